@@ -1,0 +1,48 @@
+# make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test check format bench trials wheel clean distclean
+.NOTPARALLEL:
+
+export MAKECMDGOALS
+RUN := .venv/bin/python
+PYTEST := $(RUN) -m pytest
+# pytest ends with status 5 where there is nothing to collect; that is no failure for what may be empty.
+MAY_BE_EMPTY := || test $$? -eq 5
+
+help:  ## what there is
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 18
+
+setup:
+	@PYTHON='$(PYTHON)' sh tests/setup/prepare.sh
+
+demo: setup  ## the main job on the example campaigns; leaves its results in demo-output/
+	@.venv/bin/monitor demo --out demo-output $(ARGS)
+
+test: setup  ## the tests
+	@$(PYTEST) $(ARGS)
+
+check: setup  ## format, lint, types
+	@$(RUN) -m ruff format --check .
+	@$(RUN) -m ruff check .
+	@$(RUN) -m mypy
+
+format: setup  ## put the sources into the project's format
+	@$(RUN) -m ruff check --fix-only .
+	@$(RUN) -m ruff format .
+
+bench: setup  ## how long things take (tests/benchmarks)
+	@$(PYTEST) tests/benchmarks --benchmark-only $(ARGS) $(MAY_BE_EMPTY)
+
+trials: setup  ## slow trials over many seeds, an hour; their last results are in docs/trials-*.md
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
+
+wheel: setup  ## build the wheel and run the tests against it, away from the checkout
+	@$(RUN) tests/setup/installed_wheel.py $(ARGS)
+
+clean:  ## remove what the others left, except the virtual environment
+	@rm -rf demo-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
+	@find monitor migrations reports tests examples -name __pycache__ -prune -exec rm -rf {} +
+
+distclean: clean  ## remove the virtual environment too
+	@rm -rf .venv

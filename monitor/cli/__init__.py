@@ -1,0 +1,64 @@
+"""The command line: ``monitor [--db PATH] VERB ...``. A thin face; the work is done in ``workflow``.
+
+Exit status 0: done; 1: the answer is no; 2: bad input or usage, with one plain message on standard error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Sequence
+
+from monitor.cli.parser import parse
+from monitor.exceptions import InputError, MonitorError
+
+DONE, NO, BAD_INPUT, OUR_FAULT = 0, 1, 2, 3
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one verb; the exit status."""
+    typed = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that has no µ shows a substitute; a file on its way to people is never cut off at it.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    try:
+        for text in typed:
+            if not text.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in text):
+                raise InputError(f"{text!a} is not UTF-8 text; rename it, or type it in UTF-8")
+        options = parse(typed)
+        status = int(options.run(options))
+        # What is still in the buffer is written now, where a reader who went away is no fault.
+        sys.stdout.flush()
+        return status
+    except MonitorError as error:
+        print(f"monitor: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("monitor: stopped; what was not finished was not stored", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output went away (`monitor ... | head`): no fault of anyone.
+        _let_go_of_output()
+        return DONE
+    except Exception as error:
+        if isinstance(error, OSError) and error.filename is None and error.errno is not None:
+            _let_go_of_output()
+            print(f"monitor: the output could not be written: {os.strerror(error.errno)}", file=sys.stderr)
+            return BAD_INPUT
+        if os.environ.get("MONITOR_DEBUG"):
+            raise
+        print(
+            f"monitor: this is a fault of the software, please report it: {type(error).__name__}: {error} "
+            "(with MONITOR_DEBUG=1 it shows where)",
+            file=sys.stderr,
+        )
+        return OUR_FAULT
+
+
+def _let_go_of_output() -> None:
+    """Send what is still in the buffer nowhere: Python would complain of it when it ends."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,1 @@
+"""The verbs, one file each: ``EXAMPLE``, ``options(parser)`` and ``run(options)``."""

@@ -1,0 +1,28 @@
+"""Copy the whole database into a second file, with a manifest of hashes beside it."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from monitor.cli import output
+from monitor.cli.database import opened
+from monitor.cli.parser import common
+from monitor.workflow import keeping
+
+EXAMPLE = "monitor backup monitor-2026-03-09.duckdb"
+
+
+def options(parser: ArgumentParser) -> None:
+    common(parser)
+    parser.add_argument("target", type=Path, metavar="FILE")
+
+
+def run(options: Namespace) -> int:
+    with opened(options) as db, output.working("copying"):
+        found = keeping.backup(db, options.target)
+    if options.json:
+        output.document(found)
+    else:
+        output.say(found["message"])
+    return 0

@@ -1,0 +1,48 @@
+"""Record what happened to a machine (crash, repair, compensation, another probe), or list what was recorded."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from datetime import datetime
+
+from monitor.cli import output
+from monitor.cli.database import opened
+from monitor.cli.parser import common
+from monitor.exceptions import InputError
+from monitor.workflow import keeping
+
+EXAMPLE = 'monitor event HU40-T --at 2026-03-05T07:00:00-05:00 --kind repair "B axis encoder changed"'
+
+
+def options(parser: ArgumentParser) -> None:
+    common(parser)
+    parser.add_argument("machine", metavar="MACHINE")
+    parser.add_argument(
+        "text", nargs="?", metavar="TEXT", help="what happened; without it the events are listed"
+    )
+    parser.add_argument("--at", metavar="TIME", help="ISO 8601 with an offset")
+    parser.add_argument("--kind", default="note", help="a word: crash, repair, compensation, probe, note")
+
+
+def run(options: Namespace) -> int:
+    moment = None
+    if options.at is not None:
+        try:
+            moment = datetime.fromisoformat(options.at)
+        except ValueError:
+            raise InputError(f"--at {options.at}: write a time as 2026-03-05T07:00:00-05:00") from None
+        if moment.tzinfo is None:
+            raise InputError(
+                f"--at {options.at} lacks its offset from UTC: write for example {options.at}-05:00"
+            )
+    if options.text is not None and moment is None:
+        raise InputError("say when it happened: --at 2026-03-05T07:00:00-05:00")
+    with opened(options) as db:
+        if options.text is not None and moment is not None:
+            keeping.record(db, options.machine, moment, options.kind, options.text)
+        found = keeping.events(db, options.machine)
+    if options.json:
+        output.document(found)
+    else:
+        output.listing(found["events"], "nothing was recorded yet")
+    return 0

@@ -1,0 +1,66 @@
+"""Identify the geometric errors of every run and store them. Without a campaign, of all campaigns."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import Any
+
+from monitor.cli import output
+from monitor.cli.database import opened
+from monitor.cli.parser import common
+from monitor.workflow import campaigns
+from monitor.workflow.identification import identify
+
+EXAMPLE = "monitor identify five-days"
+# A screen holds so many runs beside the names of the parameters.
+SHOWN_RUNS = 6
+
+
+def options(parser: ArgumentParser) -> None:
+    common(parser)
+    parser.add_argument("campaign", nargs="?", metavar="CAMPAIGN")
+    parser.add_argument("--model", metavar="NAME", help="a model, or a version of it: NAME@2 (default samba)")
+    parser.add_argument("--run", type=int, metavar="N", dest="number", help="this run alone")
+
+
+def run(options: Namespace) -> int:
+    with opened(options) as db, output.working("identifying"), db.transaction():
+        names = campaigns.chosen(db, options.campaign)
+        found = [identify(db, name, options.model, options.number) for name in names]
+    if options.json:
+        output.document(found[0] if options.campaign is not None else {"identifications": found})
+        return 0
+    for one in found:
+        show(one)
+    return 0
+
+
+def show(found: dict[str, Any]) -> None:
+    """The parameters of the runs, newest last, and what was refused."""
+    runs = found["runs"][-SHOWN_RUNS:]
+    names = list(dict.fromkeys(name for one in runs for name in one["parameters"]))
+    rows = []
+    for name in names:
+        cells = [one["parameters"].get(name) for one in runs]
+        unit = next(cell["unit"] for cell in cells if cell)
+        last = next(cell for cell in reversed(cells) if cell)
+        values = ["-" if cell is None else output.rounded(cell["value"], cell["u"]) for cell in cells]
+        rows.append([name, unit, *values, output.two_digits(last["u"])])
+    rows.append(["RMS", "µm", *(f"{one['rms_um']:.2f}" for one in runs), ""])
+    left_out = len(found["runs"]) - len(runs)
+    before = f" (the last {len(runs)} of {len(found['runs'])} runs; --json has all)" if left_out else ""
+    output.table(
+        f"{found['campaign']}, model {found['model']}{before}",
+        ["parameter", "unit", *(f"run {one['run']}" for one in runs), "u"],
+        rows,
+        left=2,
+    )
+    for why in dict.fromkeys(refusal["why"] for one in found["runs"] for refusal in one["refused"]):
+        output.say(f"no number: {why}")
+    for name, value in found["added"].items():
+        output.say(
+            f"{name}: {output.rounded(value['value'], value['u'])} ± {output.two_digits(value['u'])} "
+            f"{value['unit']} in all runs"
+        )
+    for refusal in found["added_refused"]:
+        output.say(f"no number: {', '.join(refusal['parameters'])}: {refusal['why']}")

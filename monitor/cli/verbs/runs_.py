@@ -1,0 +1,28 @@
+"""List the runs of a campaign with their conditions."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from monitor.cli import output
+from monitor.cli.database import opened
+from monitor.cli.parser import common
+from monitor.workflow import campaigns
+
+EXAMPLE = "monitor runs five-days"
+
+
+def options(parser: ArgumentParser) -> None:
+    common(parser)
+    parser.add_argument("campaign", metavar="CAMPAIGN")
+
+
+def run(options: Namespace) -> int:
+    with opened(options) as db:
+        campaigns.load(db, options.campaign)
+        found = campaigns.runs(db, options.campaign)
+    if options.json:
+        output.document(found)
+    else:
+        output.listing(found["runs"], "no run")
+    return 0

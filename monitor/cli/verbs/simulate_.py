@@ -1,0 +1,36 @@
+"""Write a virtual campaign folder, with a hidden effect or without, to rehearse comparison and explanation."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from monitor.cli import output
+from monitor.cli.parser import common
+from monitor.workflow.simulation import simulate
+
+EXAMPLE = 'monitor simulate rehearsal --effect "EBB:harmonic2" --peak 5 --seed 7'
+
+
+def options(parser: ArgumentParser) -> None:
+    common(parser, database=False)
+    parser.add_argument(
+        "out", type=Path, metavar="OUT", help="the folder to make; its name is the campaign's"
+    )
+    parser.add_argument("--effect", metavar="EFFECT", help="what is hidden, for example EXX:reversal")
+    parser.add_argument(
+        "--peak", type=float, default=5.0, metavar="UM", help="its largest displacement (default 5 µm)"
+    )
+    parser.add_argument(
+        "--noise", type=float, default=1.0, metavar="UM", help="of a reading, standard deviation (1 µm)"
+    )
+    parser.add_argument("--seed", type=int, default=1, metavar="S")
+
+
+def run(options: Namespace) -> int:
+    found = simulate(options.out, options.effect, options.peak, options.noise, options.seed)
+    if options.json:
+        output.document(found)
+    else:
+        output.say(found["message"])
+    return 0

@@ -1,0 +1,31 @@
+"""Hash everything anew and hold it against the audit: is the database as it was written?"""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from monitor.cli import output
+from monitor.cli.database import opened
+from monitor.cli.parser import common
+from monitor.workflow import keeping
+
+EXAMPLE = "monitor verify"
+
+
+def options(parser: ArgumentParser) -> None:
+    common(parser)
+
+
+def run(options: Namespace) -> int:
+    with opened(options) as db, output.working("verifying"):
+        found = keeping.verify(db)
+    if options.json:
+        output.document(found)
+    else:
+        for fault in found["faults"]:
+            output.say(fault)
+        verdict = "as it was written" if found["ok"] else "NOT as it was written"
+        output.say(
+            f"{options.db} is {verdict}: {found['entries']} entries, the last with hash {found['last_sha256']}"
+        )
+    return 0 if found["ok"] else 1

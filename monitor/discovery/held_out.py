@@ -1,0 +1,49 @@
+"""Error on runs that took no part in the fit: whole runs, or whole days, left out in turn.
+
+The base parameters are free in every run, so a run that was left out still finds its own; only the effects
+that all runs share are predicted from the others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Array
+
+
+def held_out_sum(residual: Array, columns: Array, row_fold: npt.NDArray[np.int64]) -> float:
+    """Sum of squares of whitened residuals (M,), each fold's with coefficients from all other folds.
+
+    ``columns`` (M, c) are the projected columns of the shared effects, ``row_fold`` (M,) the fold of each row.
+    The residual may stem from any values of the coefficients: only differences matter.
+    """
+    if columns.shape[1] == 0:
+        return float(residual @ residual)
+    scale = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(scale == 0, 1.0, scale)
+    folds = np.unique(row_fold)
+    grams = np.array([scaled[row_fold == fold].T @ scaled[row_fold == fold] for fold in folds])
+    ontos = np.array([scaled[row_fold == fold].T @ residual[row_fold == fold] for fold in folds])
+    total = 0.0
+    for place, fold in enumerate(folds):
+        gram = grams.sum(axis=0) - grams[place]
+        onto = ontos.sum(axis=0) - ontos[place]
+        coefficients = -np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ onto
+        rows = row_fold == fold
+        left = residual[rows] + scaled[rows] @ coefficients
+        total += float(left @ left)
+    return total
+
+
+def held_out_rms(
+    residual: Array, columns: Array, row_fold: npt.NDArray[np.int64], degrees_of_freedom: int, sigma: float
+) -> float | None:
+    """Held-out root mean square per degree of freedom in the unit of ``sigma``; None with fewer than two folds.
+
+    ``degrees_of_freedom`` are those that the runs' own unknowns leave. Where the model is right the result
+    estimates the standard uncertainty of a coordinate, the noise floor.
+    """
+    if len(np.unique(row_fold)) < 2:
+        return None
+    return sigma * float(np.sqrt(held_out_sum(residual, columns, row_fold) / degrees_of_freedom))

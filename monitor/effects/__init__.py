@@ -1,0 +1,23 @@
+"""What a model contains: effects written ``term:shape@driver``, and the catalogue of them with words."""
+
+from monitor.effects.context import Context, context_of, positions_of
+from monitor.effects.effect import (
+    ArtefactEffect,
+    Basis,
+    ChainEffect,
+    Effect,
+    parse_effect,
+    with_time_constant,
+)
+
+__all__ = [
+    "ArtefactEffect",
+    "Basis",
+    "ChainEffect",
+    "Context",
+    "Effect",
+    "context_of",
+    "parse_effect",
+    "positions_of",
+    "with_time_constant",
+]

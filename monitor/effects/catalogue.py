@@ -1,0 +1,115 @@
+"""The catalogue: every effect that a chain and the recorded columns allow, put together from parts.
+
+Families, each with its reason: guideways bend smoothly (poly1 to poly3 of all six motions of a linear axis);
+drives and guides have play (reversal of all six, of every moving axis); screws and scales repeat (cyclic, in
+the standard leads and the scale's pitch); tables and spindles repeat with their turn (harmonic1 to
+harmonic3 of all six); heat moves axes and stretches screws (every base effect and the spindle with each
+driver); weight bends what turns (gravity); the artefact grows and bends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from monitor.effects.context import Context
+from monitor.effects.drivers import Always
+from monitor.effects.effect import ArtefactEffect, ChainEffect, parse_effect
+from monitor.machine import COMPONENTS, Chain
+from monitor.units import CONDITION_SUFFIXES
+
+# ISO 3408-2: nominal leads of ball screws in mm, the ones that machine tools use.
+SCREW_LEADS_MM = (5.0, 10.0, 12.0, 16.0, 20.0, 25.0, 32.0, 40.0)
+
+
+def _guideways(chain: Chain) -> Iterable[str]:
+    for joint in chain.of_kind("linear"):
+        for component in COMPONENTS:
+            for order in (1, 2, 3):
+                yield f"E{component}{joint.name}:poly{order}"
+
+
+def _play(chain: Chain) -> Iterable[str]:
+    for joint in chain.joints:
+        if joint.kind != "spindle":
+            for component in COMPONENTS:
+                yield f"E{component}{joint.name}:reversal"
+
+
+def _cycles(chain: Chain, pitches: Mapping[str, float]) -> Iterable[str]:
+    for joint in chain.of_kind("linear"):
+        own = COMPONENTS[joint.direction.index(1.0)] if 1.0 in joint.direction else None
+        if own is None:
+            continue
+        for pitch in sorted({*SCREW_LEADS_MM, *([pitches[joint.name]] if joint.name in pitches else [])}):
+            yield f"E{own}{joint.name}:cyclic{pitch:g}mm"
+
+
+def _turns(chain: Chain) -> Iterable[str]:
+    for joint in chain.joints:
+        if joint.turns:
+            for component in COMPONENTS:
+                for order in (1, 2, 3):
+                    yield f"E{component}{joint.name}:harmonic{order}"
+
+
+def _heat(chain: Chain, base: Iterable[str], drivers: Iterable[str]) -> Iterable[str]:
+    spindle = [f"E{axis}{joint.name}:const" for joint in chain.of_kind("spindle") for axis in "XYZAB"]
+    for driver in drivers:
+        for effect in (*base, *spindle):
+            yield f"{effect}@{driver}"
+
+
+def _weight(chain: Chain) -> Iterable[str]:
+    for joint in chain.of_kind("rotary"):
+        for component in COMPONENTS:
+            yield f"E{component}{joint.name}:const@gravity"
+    yield "stem:gravity"
+
+
+def drivers_of(context: Context) -> tuple[str, ...]:
+    """The drivers that the recorded columns allow: time, and every channel that changes.
+
+    One with empty cells is among them, so that its effects are refused aloud and not passed over.
+    """
+    channels = [
+        name
+        for name, values in sorted(context.columns.items())
+        if name.rpartition("_")[2] in CONDITION_SUFFIXES
+        and len(known := values[np.isfinite(values)])
+        and known.min() < known.max()
+    ]
+    return ("warmup", "run_time", *channels)
+
+
+def catalogue(
+    chain: Chain, base: Iterable[str], drivers: Iterable[str], pitches: Mapping[str, float] | None = None
+) -> tuple[ChainEffect | ArtefactEffect, ...]:
+    """Every effect of the catalogue that is not in ``base``, in the order of its families.
+
+    ``drivers`` are names without @; ``pitches`` the scale pitch in mm of axes whose file gives one.
+    """
+    base = tuple(base)
+    drivers = tuple(drivers)
+    texts = [
+        *_guideways(chain),
+        *_play(chain),
+        *_cycles(chain, pitches or {}),
+        *_turns(chain),
+        *_heat(chain, base, drivers),
+        *_weight(chain),
+        *(f"artefact:expansion@{driver}" for driver in drivers),
+    ]
+    known = {parse_effect(text, chain).text for text in base}
+    found: dict[str, ChainEffect | ArtefactEffect] = {}
+    for text in texts:
+        effect = parse_effect(text, chain)
+        if effect.text not in known:
+            found.setdefault(effect.text, effect)
+    return tuple(found.values())
+
+
+def is_driven(effect: ChainEffect | ArtefactEffect) -> bool:
+    """Whether an effect has a driver."""
+    return not isinstance(effect.driver, Always)

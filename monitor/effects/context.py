@@ -1,0 +1,116 @@
+"""What an effect may depend on: where every axis stood, when, after which move, and what was recorded."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import DataError
+from monitor.machine import Chain, gravity_in_joint_frames
+from monitor.records import Array, Campaign
+from monitor.units import DEGREE
+
+# ISO 1:2022: the reference temperature of geometrical specifications.
+REFERENCE_TEMPERATURE_DEGC = 20.0
+
+
+@dataclass(frozen=True)
+class Context:
+    """n probings as effects see them.
+
+    ``positions`` (n, J) physical displacements in mm and rad; ``run`` (n,) the run's number; ``sequence`` (n,);
+    ``time`` (n,) s since the run began; ``day_time`` (n,) s since the first run of the day began; ``run_time``
+    (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
+    the frame of the last work axis; ``columns`` recorded columns by their names in the file, in its units.
+    """
+
+    chain: Chain
+    positions: Array
+    run: npt.NDArray[np.int64]
+    sequence: npt.NDArray[np.int64]
+    time: Array
+    day_time: Array
+    run_time: Array
+    target: npt.NDArray[np.str_]
+    nominal: Array
+    columns: Mapping[str, Array]
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+    @cached_property
+    def travel(self) -> Array:
+        """Sign (n, J) of every axis's last travel; before an axis has moved in a run, that of its position.
+
+        The controller references every axis at zero, so a first position is reached from there.
+        """
+        signs = np.zeros_like(self.positions)
+        for run in np.unique(self.run):
+            rows = np.flatnonzero(self.run == run)
+            last = np.sign(self.positions[rows[0]])
+            signs[rows[0]] = last
+            for before, row in itertools.pairwise(rows):
+                step = np.sign(self.positions[row] - self.positions[before])
+                last = np.where(step != 0, step, last)
+                signs[row] = last
+        return signs
+
+    @cached_property
+    def gravity(self) -> Array:
+        """Unit vectors (n, J, 3) of gravity in the frame of every axis."""
+        return gravity_in_joint_frames(self.chain, self.positions)
+
+
+def positions_of(chain: Chain, readings: Mapping[str, Array]) -> Array:
+    """Physical displacements (n, J) of all joints; a joint without readings stands at zero."""
+    count = len(next(iter(readings.values())))
+    positions = np.zeros((count, len(chain.joints)))
+    for place, joint in enumerate(chain.joints):
+        if joint.name in readings:
+            positions[:, place] = joint.sign * readings[joint.name]
+    return positions
+
+
+def context_of(campaign: Campaign, chain: Chain) -> Context:
+    """The context of all probings of a campaign, in file order."""
+    probings = campaign.probings
+    if len(probings) == 0:
+        raise DataError(f"campaign {campaign.name} has no probings")
+    runs = {run.run: run for run in campaign.runs}
+    first_of_day = {
+        run.day: min(other.started_at for other in campaign.runs if other.day == run.day)
+        for run in campaign.runs
+    }
+    since = {number: (run.started_at - first_of_day[run.day]).total_seconds() for number, run in runs.items()}
+    run_time = np.zeros(len(probings))
+    for number in np.unique(probings.run):
+        rows = probings.run == number
+        start, end = probings.time[rows].min(), probings.time[rows].max()
+        run_time[rows] = (probings.time[rows] - start) / (end - start) if end > start else 0.0
+    nominal = {ball.id: ball.nominal for ball in campaign.artefact.balls}
+    columns: dict[str, Array] = dict(probings.channels)
+    for name in sorted({name for run in campaign.runs for name in run.conditions}):
+        if name not in columns:
+            columns[name] = np.array([runs[int(run)].conditions.get(name, np.nan) for run in probings.run])
+    for axis, values in probings.readings.items():
+        joint = next((joint for joint in chain.joints if joint.name == axis), None)
+        turns = joint is not None and joint.turns
+        columns[f"{axis.lower()}_{'deg' if turns else 'mm'}"] = values / DEGREE.factor if turns else values
+    columns["time_s"] = probings.time
+    return Context(
+        chain=chain,
+        positions=positions_of(chain, probings.readings),
+        run=probings.run,
+        sequence=probings.sequence,
+        time=probings.time,
+        day_time=probings.time + np.array([since[int(run)] for run in probings.run]),
+        run_time=run_time,
+        target=probings.target,
+        nominal=np.array([nominal[target] for target in probings.target], dtype=float),
+        columns=columns,
+    )

@@ -1,0 +1,207 @@
+"""An effect: one entry of a model, written ``term:shape@driver``.
+
+``parse_effect`` turns the text into an object that gives its basis functions at every probing, what they do
+to the tip-to-target vector, and the names and units of its coefficients. Effects of the chain add to the
+errors of one joint; effects of the artefact shift the target.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from monitor.effects.artefact import ArtefactChange, parse_artefact
+from monitor.effects.context import Context
+from monitor.effects.drivers import Always, Driver, WarmUp, parse_driver
+from monitor.effects.shapes import Const, Cyclic, Poly, Shape, parse_shape
+from monitor.exceptions import EffectError
+from monitor.machine import LOCATION, MOTION, Chain, Joint, Term, parse_term
+from monitor.records import Array
+from monitor.units import ONE, Unit
+
+
+@dataclass(frozen=True)
+class ChainBasis:
+    """An effect of the chain, evaluated at n probings: ``columns`` (n, k) of one error of one joint."""
+
+    term: Term
+    columns: Array
+
+    @property
+    def size(self) -> int:
+        """How many coefficients the effect has."""
+        return int(self.columns.shape[-1])
+
+    def displacement(self, by_error: Array) -> Array:
+        """Change (n, 3, k) of the tip-to-target vector for each coefficient, from ``Evaluation.by_error``."""
+        direction = by_error[:, :, self.term.joint, self.term.stage, self.term.component]
+        moved: Array = direction[:, :, None] * self.columns[:, None, :]
+        return moved
+
+    def apply(self, coefficients: Array, errors: Array, target: Array) -> None:
+        """Add the effect, in place, to ``errors`` (n, J, 2, 6); ``coefficients`` is (k,) or (n, k)."""
+        added = np.sum(self.columns * coefficients, axis=-1)
+        errors[..., self.term.joint, self.term.stage, self.term.component] += added
+
+
+@dataclass(frozen=True)
+class ArtefactBasis:
+    """A change of the targets, evaluated at n probings: ``shifts`` (n, 3, k) in mm."""
+
+    shifts: Array
+
+    @property
+    def size(self) -> int:
+        """How many coefficients the effect has."""
+        return int(self.shifts.shape[-1])
+
+    def displacement(self, by_error: Array) -> Array:
+        """Change (n, 3, k) of the tip-to-target vector for each coefficient."""
+        return -self.shifts
+
+    def apply(self, coefficients: Array, errors: Array, target: Array) -> None:
+        """Shift ``target`` (n, 3) in place; ``coefficients`` is (k,) or (n, k)."""
+        target += np.sum(self.shifts * np.expand_dims(coefficients, -2), axis=-1)
+
+
+Basis = ChainBasis | ArtefactBasis
+
+
+class Effect(Protocol):
+    """What every effect offers; n probings, k coefficients."""
+
+    @property
+    def text(self) -> str:
+        """The effect as written."""
+        ...
+
+    def parameters(self, context: Context) -> tuple[str, ...]:
+        """Names of the k coefficients."""
+        ...
+
+    @property
+    def unit(self) -> Unit:
+        """The unit of the coefficients."""
+        ...
+
+    def basis(self, context: Context) -> Basis:
+        """The effect evaluated at every probing of a context."""
+        ...
+
+
+@dataclass(frozen=True)
+class ChainEffect:
+    """An error of one joint."""
+
+    term: Term
+    joint: Joint
+    shape: Shape
+    shape_text: str
+    driver: Driver
+    driver_text: str
+
+    @property
+    def text(self) -> str:
+        shape = "" if self.term.stage == LOCATION and isinstance(self.shape, Const) else f":{self.shape_text}"
+        return f"{self.term.symbol}{shape}" + (f"@{self.driver_text}" if self.driver_text else "")
+
+    @property
+    def is_gain(self) -> bool:
+        """Whether this is a positioning gain, the first-order term of EXX."""
+        return (
+            isinstance(self.shape, Poly)
+            and self.shape.order == 1
+            and isinstance(self.driver, Always)
+            and self.term.stage == MOTION
+            and not self.joint.turns
+            and not self.term.is_rotation
+            and self.joint.direction[self.term.component] == 1.0
+        )
+
+    @cached_property
+    def unit(self) -> Unit:
+        unit = self.shape.unit(self.term.unit, self.joint)
+        driver = self.driver.unit()
+        return unit if driver is ONE else unit.per(driver)
+
+    def parameters(self, context: Context) -> tuple[str, ...]:
+        # The gain is known by its ISO 230-1 symbol alone; that is how certificates print it.
+        name = self.term.symbol if self.is_gain else self.text
+        return tuple(f"{name}{s}{d}" for s in self.shape.labels for d in self.driver.labels(context))
+
+    def basis(self, context: Context) -> ChainBasis:
+        shape = self.shape.columns(context, self.term.joint)
+        driver = self.driver.columns(context, self.term.joint)
+        product = (shape[:, :, None] * driver[:, None, :]).reshape(len(shape), -1)
+        return ChainBasis(self.term, product)
+
+
+@dataclass(frozen=True)
+class ArtefactEffect:
+    """A change of the targets."""
+
+    change: ArtefactChange
+    driver: Driver
+    driver_text: str
+
+    @property
+    def text(self) -> str:
+        return self.change.text + (f"@{self.driver_text}" if self.driver_text else "")
+
+    @property
+    def unit(self) -> Unit:
+        driver = self.driver.unit()
+        return self.change.unit if driver is ONE else self.change.unit.per(driver)
+
+    def parameters(self, context: Context) -> tuple[str, ...]:
+        return tuple(
+            f"{self.text}{s}{d}" for s in self.change.labels(context) for d in self.driver.labels(context)
+        )
+
+    def basis(self, context: Context) -> ArtefactBasis:
+        shift = self.change.shifts(context)
+        driver = self.driver.columns(context, None)
+        product = (shift[:, :, :, None] * driver[:, None, None, :]).reshape(len(shift), 3, -1)
+        return ArtefactBasis(product)
+
+
+def parse_effect(text: str, chain: Chain) -> ChainEffect | ArtefactEffect:
+    """The effect that a text names on a chain; EffectError says what is wrong and what would be right."""
+    body, driver_text = _split_driver(text.strip())
+    head, _, rest = body.partition(":")
+    if head in ("ball", "artefact", "stem"):
+        return ArtefactEffect(parse_artefact(body), parse_driver(driver_text), driver_text)
+    term = parse_term(head, chain)
+    if not rest:
+        if term.stage != LOCATION:
+            raise EffectError(
+                f"'{text}' is an error motion and needs a shape: write for example {head}:poly1 or {head}:const"
+            )
+        rest = "const"
+    joint = chain.joints[term.joint]
+    shape = parse_shape(rest)
+    if isinstance(shape, Cyclic) and joint.turns:
+        raise EffectError(
+            f"'{text}': a cyclic pitch in mm belongs to a linear axis; for {joint.name} write harmonic1"
+        )
+    if rest.startswith("harmonic") and not joint.turns:
+        raise EffectError(f"'{text}': a harmonic belongs to a rotary axis; for {joint.name} write cyclic20mm")
+    return ChainEffect(term, joint, shape, rest, parse_driver(driver_text, joint), driver_text)
+
+
+def _split_driver(text: str) -> tuple[str, str]:
+    """Body and driver; an @ inside brackets belongs to a formula."""
+    at = text.rfind("@")
+    if at == -1 or ")" in text[at:]:
+        return text, ""
+    if at == len(text) - 1:
+        raise EffectError(f"'{text}' ends in @ without a driver; write for example {text}warmup")
+    return text[:at], text[at + 1 :]
+
+
+def with_time_constant(effect: ChainEffect | ArtefactEffect, seconds: float) -> ChainEffect | ArtefactEffect:
+    """The same effect with the time constant of its warm-up fixed; its text keeps ``@warmup``."""
+    return replace(effect, driver=WarmUp(seconds))

@@ -1,0 +1,76 @@
+"""Errors that a user can act on; each message is a plain sentence that says what would be right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class MonitorError(Exception):
+    """Base of every error that the product raises on purpose."""
+
+
+class InputError(MonitorError):
+    """What the user gave is wrong; the message says what would be right (exit status 2)."""
+
+
+class TopologyError(InputError):
+    """A topology string that cannot be parsed."""
+
+
+class EffectError(InputError):
+    """An effect that the language, the machine or the recorded columns do not have."""
+
+
+class NotFoundError(InputError):
+    """A name that is not in the database; the message lists what is there."""
+
+
+class DataError(InputError):
+    """Readings, arrays or groups from which the requested result cannot be computed."""
+
+
+class StoreError(InputError):
+    """A database that cannot be opened, is newer than the software, or was altered."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of an input file.
+
+    ``line`` counts from 1 (the header is line 1); ``column`` is the column's or key's name. Either may be
+    None where the fault has no such place.
+    """
+
+    file: str
+    line: int | None
+    column: str | None
+    message: str
+
+    def __str__(self) -> str:
+        place = self.file
+        if self.line is not None:
+            place += f", line {self.line}"
+        if self.column is not None:
+            place += f", column {self.column}"
+        return f"{place}: {self.message}"
+
+
+class CampaignError(InputError):
+    """A campaign folder that was refused as a whole; ``faults`` holds everything that is wrong with it."""
+
+    SHOWN_IN_FULL = 20
+
+    def __init__(self, folder: str, faults: Sequence[Fault]) -> None:
+        self.folder = folder
+        self.faults = tuple(faults)
+        count = len(self.faults)
+        lines = [f"{folder} was refused, nothing of it was kept: {count} fault{'s' if count != 1 else ''}."]
+        lines += [f"  {fault}" for fault in self.faults[: self.SHOWN_IN_FULL]]
+        if count > self.SHOWN_IN_FULL:
+            lines.append(f"  ... and {count - self.SHOWN_IN_FULL} more.")
+        super().__init__("\n".join(lines))
+
+
+class RefusedResultError(DataError):
+    """A result that refuses itself: it was computed, but must not be used; the message says why."""

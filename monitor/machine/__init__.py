@@ -1,0 +1,22 @@
+"""The machine as a serial chain: topology string, ISO 230-1 terms, tip-to-target vector and its Jacobian."""
+
+from monitor.machine.chain import Evaluation, evaluate
+from monitor.machine.gravity import gravity_in_joint_frames
+from monitor.machine.inverse import touching_positions
+from monitor.machine.terms import COMPONENTS, LOCATION, MOTION, Term, parse_term
+from monitor.machine.topology import Chain, Joint, parse_topology
+
+__all__ = [
+    "COMPONENTS",
+    "LOCATION",
+    "MOTION",
+    "Chain",
+    "Evaluation",
+    "Joint",
+    "Term",
+    "evaluate",
+    "gravity_in_joint_frames",
+    "parse_term",
+    "parse_topology",
+    "touching_positions",
+]

@@ -1,0 +1,46 @@
+"""Where the linear axes must stand so that the tip touches a target, for given angles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from monitor.exceptions import DataError
+from monitor.machine.chain import evaluate
+from monitor.machine.terms import MOTION
+from monitor.machine.topology import Chain
+from monitor.records import Array
+
+# A nominal chain is linear in its linear axes, so one step is exact; small errors leave products of second
+# order, and each further step squares what is left: 1e-3 mm, 1e-9 mm, below a double's last digit.
+STEPS = 5
+CLOSE_ENOUGH = 1e-9
+
+
+def touching_positions(chain: Chain, positions: Array, errors: Array, target: Array, tip: Array) -> Array:
+    """Positions (n, J) with the linear axes moved so that tip and target coincide.
+
+    ``positions`` (n, J) gives the rotary axes and a start for the linear ones, in mm and rad; the other
+    arguments are as in ``evaluate``. Raises DataError where the linear axes cannot reach the target.
+    """
+    found = np.array(positions, dtype=float)
+    linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
+    if len(linear) < 3:
+        raise DataError(
+            f"'{chain.topology}' has {len(linear)} linear axes; a touch needs three to reach its target"
+        )
+    directions = np.array([chain.joints[place].direction for place in linear])
+    for _ in range(STEPS):
+        seen = evaluate(chain, found, errors, target, tip, jacobian=True)
+        if np.abs(seen.residual).max(initial=0.0) < CLOSE_ENOUGH:
+            return found
+        assert seen.by_error is not None
+        shifts = seen.by_error[..., linear, MOTION, :3]  # (n, 3, axes, component)
+        slopes = np.einsum("...rac,ac->...ra", shifts, directions)
+        step = np.einsum("...ar,...r->...a", np.linalg.pinv(slopes), seen.residual)
+        found[..., linear] -= step
+    miss = float(np.abs(evaluate(chain, found, errors, target, tip).residual).max())
+    if miss > CLOSE_ENOUGH * 1e3:
+        raise DataError(
+            f"the linear axes of '{chain.topology}' cannot reach every target: {miss:.3g} mm are left"
+        )
+    return found

@@ -1,0 +1,21 @@
+"""Calibration methods, one file each, and the least-squares solver that they share.
+
+A method is a module with ``NAME``, ``problem_of(campaign, model)`` and ``identify(campaign, model)``; another
+one is another file, listed here.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+from monitor.exceptions import DataError
+from monitor.methods import samba
+
+METHODS: dict[str, ModuleType] = {module.NAME: module for module in (samba,)}
+
+
+def method_named(name: str) -> ModuleType:
+    """The method of a campaign; DataError lists those that can be identified."""
+    if name not in METHODS:
+        raise DataError(f"method '{name}' cannot be identified yet; these can: {', '.join(METHODS)}")
+    return METHODS[name]

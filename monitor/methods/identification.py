@@ -1,0 +1,59 @@
+"""What an identification found: the geometric errors of every run, and what the plan cannot separate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from monitor.records import Array
+from monitor.units import Unit
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Parameters that the plan cannot tell apart, and why; none of them gets a number."""
+
+    parameters: tuple[str, ...]
+    why: str
+
+
+@dataclass(frozen=True)
+class RunIdentification:
+    """One run. ``estimate`` (k,) and ``covariance`` (k, k) are in internal units, NaN where refused.
+
+    ``unknowns`` maps every other unknown of the run (ball coordinates, stylus tip) to its value in mm.
+    ``residuals`` (m, 3) mm from target to tip in the frame of the last work axis, one row a probing.
+    ``chi_square`` is the sum of the squared weighted residuals, ``degrees_of_freedom`` its expectation.
+    """
+
+    run: int
+    estimate: Array
+    covariance: Array
+    unknowns: Mapping[str, float]
+    refused: tuple[Refusal, ...]
+    residuals: Array
+    rms: float
+    chi_square: float
+    degrees_of_freedom: int
+
+
+@dataclass(frozen=True)
+class Identification:
+    """All runs of a campaign under one model.
+
+    ``parameters`` names the k base parameters, ``units`` their display units. ``added`` names the parameters
+    common to all runs, with ``added_estimate`` (c,) and ``added_covariance`` (c, c) in internal units.
+    """
+
+    campaign: str
+    method: str
+    model: str
+    parameters: tuple[str, ...]
+    units: tuple[Unit, ...]
+    runs: tuple[RunIdentification, ...]
+    added: tuple[str, ...]
+    added_units: tuple[Unit, ...]
+    added_estimate: Array
+    added_covariance: Array
+    added_refused: tuple[Refusal, ...]
+    iterations: int

@@ -1,0 +1,172 @@
+"""Least squares for many runs at once: unknowns of each run, unknowns common to all, rank and null space.
+
+The runs share only the common unknowns, so every Gauss-Newton step takes each run's own columns out first
+(QR, then a singular value decomposition of the small triangle) and solves for the common ones on what is
+left. What the data cannot separate is found by the rank, gets no step and no number, and is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+
+# Columns are scaled to unit length first. Unknowns that a plan separates leave singular values above 1e-3 on
+# the plans tried; those that it cannot separate leave products of errors of second order, below 1e-6 for
+# errors of 1 mrad and 1 mm. The limit stands between.
+RANK_TOLERANCE = 1e-5
+# Of a common unknown the same limit would keep directions that only products of errors of second order leave; they
+# turn with every step, which then does not converge. What is left less than this part says nothing of the effect.
+COMMON_RANK_TOLERANCE = 1e-3
+# Steps are measured in standard deviations of the whitened residuals; a hundred-millionth is far below any
+# digit that is printed.
+STEP_TOLERANCE = 1e-8
+MOST_ITERATIONS = 50
+MOST_HALVINGS = 12
+# A member of a null vector is named where its share exceeds this part of the largest.
+MEMBER_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Whitened residuals (R, N) of R runs, padded with zero rows, and their derivatives.
+
+    ``local`` (R, N, p) by the unknowns of the run, ``common`` (R, N, c) by those of all runs.
+    """
+
+    residual: Array
+    local: Array
+    common: Array
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The least-squares point of R runs with p unknowns each and c common ones.
+
+    ``local`` (R, p) and ``common`` (c,) with the covariances ``local_covariance`` (R, p, p) and
+    ``common_covariance`` (c, c) for residuals of unit variance; ``local_free`` (R, p) and ``common_free`` (c,)
+    say which unknowns the data determine; ``null_space`` (R, p, p) holds scaled null vectors in its rows,
+    zero rows where there is none. ``rank`` (R,) counts what each run determines.
+    """
+
+    local: Array
+    common: Array
+    local_covariance: Array
+    common_covariance: Array
+    local_free: npt.NDArray[np.bool_]
+    common_free: npt.NDArray[np.bool_]
+    null_space: Array
+    rank: npt.NDArray[np.int64]
+    iterations: int
+    last: Linearisation
+
+
+@dataclass(frozen=True)
+class _Elimination:
+    """Each run's own columns, orthonormalised: ``basis`` (R, N, p), zero where there is no rank."""
+
+    basis: Array
+    inverse: Array  # (R, p, p): coefficients in the basis to unknowns
+    null_space: Array
+    rank: npt.NDArray[np.int64]
+
+
+def eliminate(local: Array) -> _Elimination:
+    """Orthonormal basis of what each run's own unknowns can do, and its null space."""
+    scale = np.linalg.norm(local, axis=1)
+    scale[scale == 0] = 1.0
+    q, triangle = np.linalg.qr(local / scale[:, None, :])
+    u, s, vt = np.linalg.svd(triangle)
+    keep = s > RANK_TOLERANCE * s.max(axis=-1, keepdims=True, initial=0.0)
+    basis = (q @ u) * keep[:, None, :]
+    inverse_s = np.where(keep, 1.0 / np.where(keep, s, 1.0), 0.0)
+    inverse = np.swapaxes(vt, -1, -2) * inverse_s[:, None, :] / scale[:, :, None]
+    return _Elimination(basis, inverse, vt * ~keep[:, :, None], keep.sum(axis=-1))
+
+
+def project_out(basis: Array, columns: Array) -> Array:
+    """What is left of columns (R, N, k) once the span of ``basis`` (R, N, p) is taken out."""
+    left: Array = columns - basis @ (np.swapaxes(basis, -1, -2) @ columns)
+    return left
+
+
+def _common_step(left: Array, whole: Array, residual: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Step, covariance and identifiability of the common unknowns."""
+    count = left.shape[-1]
+    if count == 0:
+        return np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool)
+    scale = np.linalg.norm(whole.reshape(-1, count), axis=0)
+    scale[scale == 0] = 1.0
+    matrix = left.reshape(-1, count) / scale
+    u, s, vt = np.linalg.svd(matrix, full_matrices=False)
+    keep = s > COMMON_RANK_TOLERANCE
+    inverse_s = np.where(keep, 1.0 / np.where(keep, s, 1.0), 0.0)
+    inverse = (vt.T * inverse_s) / scale[:, None]
+    free = np.abs(vt[~keep]).max(axis=0, initial=0.0) < MEMBER_SHARE
+    return -inverse @ (u.T @ residual.reshape(-1)), inverse @ inverse.T, free
+
+
+def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, common: Array) -> Solution:
+    """The least-squares point by Gauss-Newton, from the start ``local`` (R, p) and ``common`` (c,).
+
+    Raises DataError if it does not converge, which means readings that contradict the machine file (a wrong
+    sign, a wrong axis or a ball confused with another).
+    """
+    now = linearise(local, common)
+    cost = float(np.sum(now.residual**2))
+    for iteration in range(1, MOST_ITERATIONS + 1):
+        space = eliminate(now.local)
+        whole = np.concatenate([now.common, now.residual[..., None]], axis=-1)
+        left = project_out(space.basis, whole)
+        step_common, covariance, free = _common_step(left[..., :-1], now.common, left[..., -1])
+        moved = now.residual + now.common @ step_common
+        in_basis = -np.einsum("rnp,rn->rp", space.basis, moved)
+        step_local = np.einsum("rkp,rp->rk", space.inverse, in_basis)
+        size = float(np.sqrt(np.sum(in_basis**2) + np.sum((left[..., :-1] @ step_common) ** 2)))
+        factor = 1.0
+        for _ in range(MOST_HALVINGS):
+            trial = linearise(local + factor * step_local, common + factor * step_common)
+            trial_cost = float(np.sum(trial.residual**2))
+            if trial_cost <= cost or size < 1.0:
+                break
+            factor /= 2.0
+        local, common = local + factor * step_local, common + factor * step_common
+        now, cost = trial, trial_cost
+        if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)):
+            return _solution(local, common, now, covariance, free, iteration)
+    raise DataError(
+        f"the identification did not converge in {MOST_ITERATIONS} steps: the readings contradict the machine file; "
+        "check the axis signs, the topology and the order of the targets"
+    )
+
+
+def _solution(
+    local: Array,
+    common: Array,
+    now: Linearisation,
+    covariance: Array,
+    free: npt.NDArray[np.bool_],
+    iterations: int,
+) -> Solution:
+    space = eliminate(now.local)
+    own = space.inverse @ np.swapaxes(space.inverse, -1, -2)
+    reaction = space.inverse @ (np.swapaxes(space.basis, -1, -2) @ now.common)
+    own = own + reaction @ covariance @ np.swapaxes(reaction, -1, -2)
+    share = np.abs(space.null_space).max(axis=1)
+    return Solution(
+        local=local,
+        common=common,
+        local_covariance=own,
+        common_covariance=covariance,
+        local_free=share < MEMBER_SHARE,
+        common_free=free,
+        null_space=space.null_space,
+        rank=space.rank,
+        iterations=iterations,
+        last=now,
+    )

@@ -1,0 +1,39 @@
+"""A model: the effects that are free in every run and those that all runs of a campaign share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
+from monitor.exceptions import EffectError
+from monitor.machine import Chain, parse_topology
+from monitor.methods.base_effects import base_effects
+from monitor.records import Machine
+
+
+@dataclass(frozen=True)
+class Model:
+    """A named list of effects. ``base`` empty means: the complete and minimal set of the machine's chain."""
+
+    name: str
+    base: tuple[str, ...] = ()
+    added: tuple[str, ...] = ()
+
+    def base_of(self, chain: Chain) -> tuple[ChainEffect | ArtefactEffect, ...]:
+        """The effects that are free in every run."""
+        return tuple(parse_effect(text, chain) for text in (self.base or base_effects(chain)))
+
+    def added_to(self, chain: Chain) -> tuple[ChainEffect | ArtefactEffect, ...]:
+        """The effects that all runs share; EffectError where one is in the base already or named twice."""
+        effects = tuple(parse_effect(text, chain) for text in self.added)
+        texts = [effect.text for effect in (*self.base_of(chain), *effects)]
+        twice = sorted({text for text in texts if texts.count(text) > 1})
+        if twice:
+            raise EffectError(f"model {self.name} has {twice[0]} already; name an effect once")
+        return effects
+
+
+def chain_of(machine: Machine) -> Chain:
+    """The chain that a machine's file describes."""
+    signs = {name: axis.sign for name, axis in machine.axes.items() if axis.sign is not None}
+    return parse_topology(machine.topology, signs)

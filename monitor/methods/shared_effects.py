@@ -1,0 +1,94 @@
+"""The parameters that all runs of a campaign share, as they are reported: with numbers, or refused with the reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.effects import Basis, ChainEffect, Effect
+from monitor.effects.effect import ChainBasis
+from monitor.machine import evaluate
+from monitor.methods.identification import Refusal
+from monitor.methods.least_squares import Solution
+from monitor.methods.touch import TouchProblem
+from monitor.records import Array
+from monitor.units import MINUTE, Unit
+
+# The largest effect that a machine in use is likely to have: 50 µm at the tip, or an angle of 1 mrad. The
+# tolerances of geometric tests of machining centres (ISO 10791-1 to -3) are about 10 µm and 60 µrad. A plan that
+# leaves an uncertainty as large as that says nothing of the effect.
+LARGEST_DISPLACEMENT = 50e-3
+LARGEST_ANGLE = 1e-3
+
+UNSEEN = "what it does at this plan's probings is done by the parameters that are free in every run"
+
+
+@dataclass(frozen=True)
+class SharedParameters:
+    """``estimate`` (c,) and ``covariance`` (c, c) in internal units, NaN where refused; time constants in s."""
+
+    names: tuple[str, ...]
+    units: tuple[Unit, ...]
+    estimate: Array
+    covariance: Array
+    refused: tuple[Refusal, ...]
+
+
+def largest_coefficient(effect: Effect, basis: Basis, peak: float) -> float:
+    """The size of the coefficients that a machine in use is likely to have at most, in internal units.
+
+    ``peak`` mm is the largest displacement that a unit of any coefficient causes at any probing.
+    """
+    if peak == 0.0:
+        return 0.0
+    limit = LARGEST_DISPLACEMENT / peak
+    if isinstance(effect, ChainEffect) and isinstance(basis, ChainBasis) and effect.term.is_rotation:
+        limit = min(limit, LARGEST_ANGLE / float(np.abs(basis.columns).max()))
+    return limit
+
+
+def shared_parameters(problem: TouchProblem, solution: Solution) -> SharedParameters:
+    """The common unknowns of a solution: time constants in seconds, and no number for what the plan barely sees."""
+    estimate = solution.common.copy()
+    covariance = solution.common_covariance.copy()
+    units: list[Unit] = []
+    why: list[str] = ["" if free else UNSEEN for free in solution.common_free]
+    errors, target, tip = problem.state(solution.local, solution.common)
+    context = problem.context
+    by_error = evaluate(context.chain, context.positions, errors, target, tip, jacobian=True).by_error
+    assert by_error is not None
+    place = 0
+    for added in problem.shared:
+        own = slice(place, place + added.unknowns)
+        basis = added.basis(solution.common[own])
+        moved = basis.displacement(by_error)
+        limit = largest_coefficient(
+            added.effect, basis, float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+        )
+        for one in range(place, place + added.size):
+            units.append(added.effect.unit)
+            u = float(np.sqrt(covariance[one, one]))
+            if not why[one] and u > limit:
+                why[one] = (
+                    f"this plan sees so little of it that its standard uncertainty, "
+                    f"{added.effect.unit.to_display(u):.2g} {added.effect.unit.name}, exceeds what a machine may have"
+                )
+        if added.searched:
+            last = place + added.size
+            units.append(MINUTE)
+            tau = float(np.exp(estimate[last]))
+            estimate[last] = tau
+            covariance[last, :] *= tau
+            covariance[:, last] *= tau
+        place += added.unknowns
+    kept = np.array([not reason for reason in why], dtype=bool)
+    return SharedParameters(
+        names=problem.added_names,
+        units=tuple(units),
+        estimate=np.where(kept, estimate, np.nan),
+        covariance=np.where(kept[:, None] & kept, covariance, np.nan),
+        refused=tuple(
+            Refusal((name,), reason) for name, reason in zip(problem.added_names, why, strict=True) if reason
+        ),
+    )

@@ -1,0 +1,20 @@
+"""Campaigns from and to files: bytes in, a campaign out, or every fault of the folder in one refusal.
+
+``read_campaign`` reads a folder in any format that is registered; ``write_campaign`` writes campaign folder
+format 1, for virtual campaigns and for handing data on. A format is one file in ``formats``, a method's rules
+are one file in ``methods``; plug-ins come through the entry points of the group ``monitor.readers``.
+"""
+
+from monitor.readers.method_rules import MethodRules, Plan
+from monitor.readers.registry import Reader, method_rules, read_campaign, readers
+from monitor.readers.writer import write_campaign
+
+__all__ = [
+    "MethodRules",
+    "Plan",
+    "Reader",
+    "method_rules",
+    "read_campaign",
+    "readers",
+    "write_campaign",
+]

@@ -1,0 +1,85 @@
+"""``campaign.toml`` from the records of a campaign."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+from monitor.readers.axes import axes_of
+from monitor.readers.decimals import decimal_in
+from monitor.records import Artefact, Campaign, Machine, Probe
+from monitor.units import MICROMETRE
+
+
+def campaign_toml(campaign: Campaign) -> str:
+    """The text of the file; keys that the records leave open are left out."""
+    lines = [
+        "format = 1",
+        f"campaign = {_text(campaign.name)}",
+        f"method = {_text(campaign.method)}",
+        *_machine(campaign.machine),
+        *_probe(campaign.probe),
+        *_artefact(campaign.artefact),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _machine(machine: Machine) -> Iterator[str]:
+    yield from ("", "[machine]", f"id = {_text(machine.id)}")
+    for key in ("manufacturer", "model", "serial_number", "location"):
+        value = getattr(machine, key)
+        if value is not None:
+            yield f"{key} = {_text(value)}"
+    yield f"topology = {_text(machine.topology)}"
+    axes = {axis.name: axis for axis in axes_of(machine.topology)[0]}
+    for name, settings in machine.axes.items():
+        yield from ("", f"[machine.axes.{_text(name)}]")
+        if settings.sign is not None:
+            yield f"sign = {settings.sign}"
+        if settings.stroke is not None and name in axes:
+            ends = ", ".join(map(decimal_in(axes[name].unit), settings.stroke))
+            yield f"stroke_{axes[name].suffix} = [{ends}]"
+        if settings.scale_pitch is not None:
+            yield f"scale_pitch_mm = {settings.scale_pitch!r}"
+    if machine.tolerances:
+        yield from ("", "[machine.tolerances]")
+        yield from (f"{_text(name)} = {float(limit)!r}" for name, limit in machine.tolerances.items())
+
+
+def _probe(probe: Probe) -> Iterator[str]:
+    yield from ("", "[probe]", f"id = {_text(probe.id)}", f"model = {_text(probe.model)}")
+    yield f"standard_uncertainty_um = {decimal_in(MICROMETRE)(probe.standard_uncertainty)}"
+    if probe.tip is not None:
+        yield f"tip_mm = {_numbers(probe.tip)}"
+    if probe.certificate is not None:
+        yield f"certificate = {_text(probe.certificate)}"
+
+
+def _artefact(artefact: Artefact) -> Iterator[str]:
+    yield from ("", "[artefact]")
+    if artefact.id:
+        yield f"id = {_text(artefact.id)}"
+    for ball in artefact.balls:
+        yield from ("", "[[artefact.balls]]", f"id = {_text(ball.id)}")
+        yield f"nominal_mm = {_numbers(ball.nominal)}"
+        yield f"diameter_mm = {float(ball.diameter)!r}"
+    bar = artefact.scale_bar
+    if bar is None:
+        return
+    yield from ("", "[artefact.scale_bar]", f"balls = [{_text(bar.balls[0])}, {_text(bar.balls[1])}]")
+    yield f"length_mm = {float(bar.length)!r}"
+    yield f"standard_uncertainty_mm = {float(bar.standard_uncertainty)!r}"
+    yield f"certificate = {_text(bar.certificate)}"
+    if bar.expansion_coefficient is not None:
+        yield f"expansion_coefficient_per_K = {float(bar.expansion_coefficient)!r}"
+    if bar.reference_temperature is not None:
+        yield f"reference_temperature_degC = {float(bar.reference_temperature)!r}"
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return "[" + ", ".join(repr(float(value)) for value in values) + "]"
+
+
+def _text(value: str) -> str:
+    # A JSON string is a TOML basic string, but for DEL, which the reader refuses like every control character.
+    return json.dumps(value, ensure_ascii=False)

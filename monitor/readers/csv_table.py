@@ -1,0 +1,139 @@
+"""A CSV file as columns of text, one line a row, so that every message can name its line."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from monitor.readers.faults import Faults, near, one_of, quoted
+
+#: Longest line, in characters; a row of the examples has 70.
+LONGEST_LINE = 65_536
+#: Most lines of one file: two years of touching without a pause, at one touch a minute.
+MOST_LINES = 1_000_000
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """A file's cells: column name to the cells of every whole row, and the line that each row stands on.
+
+    ``damaged`` holds the rows that do not have the header's number of cells.
+    """
+
+    file: str
+    columns: dict[str, Sequence[str]]
+    lines: Sequence[int]
+    damaged: tuple[tuple[str, ...], ...]
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+
+def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
+    """RFC 4180 with one line a row. None where there is no header to go by; the faults are noted."""
+    if text.count("\n") > MOST_LINES:
+        faults.add(file, None, None, f"the file has more than {MOST_LINES} lines; split the campaign")
+        return None
+    lines = text.split("\n")
+    while lines and not lines[-1].strip("\r"):
+        lines.pop()
+    longest = max(range(len(lines)), key=lambda place: len(lines[place]), default=None)
+    if longest is None:
+        faults.add(file, 1, None, "the file is empty; its first line names the columns")
+        return None
+    if len(lines[longest]) > LONGEST_LINE:
+        faults.add(
+            file, longest + 1, None, f"the line is longer than {LONGEST_LINE} characters; end each row's line"
+        )
+        return None
+    try:
+        header = _cells(lines[0])
+    except csv.Error as error:
+        faults.add(file, 1, None, f"the header cannot be read: {_what(error)}")
+        return None
+    return _body(file, header, lines, faults) if _header_is_sound(file, header, faults) else None
+
+
+def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> None:
+    """Note every required column that the header lacks."""
+    for column in required:
+        if column not in table.columns:
+            unused = [name for name in table.columns if name not in required]
+            hint = near(column, unused).replace("did you mean", "is it")
+            told = "the column is missing; "
+            faults.add(table.file, 1, column, f"{told}{hint}the header needs {one_of(required)}")
+
+
+def _header_is_sound(file: str, header: list[str], faults: Faults) -> bool:
+    sound = True
+    seen: set[str] = set()
+    for place, name in enumerate(header, start=1):
+        wrong = None
+        if not name:
+            wrong = f"the header's cell {place} is empty; name the column or remove it"
+        elif name in seen:
+            wrong = f"the header names the column {quoted(name)} twice; name each column once"
+        elif not name.isprintable() or name != name.strip():
+            wrong = f"the column name {quoted(name)} holds spaces or characters that cannot be printed"
+        if wrong is not None:
+            faults.add(file, 1, name if name and name.isprintable() else None, wrong)
+            sound = False
+        seen.add(name)
+    if sound and len(header) == 1 and any(mark in header[0] for mark in ";\t|"):
+        faults.add(file, 1, None, "the header has one cell; separate the cells by commas")
+        return False
+    return sound
+
+
+def _body(file: str, header: list[str], lines: list[str], faults: Faults) -> CsvTable:
+    rows: list[list[str]] = []
+    at: list[int] = []
+    damaged: list[tuple[str, ...]] = []
+    width = len(header)
+    for number, row in _rows(lines):
+        if not isinstance(row, csv.Error) and len(row) == width:
+            rows.append(row)
+            at.append(number)
+            continue
+        if isinstance(row, csv.Error):
+            faults.add(file, number, None, _what(row))
+            damaged.append(())
+        elif not row:
+            faults.add(file, number, None, "the line is empty; remove it")
+        else:
+            hint = "; is a comma used as decimal point?" if len(row) > width else ""
+            faults.add(file, number, None, f"{len(row)} cells where the header has {width}{hint}")
+            damaged.append(tuple(row[:width]))
+    if not rows and not damaged:
+        faults.add(file, 1, None, "there is only a header; at least one row must follow")
+    columns = list(zip(*rows, strict=True)) if rows else [()] * width
+    return CsvTable(file, dict(zip(header, columns, strict=True)), at, tuple(damaged))
+
+
+def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:
+    """Every line after the header with its number. A quote has to close on its line."""
+    body = lines[1:]
+    if not any('"' in line or "\r" in line[:-1] for line in body):
+        yield from enumerate(csv.reader(body), start=2)
+        return
+    for number, line in enumerate(body, start=2):
+        try:
+            yield number, _cells(line)
+        except csv.Error as error:
+            yield number, error
+
+
+def _cells(line: str) -> list[str]:
+    return next(csv.reader([line], strict=True), [])
+
+
+def _what(error: csv.Error) -> str:
+    told = str(error)
+    if "unexpected end of data" in told:
+        return 'a quote is opened and not closed on this line; close it, and write a quote in a cell as ""'
+    if "expected after" in told:
+        return 'text follows a closing quote; put a comma there, or write a quote in a cell as ""'
+    if "new-line" in told:
+        return "a carriage return inside the line; end lines with LF or CRLF"
+    return f"the line cannot be read: {told}"

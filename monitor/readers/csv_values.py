@@ -1,0 +1,123 @@
+"""Cells of a CSV column as numbers. Whole columns at once; cell by cell only where something is wrong."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.readers.csv_table import CsvTable
+from monitor.readers.faults import Faults, quoted
+
+Mask = npt.NDArray[np.bool_]
+
+#: Largest run, day or sequence number: what a 32-bit integer column holds.
+LARGEST_WHOLE = 2**31 - 1
+# What a decimal number is written with. The rest of Python's float syntax (nan, 1_000, other scripts' digits)
+# needs other characters, so a column that keeps to these can be handed to float() as it is.
+NUMBER_CHARACTERS = frozenset("0123456789+-.eE\n")
+DIGITS = frozenset("0123456789\n")
+# Dashes that word processors put in place of a minus.
+TYPOGRAPHIC_MINUS = "\u2212\u2013\u2014\u2010\u2011\ufe63\uff0d"
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A column of numbers, NaN (or -1 for whole numbers) where ``good`` is False or the cell is empty."""
+
+    values: npt.NDArray[np.float64]
+    good: Mask
+
+
+@dataclass(frozen=True)
+class Wholes:
+    """A column of whole numbers from 0, -1 where ``good`` is False."""
+
+    values: npt.NDArray[np.int64]
+    good: Mask
+
+
+def numbers(table: CsvTable, column: str, faults: Faults, *, may_be_empty: bool = False) -> Numbers:
+    """The column as finite numbers; empty cells are NaN where they are allowed."""
+    cells = table.columns[column]
+    if set("\n".join(cells)) <= NUMBER_CHARACTERS:
+        try:
+            values = np.array(
+                [float(cell) if cell else math.nan for cell in cells]
+                if may_be_empty
+                else list(map(float, cells)),
+                dtype=np.float64,
+            )
+        except ValueError:
+            pass
+        else:
+            if not np.isinf(values).any():
+                return Numbers(values, np.ones(len(cells), dtype=np.bool_))
+    return _numbers_one_by_one(table, column, cells, faults, may_be_empty)
+
+
+def wholes(table: CsvTable, column: str, faults: Faults) -> Wholes:
+    """The column as whole numbers from 0."""
+    cells = table.columns[column]
+    if cells and all(cells) and max(map(len, cells)) < 10 and set("\n".join(cells)) <= DIGITS:
+        return Wholes(np.array(list(map(int, cells)), dtype=np.int64), np.ones(len(cells), dtype=np.bool_))
+    values = np.full(len(cells), -1, dtype=np.int64)
+    for place, cell in enumerate(cells):
+        if re.fullmatch(r"[0-9]{1,20}", cell) and int(cell) <= LARGEST_WHOLE:
+            values[place] = int(cell)
+        else:
+            told = "the cell is empty" if not cell else f"{quoted(cell)} is not a whole number"
+            faults.add(
+                table.file,
+                table.lines[place],
+                column,
+                f"{told}; write digits only, from 0 to {LARGEST_WHOLE}",
+            )
+    return Wholes(values, values >= 0)
+
+
+def _numbers_one_by_one(
+    table: CsvTable, column: str, cells: Sequence[str], faults: Faults, may_be_empty: bool
+) -> Numbers:
+    values = np.full(len(cells), math.nan)
+    good = np.zeros(len(cells), dtype=np.bool_)
+    for place, cell in enumerate(cells):
+        if not cell and may_be_empty:
+            good[place] = True
+            continue
+        wrong = what_is_wrong(cell)
+        if wrong is None:
+            values[place] = float(cell)
+            good[place] = True
+        else:
+            faults.add(table.file, table.lines[place], column, wrong)
+    return Numbers(values, good)
+
+
+def what_is_wrong(cell: str) -> str | None:
+    """Why a cell is not a finite decimal number, and what to write; None if it is one."""
+    if not cell:
+        return "the cell is empty; a number is needed"
+    shown = quoted(cell)
+    if set(cell) <= NUMBER_CHARACTERS and "\n" not in cell:
+        try:
+            value = float(cell)
+        except ValueError:
+            return f"{shown} is not a number; write digits with a decimal point, such as -12.345"
+        return None if math.isfinite(value) else f"{shown} is too large for a number; a finite one is needed"
+    if cell.strip().lstrip("+-").lower() in ("nan", "inf", "infinity"):
+        return f"{shown} is not a finite number; leave out the row, or measure again"
+    if cell != cell.strip():
+        return f"{shown} is not a number: remove the spaces around it"
+    if any(mark in cell for mark in TYPOGRAPHIC_MINUS):
+        return f"{shown} is not a number: its minus is a typographic sign; write the plain '-'"
+    if re.fullmatch(r"[+-]?[0-9]+,[0-9]+", cell):
+        point = cell.replace(",", ".")[:40]
+        return f"{shown} is not a number: write a decimal point, {point}, and no thousands separators"
+    if re.fullmatch(r"[+-]?[0-9]{1,3}([,'_ \u00a0\u2009\u202f\u2019][0-9]{3})+(\.[0-9]*)?", cell):
+        return f"{shown} is not a number: write it without thousands separators"
+    return f"{shown} is not a number; write digits with a decimal point, such as -12.345"

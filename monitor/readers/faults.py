@@ -1,0 +1,59 @@
+"""The list that every fault of a folder goes into, and the words that faults share."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from monitor.exceptions import Fault
+
+#: Longest piece of a user's own text that a message repeats.
+SHOWN = 40
+
+
+class Faults:
+    """Faults of one folder, collected so that all of them are told together."""
+
+    def __init__(self, files: Iterable[str]) -> None:
+        self._order = {name: place for place, name in enumerate(files)}
+        self._found: list[Fault] = []
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def add(self, file: str, line: int | None, column: str | None, message: str) -> None:
+        """Note one fault."""
+        self._found.append(Fault(file, line, column, message))
+
+    def extend(self, faults: Iterable[Fault]) -> None:
+        """Note several faults."""
+        self._found.extend(faults)
+
+    def sorted(self) -> list[Fault]:
+        """All faults, by file and line."""
+        return sorted(self._found, key=lambda f: (self._order.get(f.file, -1), f.line or 0))
+
+
+def quoted(value: object) -> str:
+    """A user's own text, repeated in a message: printable, and not longer than it helps."""
+    try:
+        text = repr(value)
+    except (
+        ValueError,
+        RecursionError,
+    ):  # an integer of thousands of digits, or a list within a list within ...
+        return "a value too long to repeat"
+    text = text.encode("ascii", "backslashreplace").decode() if not text.isprintable() else text
+    return text if len(text) <= SHOWN else text[:SHOWN] + "..."
+
+
+def one_of(names: Iterable[str]) -> str:
+    """Names in a row, for the end of a message."""
+    return ", ".join(names) or "none"
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """A hint ("did you mean 'x_mm'? ") where a known name is close, else nothing."""
+    by_folded = {candidate.casefold(): candidate for candidate in known}
+    close = difflib.get_close_matches(name[:100].casefold(), list(by_folded), n=1, cutoff=0.7)
+    return f"did you mean '{by_folded[close[0]]}'? " if close else ""

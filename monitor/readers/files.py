@@ -1,0 +1,64 @@
+"""Bytes of a campaign folder's files, within limits that keep memory bounded."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from monitor.readers.faults import Faults
+
+#: Largest CSV file, in bytes. A five-day campaign has 86 kB; a year of such days has 5 MB.
+LARGEST_CSV = 256 * 1024**2
+#: Largest campaign.toml, in bytes; the examples have 1 kB.
+LARGEST_TOML = 1024**2
+
+
+def read_bytes(folder: Path, name: str, largest: int, faults: Faults) -> bytes | None:
+    """The content of one file, or None with a fault noted."""
+    path = folder / name
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            faults.add(name, None, None, "this is not a regular file; a text file is needed")
+            return None
+        if status.st_size <= largest:
+            with path.open("rb") as stream:
+                content = stream.read(largest + 1)
+            if len(content) <= largest:
+                return content
+    except FileNotFoundError:
+        faults.add(name, None, None, f"the file is missing; the folder holds {_what_is_there(folder)}")
+        return None
+    except OSError as error:
+        faults.add(name, None, None, f"the file cannot be read: {error.strerror or error}")
+        return None
+    faults.add(name, None, None, f"the file is larger than {largest // 1024**2} MiB; split the campaign")
+    return None
+
+
+def decode(name: str, content: bytes, faults: Faults) -> str | None:
+    """UTF-8 text without its byte-order mark, or None with a fault that names the line of the bad byte."""
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        faults.add(
+            name, line, None, f"byte 0x{content[error.start]:02x} is not UTF-8; save the file as UTF-8 text"
+        )
+        return None
+    text = text.removeprefix("\ufeff")
+    if not text.strip():
+        faults.add(name, 1, None, "the file is empty")
+        return None
+    if "\x00" in text:
+        line = text.count("\n", 0, text.index("\x00")) + 1
+        faults.add(name, line, None, "a NUL character: this is not a text file; save it as UTF-8 text")
+        return None
+    return text
+
+
+def _what_is_there(folder: Path) -> str:
+    names = sorted(path.name for path in folder.iterdir())
+    if not names:
+        return "nothing"
+    return ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")

@@ -1,0 +1,58 @@
+"""What a calibration method asks of a campaign folder, beyond what every folder must hold.
+
+One file a method in ``monitor/readers/methods``, each with a ``RULES``; a plug-in adds its own through an
+entry point of the group ``monitor.readers``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import Fault
+from monitor.records import Artefact, Probings
+from monitor.units import COLUMN_UNITS, CONDITION_SUFFIXES
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was probed, for a method to judge.
+
+    ``probings`` are the rows that could be read (n), ``lines`` the line of each in the file (n,), ``runs`` the
+    runs without a damaged row: only these may be judged, ``turning`` the rotary axes and the spindle.
+    """
+
+    file: str
+    probings: Probings
+    lines: npt.NDArray[np.int64]
+    runs: tuple[int, ...]
+    turning: tuple[str, ...]
+    artefact: Artefact
+
+
+def no_check(plan: Plan) -> Iterable[Fault]:
+    """Nothing to ask of the plan."""
+    return ()
+
+
+@dataclass(frozen=True)
+class MethodRules:
+    """The rules of one method.
+
+    ``needs_scale_bar`` and ``targets_are_balls`` say what the artefact must hold, ``suffixes`` the units that
+    a recorded column may end in, ``plain_columns`` the columns without a unit; ``check`` judges the plan.
+    """
+
+    name: str
+    needs_scale_bar: bool = False
+    targets_are_balls: bool = False
+    suffixes: tuple[str, ...] = tuple(COLUMN_UNITS)
+    plain_columns: tuple[str, ...] = ()
+    check: Callable[[Plan], Iterable[Fault]] = no_check
+
+
+#: Units of the channels of a method that measures nothing but positions.
+CHANNELS_ONLY = CONDITION_SUFFIXES

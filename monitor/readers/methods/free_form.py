@@ -1,0 +1,7 @@
+"""The method ``free-form``: points of an unknown workpiece, with the surface normal at each."""
+
+from __future__ import annotations
+
+from monitor.readers.method_rules import MethodRules
+
+RULES = MethodRules("free-form", plain_columns=("normal_x", "normal_y", "normal_z"))

@@ -1,0 +1,43 @@
+"""Recorded columns beyond the required ones: each name ends in a unit that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from monitor.readers.csv_table import CsvTable
+from monitor.readers.faults import Faults, near, quoted
+from monitor.units import CONDITION_SUFFIXES, column_unit
+
+
+def has_unit(column: str, suffixes: Sequence[str]) -> bool:
+    """Whether a name ends in one of the units: ``ambient_degC``."""
+    return column_unit(column) is not None and column.rpartition("_")[2] in suffixes
+
+
+def recorded_columns(
+    table: CsvTable,
+    taken: Sequence[str],
+    faults: Faults,
+    suffixes: Sequence[str] = CONDITION_SUFFIXES,
+    plain: Sequence[str] = (),
+) -> list[str]:
+    """The columns that are not ``taken``, in order; those whose unit is not known are noted and left out.
+
+    ``suffixes`` are the units allowed, ``plain`` the columns without a unit that a method allows.
+    """
+    kept = []
+    for column in table.columns:
+        if column in taken:
+            continue
+        if has_unit(column, suffixes) or column in plain:
+            kept.append(column)
+            continue
+        ends = ", ".join(f"_{suffix}" for suffix in suffixes)
+        hint = near(column, [*taken, *plain]) or near(column.rpartition("_")[2], suffixes)
+        faults.add(
+            table.file,
+            1,
+            column,
+            f"the unit of {quoted(column)} is not known; {hint}end the name of a recorded column in {ends}",
+        )
+    return kept

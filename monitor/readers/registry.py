@@ -1,0 +1,94 @@
+"""The formats and the methods that are known, and the door to all of them.
+
+Built-in formats and methods are the files of ``formats`` and ``methods``; a plug-in gives a ``Reader`` or a
+``MethodRules`` through an entry point of the group ``monitor.readers``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TypeVar
+
+from monitor.exceptions import CampaignError, Fault, InputError
+from monitor.readers.method_rules import MethodRules
+from monitor.records import Campaign
+
+GROUP = "monitor.readers"
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One format: ``recognises`` says quickly whether a folder looks like it, ``read`` reads or refuses it."""
+
+    name: str
+    recognises: Callable[[Path], bool]
+    read: Callable[[Path], Campaign]
+
+
+T = TypeVar("T", Reader, MethodRules)
+
+
+def read_campaign(folder: Path) -> Campaign:
+    """The campaign of a folder, in internal units.
+
+    Raises CampaignError, with every fault of the folder, if anything in it is wrong.
+    """
+    folder = Path(folder)
+    try:
+        is_folder = folder.is_dir()
+    except (ValueError, OSError):  # a NUL in the name, or a name longer than the system allows
+        is_folder = False
+    if not is_folder:
+        told = "there is no such folder; give a folder with campaign.toml, runs.csv and probings.csv"
+        if _exists(folder):
+            told = "this is a file; give the folder that holds campaign.toml, runs.csv and probings.csv"
+        raise CampaignError(str(folder), [Fault(str(folder), None, None, told)])
+    known = readers()
+    chosen = next((reader for reader in known if reader.recognises(folder)), known[-1])
+    return chosen.read(folder)
+
+
+@cache
+def readers() -> tuple[Reader, ...]:
+    """All formats, plug-ins first, so that one can take a folder that the built-in would refuse."""
+    return (*_plugged_in(Reader), *_built_in("formats", "READER", Reader))
+
+
+@cache
+def method_rules() -> dict[str, MethodRules]:
+    """The rules of every method, by its name."""
+    rules = (*_built_in("methods", "RULES", MethodRules), *_plugged_in(MethodRules))
+    return {rule.name: rule for rule in rules}
+
+
+def _built_in(room: str, attribute: str, kind: type[T]) -> Iterator[T]:
+    package = importlib.import_module(f"monitor.readers.{room}")
+    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda found: found.name):
+        found = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), attribute)
+        assert isinstance(found, kind), f"{module.name}.{attribute} must be a {kind.__name__}"
+        yield found
+
+
+def _plugged_in(kind: type[T]) -> Iterator[T]:
+    for point in entry_points(group=GROUP):
+        try:
+            found = point.load()
+        except Exception as error:
+            raise InputError(f"the plug-in {point.name} ({point.value}) cannot be loaded: {error}") from error
+        if not isinstance(found, Reader | MethodRules):
+            raise InputError(f"the plug-in {point.name} ({point.value}) must be a Reader or a MethodRules")
+        if isinstance(found, kind):
+            yield found
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (ValueError, OSError):
+        return False

@@ -1,0 +1,125 @@
+"""``runs.csv``: the runs of the plan, when they started, and their conditions."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from monitor.readers.csv_table import CsvTable, refuse_missing
+from monitor.readers.csv_values import numbers, wholes
+from monitor.readers.faults import Faults, quoted
+from monitor.readers.recorded_columns import recorded_columns
+from monitor.records import Run
+
+FILE = "runs.csv"
+PLAN = ("run", "started_at", "day", "warm_up")
+AMBIENT = "ambient_degC"
+# ISO 8601-1:2019, 5.4: date and time of day, extended format, with the shift from UTC.
+MOMENT = re.compile(
+    r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ][0-9]{2}:[0-9]{2}(:[0-9]{2}([.,][0-9]{1,6})?)?(Z|[+-][0-9]{2}(:?[0-9]{2})?)?"
+)
+EXAMPLE = "2026-03-02T08:37:06-05:00"
+#: No machine of this kind was measured before; a date beyond either year is a slip.
+YEARS = (1900, 2999)
+
+
+@dataclass(frozen=True)
+class RunsPart:
+    """The runs that could be read, and the line of every run number that is listed."""
+
+    runs: tuple[Run, ...]
+    lines: dict[int, int]
+
+
+def read_runs(table: CsvTable, faults: Faults) -> RunsPart | None:
+    """The runs, or None where the columns that the plan needs are missing."""
+    required = (*PLAN, AMBIENT)
+    refuse_missing(table, required, faults)
+    names = [AMBIENT] if AMBIENT in table.columns else []
+    names += recorded_columns(table, required, faults)
+    conditions = {name: numbers(table, name, faults, may_be_empty=name != AMBIENT) for name in names}
+    day = wholes(table, "day", faults) if "day" in table.columns else None
+    warm = _truths(table, faults) if "warm_up" in table.columns else None
+    started = _moments(table, faults) if "started_at" in table.columns else None
+    if "run" not in table.columns:
+        return None
+    run = wholes(table, "run", faults)
+    lines: dict[int, int] = {}
+    runs: list[Run] = []
+    for place, number in enumerate(run.values.tolist()):
+        if not run.good[place]:
+            continue
+        line = table.lines[place]
+        if number in lines:
+            faults.add(
+                FILE,
+                line,
+                "run",
+                f"run {number} is listed twice, first on line {lines[number]}; list it once",
+            )
+            continue
+        lines[number] = line
+        if day is None or warm is None or started is None:
+            continue
+        moment, hot = started[place], warm[place]
+        if moment is None or hot is None or not day.good[place]:
+            continue
+        told = {name: float(column.values[place]) for name, column in conditions.items()}
+        told = {name: value for name, value in told.items() if not math.isnan(value)}
+        runs.append(Run(number, moment, int(day.values[place]), hot, told))
+    return RunsPart(tuple(runs), lines)
+
+
+def _truths(table: CsvTable, faults: Faults) -> list[bool | None]:
+    found: list[bool | None] = []
+    for line, cell in zip(table.lines, table.columns["warm_up"], strict=True):
+        found.append({"true": True, "false": False}.get(cell))
+        if found[-1] is None:
+            faults.add(FILE, line, "warm_up", f"{quoted(cell)} is neither; write true or false")
+    return found
+
+
+def _moments(table: CsvTable, faults: Faults) -> list[datetime | None]:
+    found = [
+        _moment(line, cell, faults)
+        for line, cell in zip(table.lines, table.columns["started_at"], strict=True)
+    ]
+    _refuse_backwards(table.lines, found, faults)
+    return found
+
+
+def _moment(line: int, cell: str, faults: Faults) -> datetime | None:
+    wrong = f"{quoted(cell)} is not a time in ISO 8601 with an offset; write for example {EXAMPLE}"
+    if match := MOMENT.fullmatch(cell):
+        try:
+            moment = datetime.fromisoformat(cell)
+        except ValueError as error:
+            wrong = f"{quoted(cell)} is not a time: {error}; write for example {EXAMPLE}"
+        else:
+            if match[3] is not None and YEARS[0] <= moment.year <= YEARS[1]:
+                return moment
+            if match[3] is not None:
+                wrong = f"{quoted(cell)} is not in the years {YEARS[0]} to {YEARS[1]}"
+            else:
+                wrong = f"{quoted(cell)} has no offset from UTC; write for example {EXAMPLE}"
+    faults.add(FILE, line, "started_at", wrong)
+    return None
+
+
+def _refuse_backwards(lines: Sequence[int], moments: Sequence[datetime | None], faults: Faults) -> None:
+    before: tuple[int, datetime] | None = None
+    for line, moment in zip(lines, moments, strict=True):
+        if moment is None:
+            continue
+        if before is not None and moment < before[1]:
+            faults.add(
+                FILE,
+                line,
+                "started_at",
+                f"time runs backwards: {moment.isoformat()} is before {before[1].isoformat()} "
+                f"on line {before[0]}; list the runs in the order in which they started",
+            )
+        before = (line, moment)

@@ -1,0 +1,176 @@
+"""Values of a TOML file, taken key by key; whatever is wrong is noted with its line, and nothing raises."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Iterable
+from typing import Any
+
+from monitor.readers.faults import Faults, near, one_of, quoted
+from monitor.readers.toml_lines import Path, line_of, lines_of_keys
+
+#: Longest name or text that a key may hold.
+LONGEST_TEXT = 200
+#: What the parser's message ends in.
+PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+
+
+class Table:
+    """One table of a TOML file. Every getter notes a fault and returns None where the value is not right.
+
+    The keys that were asked for are the known ones; ``finish`` refuses all others.
+    """
+
+    def __init__(
+        self, file: str, faults: Faults, data: dict[str, Any], lines: dict[Path, int], path: Path = ()
+    ) -> None:
+        self.file = file
+        self.faults = faults
+        self.data = data
+        self.path = path
+        self._lines = lines
+        self._known: list[str] = []
+
+    def fault(self, key: str | None, message: str) -> None:
+        """Note a fault of a key, or of the table itself."""
+        path = self.path if key is None else (*self.path, key)
+        self.faults.add(self.file, line_of(path, self._lines), name_of(path) or None, message)
+
+    def raw(self, key: str, *, required: bool, example: str) -> Any:
+        """The value as TOML has it, or None."""
+        self._known.append(key)
+        if key not in self.data and required:
+            self.fault(key, f"this key is missing; write for example {key} = {example}")
+        return self.data.get(key)
+
+    def text(self, key: str, *, required: bool = False, example: str = '"..."') -> str | None:
+        """A text of one line."""
+        value = self.raw(key, required=required, example=example)
+        if value is None:
+            return None
+        if not isinstance(value, str):
+            self.fault(key, f"{quoted(value)} is not a text; write it in quotes, such as {example}")
+        elif not value.strip() or value != value.strip():
+            self.fault(key, f"{quoted(value)} is empty or begins or ends with a space; write {example}")
+        elif not value.isprintable() or len(value) > LONGEST_TEXT:
+            self.fault(
+                key, f"{quoted(value)} must be one line of at most {LONGEST_TEXT} printable characters"
+            )
+        else:
+            return value
+        return None
+
+    def number(
+        self,
+        key: str,
+        *,
+        required: bool = False,
+        positive: bool = False,
+        largest: float | None = None,
+        unit: str,
+        example: str,
+    ) -> float | None:
+        """A finite number, positive and at most ``largest`` where that is asked for."""
+        value = self.raw(key, required=required, example=example)
+        return None if value is None else self._number(key, value, positive, largest, unit, example)
+
+    def numbers(
+        self, key: str, count: int, *, required: bool = False, largest: float, unit: str, example: str
+    ) -> tuple[float, ...] | None:
+        """Exactly ``count`` finite numbers."""
+        value = self.raw(key, required=required, example=example)
+        if value is None:
+            return None
+        if not isinstance(value, list) or len(value) != count:
+            self.fault(key, f"{quoted(value)} is not {count} numbers; write for example {key} = {example}")
+            return None
+        found = [self._number(key, item, False, largest, unit, example) for item in value]
+        kept = tuple(item for item in found if item is not None)
+        return kept if len(kept) == count else None
+
+    def table(self, key: str, *, required: bool = False) -> Table | None:
+        """The table under a key."""
+        self._known.append(key)
+        value = self.data.get(key)
+        inner = (*self.path, key)
+        if value is None:
+            if required:
+                self.fault(None if self.path else key, f"the table [{name_of(inner)}] is missing")
+            return None
+        if not isinstance(value, dict):
+            self.fault(key, f"{quoted(value)} is not a table; write [{name_of(inner)}] and its keys below")
+            return None
+        return Table(self.file, self.faults, value, self._lines, inner)
+
+    def tables(self, key: str) -> list[Table]:
+        """The tables of an array of tables; none where the key is absent."""
+        self._known.append(key)
+        value = self.data.get(key, [])
+        inner = (*self.path, key)
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            self.fault(key, f"this is not a list of tables; write [[{name_of(inner)}]] above each of them")
+            return []
+        return [
+            Table(self.file, self.faults, item, self._lines, (*inner, place))
+            for place, item in enumerate(value)
+        ]
+
+    def finish(self) -> None:
+        """Refuse every key that was not asked for."""
+        for key in self.data:
+            if key not in self._known:
+                hint = near(key, self._known)
+                self.fault(key, f"this key is not known; {hint}the keys here are {one_of(self._known)}")
+
+    def _number(
+        self, key: str, value: Any, positive: bool, largest: float | None, unit: str, example: str
+    ) -> float | None:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self.fault(key, f"{quoted(value)} is not a number; write {key} = {example} (in {unit})")
+            return None
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            self.fault(key, f"{quoted(value)} is not a finite number; write {key} = {example} (in {unit})")
+        elif positive and number <= 0.0:
+            self.fault(key, f"{quoted(value)} must be greater than 0 (in {unit})")
+        elif largest is not None and abs(number) > largest:
+            self.fault(key, f"{quoted(value)} is beyond {largest:g} {unit}; is its unit {unit}?")
+        else:
+            return number
+        return None
+
+
+def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
+    """The top table, or None with the syntax error noted."""
+    try:
+        data = tomllib.loads(text.replace("\r\n", "\n"))
+    except RecursionError:
+        faults.add(file, None, None, "the brackets are nested too deeply for a campaign file")
+    except ValueError as error:
+        message = str(error)
+        match = PLACE.search(message)
+        line = int(match[1]) if match and match[1] else text.count("\n") + 1 if match else None
+        told = message[: match.start()] if match else message
+        told = told if told.isprintable() else told.encode("ascii", "backslashreplace").decode()
+        where = f" at character {match[2]}" if match and match[2] else ""
+        faults.add(file, line, None, f"this is not TOML{where}: {told[:200]}")
+    else:
+        return Table(file, faults, data, lines_of_keys(text))
+    return None
+
+
+def name_of(path: Iterable[str | int]) -> str:
+    """A path as it is written in a message; elements of an array of tables count from 1 as people do."""
+    name = ""
+    for part in path:
+        if isinstance(part, int):
+            name += f"[{part + 1}]"
+        else:
+            part = part if part.isprintable() else part.encode("ascii", "backslashreplace").decode()
+            name += ("." if name else "") + part[:60]
+    return name

@@ -1,0 +1,157 @@
+"""What a calibration campaign is: frozen records in internal units (mm, rad, s, °C).
+
+Readers make them, the store keeps them, the methods read them. Recorded conditions and channels keep the
+unit that their name ends in (``ambient_degC``, ``warm_up_min``).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AxisSettings:
+    """What the machine file says of one axis; None where it says nothing.
+
+    ``stroke`` is in mm for a linear axis and in rad for a rotary one, ``scale_pitch`` in mm.
+    """
+
+    name: str
+    sign: int | None = None
+    stroke: tuple[float, float] | None = None
+    scale_pitch: float | None = None
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine as its file describes it. ``tolerances`` are limits of absolute values in display units."""
+
+    id: str
+    topology: str
+    manufacturer: str | None = None
+    model: str | None = None
+    serial_number: str | None = None
+    location: str | None = None
+    axes: Mapping[str, AxisSettings] = field(default_factory=dict)
+    tolerances: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A probe; ``standard_uncertainty`` of one coordinate and ``tip`` (in the spindle frame) in mm."""
+
+    id: str
+    model: str
+    standard_uncertainty: float
+    tip: tuple[float, float, float] | None = None
+    certificate: str | None = None
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball; ``nominal`` is its centre in the frame of the last work axis at all axes zero, in mm."""
+
+    id: str
+    nominal: tuple[float, float, float]
+    diameter: float
+
+
+@dataclass(frozen=True)
+class ScaleBar:
+    """A calibrated distance between the centres of two balls: length and standard uncertainty in mm.
+
+    ``expansion_coefficient`` is in 1/K and ``reference_temperature`` in °C, None where not given.
+    """
+
+    balls: tuple[str, str]
+    length: float
+    standard_uncertainty: float
+    certificate: str
+    expansion_coefficient: float | None = None
+    reference_temperature: float | None = None
+
+
+@dataclass(frozen=True)
+class Artefact:
+    """The balls, and the scale bar where the method needs one."""
+
+    id: str
+    balls: tuple[Ball, ...]
+    scale_bar: ScaleBar | None = None
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of the plan and its conditions, each in the unit that its name ends in."""
+
+    run: int
+    started_at: datetime
+    day: int
+    warm_up: bool
+    conditions: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Probings:
+    """All probings of a campaign, row by row in file order (n rows).
+
+    ``run`` and ``sequence`` are integers (n,), ``time`` seconds since the run's start (n,), ``target`` ball
+    names (n,), ``readings`` axis name to (n,) in mm or rad, ``channels`` recorded column to (n,) in the unit
+    that its name ends in, NaN where a cell is empty.
+    """
+
+    run: npt.NDArray[np.int64]
+    sequence: npt.NDArray[np.int64]
+    time: Array
+    target: npt.NDArray[np.str_]
+    readings: Mapping[str, Array]
+    channels: Mapping[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+    def rows(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> Probings:
+        """The chosen rows (a mask or indices), in order."""
+        return Probings(
+            self.run[chosen],
+            self.sequence[chosen],
+            self.time[chosen],
+            self.target[chosen],
+            {axis: values[chosen] for axis, values in self.readings.items()},
+            {name: values[chosen] for name, values in self.channels.items()},
+        )
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """One imported file, byte for byte."""
+
+    name: str
+    content: bytes
+
+    @property
+    def sha256(self) -> str:
+        """The hash of the content, in hexadecimal digits."""
+        return hashlib.sha256(self.content).hexdigest()
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign: one machine, one artefact, one probe, and the runs of one plan."""
+
+    name: str
+    method: str
+    machine: Machine
+    probe: Probe
+    artefact: Artefact
+    runs: tuple[Run, ...]
+    probings: Probings
+    files: tuple[SourceFile, ...] = ()

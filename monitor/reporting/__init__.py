@@ -1,0 +1,1 @@
+"""Numbers on paper, figures and certificates: what was computed elsewhere, printed and never recomputed."""

@@ -1,0 +1,271 @@
+"""Figures of what the model leaves: by group, over the workspace, against a driver, against a prediction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.reporting.figure_style import (
+    BLUE,
+    FAINT,
+    INK,
+    MID,
+    ORANGE,
+    PAGE_WIDTH_MM,
+    PALE,
+    caption,
+    new_figure,
+    reference_line,
+    style,
+    zero_line,
+)
+
+#: A residual's arrow: the longest is this part of the workspace's longest edge.
+_LONGEST_ARROW = 0.2
+
+
+def residual_bars(
+    groups: Mapping[str, tuple[Sequence[str], npt.ArrayLike]],
+    *,
+    level_um: float | None = None,
+    level_name: str = "probe",
+    title: str = "",
+    width_mm: float = PAGE_WIDTH_MM,
+    height_mm: float = 62.0,
+) -> Figure:
+    """RMS residuals in µm as bars, one panel a grouping: ``{"target": (labels, rms_um), ...}``.
+
+    ``level_um`` is the probe's repeatability or stated uncertainty, drawn as a line named ``level_name``.
+    Bars above twice the level are marked.
+    """
+    if not groups:
+        raise DataError("groups is empty; a grouping such as 'target' with its labels and RMS is needed")
+    counts = [max(len(labels), 3) for labels, _ in groups.values()]
+    with style():
+        figure = new_figure(width_mm, height_mm, title)
+        marked = False
+        panels = figure.subplots(1, len(groups), squeeze=False, sharey=True, width_ratios=counts)[0]
+        for axes, (kind, (labels, rms)) in zip(panels, groups.items(), strict=True):
+            values = np.asarray(rms, dtype=np.float64)
+            if values.shape != (len(labels),):
+                raise DataError(f"the RMS by {kind} must have shape ({len(labels)},), but has {values.shape}")
+            high = np.zeros(len(values), dtype=bool) if level_um is None else values > 2.0 * level_um
+            bars = axes.bar(
+                np.arange(len(labels)),
+                values,
+                width=0.66,
+                color=[ORANGE if mark else BLUE for mark in high],
+                zorder=2,
+            )
+            for bar, mark in zip(bars, high, strict=True):
+                bar.set_hatch("////" if mark else "")
+                bar.set_edgecolor("white" if mark else BLUE)
+                bar.set_linewidth(0.0)
+            step = max(
+                1, math.ceil(len(labels) / max(4, 30 * len(labels) / sum(counts) * width_mm / PAGE_WIDTH_MM))
+            )
+            axes.set_xticks(np.arange(len(labels))[::step], list(labels)[::step])
+            axes.set_xlabel(f"by {kind}", labelpad=2)
+            axes.grid(axis="y", color=PALE, linewidth=0.4)
+            axes.margins(x=0.02 if len(labels) > 8 else 0.08)
+            if level_um is not None:
+                reference_line(axes, level_um)
+            marked = marked or bool(np.any(high))
+        if level_um is not None:
+            more = "; hatched: more than twice as large" if marked else ""
+            caption(figure, f"dashed: {level_name}, {level_um:.2g} µm{more}")
+        panels[0].set_ylabel("RMS residual / µm")
+        top = max(float(np.nanmax(np.asarray(rms, dtype=np.float64))) for _, rms in groups.values())
+        panels[0].set_ylim(0.0, 1.18 * max(top, level_um or 0.0) or 1.0)
+    return figure
+
+
+def residual_vectors(
+    positions_mm: npt.ArrayLike, residuals_um: npt.ArrayLike, *, title: str, frame: str = "machine frame"
+) -> Figure:
+    """Residuals (n, 3) µm as magnified arrows at ``positions_mm`` (n, 3), seen along Z, Y and X.
+
+    The largest tenth is drawn in the accent colour, thicker. All three views share one magnification, printed below.
+    """
+    place, size = _points(positions_mm, residuals_um)
+    length = np.linalg.norm(size, axis=1)
+    extent = float(np.max(np.ptp(place, axis=0)))
+    longest = float(np.max(length))
+    magnify = _nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if longest > 0.0 and extent > 0.0 else 1.0
+    large = length >= np.quantile(length, 0.9)
+    middle = (np.max(place, axis=0) + np.min(place, axis=0)) / 2
+    reach = 0.66 * extent or 1.0
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, 71.0, title)
+        panels = figure.subplots(1, 3)
+        for axes, (across, up) in zip(panels, ((0, 1), (0, 2), (1, 2)), strict=True):
+            axes.scatter(place[:, across], place[:, up], s=3, color=PALE, linewidths=0, zorder=1)
+            for chosen, colour, width in ((~large, BLUE, 0.005), (large, ORANGE, 0.0095)):
+                axes.quiver(
+                    place[chosen, across],
+                    place[chosen, up],
+                    size[chosen, across] * 1e-3 * magnify,
+                    size[chosen, up] * 1e-3 * magnify,
+                    angles="xy",
+                    scale_units="xy",
+                    scale=1.0,
+                    color=colour,
+                    width=width,
+                    zorder=3 if colour == ORANGE else 2,
+                )
+            axes.set_xlim(middle[across] - reach, middle[across] + reach)
+            axes.set_ylim(middle[up] - reach, middle[up] + reach)
+            axes.set_aspect("equal")
+            axes.set_title(f"{'XYZ'[across]}{'XYZ'[up]}")
+            axes.set_xlabel(f"{'XYZ'[across]} / mm", labelpad=1)
+            axes.set_ylabel(f"{'XYZ'[up]} / mm", labelpad=0)
+        key = _nice(longest) if longest > 0.0 else 1.0
+        corner = (middle[0] - 0.95 * reach, middle[1] - 0.9 * reach)
+        panels[0].plot(
+            [corner[0], corner[0] + key * 1e-3 * magnify], [corner[1]] * 2, color=INK, linewidth=2.2
+        )
+        panels[0].annotate(
+            f"{key:g} µm",
+            corner,
+            xytext=(0, 3),
+            textcoords="offset points",
+            fontsize=7,
+            va="bottom",
+            zorder=5,
+        )
+        caption(
+            figure, f"{frame}; arrows {magnify:g} times enlarged, bar {key:g} µm; thick: the largest tenth"
+        )
+    return figure
+
+
+def residual_against_driver(
+    driver: npt.ArrayLike,
+    residual_um: npt.ArrayLike,
+    *,
+    title: str,
+    driver_name: str,
+    residual_name: str = "residual / µm",
+    group: npt.ArrayLike | None = None,
+    bins: int = 8,
+) -> Figure:
+    """Residuals (n,) µm against a driver (n,), with the mean of each group and ± 1 standard error of it.
+
+    ``group`` (n,) assigns the groups; without it the driver is cut into ``bins`` of equal numbers of points.
+    The means are drawn to guide the eye and are no stored result.
+    """
+    x, y = np.asarray(driver, dtype=np.float64), np.asarray(residual_um, dtype=np.float64)
+    if x.shape != y.shape or x.ndim != 1:
+        raise DataError(f"driver and residual_um must have one shape (n,), but have {x.shape} and {y.shape}")
+    keep = np.isfinite(x) & np.isfinite(y)
+    x, y = x[keep], y[keep]
+    labels = _equal_parts(x, bins) if group is None else np.asarray(group)[keep]
+    with style():
+        figure = new_figure(0.72 * PAGE_WIDTH_MM, 78.0, title)
+        axes = figure.subplots()
+        zero_line(axes)
+        axes.scatter(x, y, s=6, color=MID, alpha=0.45, linewidths=0, zorder=1)
+        centres, means, errors = [], [], []
+        for label in dict.fromkeys(labels.tolist()):
+            inside = labels == label
+            centres.append(float(np.mean(x[inside])))
+            means.append(float(np.mean(y[inside])))
+            count = int(inside.sum())
+            errors.append(float(np.std(y[inside], ddof=1)) / math.sqrt(count) if count > 1 else 0.0)
+        order = np.argsort(centres)
+        axes.errorbar(
+            np.array(centres)[order],
+            np.array(means)[order],
+            yerr=np.array(errors)[order],
+            fmt="o-",
+            color=ORANGE,
+            markeredgecolor=INK,
+            markeredgewidth=0.6,
+            markersize=5,
+            linewidth=1.2,
+            capsize=2.5,
+            zorder=3,
+        )
+        caption(figure, "grey: single probings; circles: means of groups, ± 1 standard error")
+        axes.set_xlabel(driver_name)
+        axes.set_ylabel(residual_name)
+    return figure
+
+
+def predicted_against_measured(
+    predicted_um: npt.ArrayLike, measured_um: npt.ArrayLike, *, title: str, noise_um: float | None = None
+) -> Figure:
+    """What an effect predicts (n,) against the residual measured without it (n,), both in µm.
+
+    Points on the line of equality are explained; ``noise_um`` draws a band of ± 2 standard deviations.
+    """
+    x, y = np.asarray(predicted_um, dtype=np.float64), np.asarray(measured_um, dtype=np.float64)
+    if x.shape != y.shape or x.ndim != 1 or not len(x):
+        raise DataError(
+            f"predicted_um and measured_um must have one shape (n,), but have {x.shape} and {y.shape}"
+        )
+    reach = 1.08 * max(float(np.max(np.abs(x))), float(np.max(np.abs(y)))) or 1.0
+    with style():
+        figure = new_figure(0.6 * PAGE_WIDTH_MM, 0.6 * PAGE_WIDTH_MM, title)
+        axes = figure.subplots()
+        ends = np.array([-reach, reach])
+        if noise_um is not None:
+            axes.fill_between(
+                ends, ends - 2 * noise_um, ends + 2 * noise_um, color=FAINT, linewidth=0, zorder=0
+            )
+        axes.plot(ends, ends, color=INK, linewidth=0.9, zorder=2)
+        zero_line(axes)
+        zero_line(axes, vertical=True)
+        axes.scatter(x, y, s=9, color=BLUE, alpha=0.6, linewidths=0, zorder=3)
+        axes.annotate(
+            "fully explained",
+            (0.97 * reach, 0.97 * reach),
+            xytext=(-4, -12),
+            textcoords="offset points",
+            ha="right",
+            va="top",
+            fontsize=7,
+            rotation=45,
+            rotation_mode="anchor",
+        )
+        if noise_um is not None:
+            axes.text(
+                0.02,
+                0.98,
+                f"band: ± 2 × {noise_um:.2g} µm of noise",
+                transform=axes.transAxes,
+                va="top",
+                fontsize=7,
+            )
+        axes.set_xlim(-reach, reach)
+        axes.set_ylim(-reach, reach)
+        axes.set_aspect("equal")
+        axes.set_xlabel("predicted by the effect / µm")
+        axes.set_ylabel("measured residual without it / µm")
+    return figure
+
+
+def _points(positions: npt.ArrayLike, residuals: npt.ArrayLike) -> tuple[Array, Array]:
+    place, size = np.asarray(positions, dtype=np.float64), np.asarray(residuals, dtype=np.float64)
+    if place.ndim != 2 or place.shape != size.shape or place.shape[1] != 3 or not len(place):
+        raise DataError(
+            f"positions_mm and residuals_um must have one shape (n, 3), but have {place.shape} and {size.shape}"
+        )
+    return place, size
+
+
+def _nice(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that does not exceed ``value``."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))
+
+
+def _equal_parts(values: Array, parts: int) -> npt.NDArray[np.int64]:
+    edges = np.quantile(values, np.linspace(0.0, 1.0, parts + 1)[1:-1])
+    return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.int64)

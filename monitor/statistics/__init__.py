@@ -1,0 +1,92 @@
+"""Statistics of repeated runs and of years of campaigns: arrays in, frozen results out.
+
+One method, one file. Units are those of the arrays passed in; nothing here knows a database.
+"""
+
+from monitor.statistics.changes import Change, History, find_changes, joint_change
+from monitor.statistics.components import VarianceComponents, variance_components
+from monitor.statistics.conditions import Coefficient, Cycle, Dependence, dependence
+from monitor.statistics.control import (
+    ControlChart,
+    CusumChart,
+    Reference,
+    cusum_chart,
+    ewma_chart,
+    individuals_chart,
+    known_reference,
+    reference_period,
+)
+from monitor.statistics.fdr import FalseDiscoveries, control_false_discoveries
+from monitor.statistics.forecast import Backtest, Crossing, Forecast, backtest, forecast, predict
+from monitor.statistics.groups import Selection, group_by, select_runs
+from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
+from monitor.statistics.means import AnalysisOfVariance, GroupTest, anova, kruskal_wallis, welch_anova
+from monitor.statistics.monotone import MonotoneTrend, mann_kendall
+from monitor.statistics.multivariate import VectorTest, box_m, manova
+from monitor.statistics.normality import Normality, normality
+from monitor.statistics.pooling import Covariance, Pooling, pool
+from monitor.statistics.trend import Trend, trend
+from monitor.statistics.variances import bartlett, levene
+from monitor.statistics.vector_control import VectorChart, mewma_chart, mewma_limit, t_squared_chart
+from monitor.statistics.warmup import WarmUp, warm_up
+
+__all__ = [
+    "AnalysisOfVariance",
+    "Backtest",
+    "Change",
+    "Coefficient",
+    "ControlChart",
+    "Covariance",
+    "Crossing",
+    "CusumChart",
+    "Cycle",
+    "Dependence",
+    "FalseDiscoveries",
+    "Forecast",
+    "GroupTest",
+    "Histogram",
+    "History",
+    "Homogeneity",
+    "MonotoneTrend",
+    "Normality",
+    "Pooling",
+    "Reference",
+    "Selection",
+    "Trend",
+    "VarianceComponents",
+    "VectorChart",
+    "VectorTest",
+    "WarmUp",
+    "anova",
+    "backtest",
+    "bartlett",
+    "box_m",
+    "control_false_discoveries",
+    "cusum_chart",
+    "dependence",
+    "ewma_chart",
+    "find_changes",
+    "forecast",
+    "group_by",
+    "homogeneity",
+    "individuals_chart",
+    "joint_change",
+    "known_reference",
+    "kruskal_wallis",
+    "levene",
+    "mann_kendall",
+    "manova",
+    "mewma_chart",
+    "mewma_limit",
+    "normality",
+    "p_value_histogram",
+    "pool",
+    "predict",
+    "reference_period",
+    "select_runs",
+    "t_squared_chart",
+    "trend",
+    "variance_components",
+    "warm_up",
+    "welch_anova",
+]

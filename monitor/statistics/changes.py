@@ -1,0 +1,280 @@
+"""Since when is the machine another one? Steps and changes of slope with a stated false-alarm probability.
+
+A step is preferred over a trend where it explains more; a history that known events split is searched
+piece by piece; several parameters share one false-alarm probability. For a change that many parameters
+share, none of which shows it alone, use ``joint_change``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
+from monitor.statistics.scan import EDGE, Base, Kind, Scan, Scanner
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change between run ``index - 1`` and run ``index`` (in the order of time).
+
+    ``at`` is the time of run ``index``, ``interval`` the times between which the change lies; ``size`` is a
+    step or a transient's amplitude in the unit of the values, or a (change of) slope per unit of time;
+    ``p_value`` is that of the search.
+    """
+
+    parameter: str
+    kind: Kind
+    index: int
+    at: float
+    interval: tuple[float, float]
+    size: float
+    u: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class History:
+    """``changes`` in the order of time; ``trends`` of pieces with a slope or with a
+    transient from their first run on (warm-up, running-in: fit it with ``warm_up``).
+
+    ``false_alarm`` is the probability of any change or trend where there is none, over everything searched.
+    """
+
+    changes: tuple[Change, ...]
+    trends: tuple[Change, ...]
+    false_alarm: float
+    trials: int
+
+
+@dataclass(frozen=True)
+class _Series:
+    name: str
+    y: Array
+    t: Array
+    u: Array | None
+
+    def part(self, start: int, stop: int) -> _Series:
+        own = None if self.u is None else self.u[start:stop]
+        return _Series(self.name, self.y[start:stop], self.t[start:stop], own)
+
+
+#: 95 % point of the likelihood ratio for the place of a change, -2 log(1 - sqrt(0.95)): the larger of two
+#: independent exponential maxima, one on each side (Siegmund, Ann. Stat. 16 (1988) 1; Eo and Morley 2015).
+PLACE = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
+
+
+def _when(found: Scan, t: Array, fitted: int) -> tuple[float, float]:
+    """Times between which the change lies, from all places that explain nearly as much as the best."""
+    same = np.array([kind == found.kind for kind in found.kinds])
+    rss, places = found.rss[same], found.positions[same]
+    freedom = max(len(t) - fitted, 1)
+    floor = max(float(rss.min()), 1e-300)
+    inside = places[freedom * np.log(np.maximum(rss, floor) / floor) <= PLACE]
+    return float(t[max(int(inside.min()) - 1, 0)]), float(t[min(int(inside.max()), len(t) - 1)])
+
+
+def _size(series: _Series, found: Scan, base: Base) -> tuple[float, float]:
+    """Least-squares size of the change and its standard uncertainty, its place taken as known."""
+    t = series.t
+    columns = [np.ones_like(t)] if base == "constant" else [np.ones_like(t), t - t.mean()]
+    after = (np.arange(len(t)) >= found.at).astype(np.float64)
+    if found.kind == "step":
+        columns.append(after)
+    elif found.kind == "slope":
+        columns.append(after * (t - t[found.at - 1]))
+    elif found.kind == "transient":
+        columns.append(found.column)
+    else:
+        columns.append(t - t.mean())
+    root = np.ones_like(t) if series.u is None else 1.0 / series.u
+    design = root[:, np.newaxis] * np.column_stack(columns)
+    norm = np.sqrt((design**2).sum(axis=0))
+    solution = np.linalg.lstsq(design / norm, root * series.y, rcond=None)[0]
+    left = root * series.y - design / norm @ solution
+    variance = float(left @ left) / max(len(t) - len(columns), 1)
+    inverse = np.linalg.inv((design / norm).T @ (design / norm))
+    # A first-order process lets a mean of many runs know less: variance times (1 + r) / (1 - r).
+    swell = (1.0 + found.correlation) / (1.0 - found.correlation)
+    return float(solution[-1] / norm[-1]), float(np.sqrt(variance * inverse[-1, -1] * swell) / norm[-1])
+
+
+def _change(series: _Series, found: Scan, base: Base, offset: int) -> Change:
+    size, u = _size(series, found, base)
+    if found.kind in ("trend", "transient"):
+        when = (float(series.t[0]), float(series.t[-1]))
+    else:
+        when = _when(found, series.t, 3 if base == "constant" else 4)
+    return Change(
+        series.name, found.kind, offset + found.at, float(series.t[found.at]), when, size, u, found.p_value
+    )
+
+
+class _Search:
+    """One search with its scanners kept: parameters with the same plan share the preparation."""
+
+    def __init__(self, rng: np.random.Generator, trials: int) -> None:
+        self.rng, self.trials = rng, trials
+        self._kept: dict[tuple[object, ...], Scanner] = {}
+
+    def scan(self, series: _Series, base: Base) -> Scan:
+        key = (base, series.t.tobytes(), None if series.u is None else series.u.tobytes())
+        if key not in self._kept:
+            self._kept[key] = Scanner(series.t, series.u, base)
+        return self._kept[key].scan(series.y, self.rng, self.trials)
+
+    def piece(self, series: _Series, offset: int, level: float) -> tuple[list[Change], list[Change]]:
+        """Changes and trends of one piece of history, split again at every step found."""
+        if len(series.y) < 2 * EDGE + 2 or np.ptp(series.y) == 0.0:
+            return [], []
+        found = self.scan(series, "constant")
+        if found.p_value > level:
+            return [], []
+        base: Base = "constant"
+        trends: list[Change] = []
+        if found.kind == "transient":
+            bent = self.scan(series, "line")
+            # Two coefficients and a place more must earn their keep (Schwarz's criterion).
+            gain = len(series.y) * np.log(max(found.rss.min(), 1e-300) / max(bent.rss.min(), 1e-300))
+            if bent.p_value > level or gain < 3.0 * np.log(len(series.y)):
+                return [], [_change(series, found, base, offset)]
+            found = replace(found, kind="trend", at=0)
+        if found.kind == "trend":
+            trends = [_change(series, found, base, offset)]
+            base = "line"
+            found = self.scan(series, base)
+            if found.p_value > level:
+                return [], trends
+        change = _change(series, found, base, offset)
+        if found.kind == "slope":
+            return [change], trends
+        changes = [change]
+        for start, stop in ((0, found.at), (found.at, len(series.y))):
+            inner, slopes = self.piece(series.part(start, stop), offset + start, level)
+            changes += inner
+            trends += slopes
+        return changes, trends
+
+
+def find_changes(
+    values: Mapping[str, npt.ArrayLike],
+    times: npt.ArrayLike,
+    *,
+    rng: np.random.Generator,
+    u: Mapping[str, npt.ArrayLike] | None = None,
+    events: Sequence[float] = (),
+    false_alarm: float = 0.05,
+    trials: int = 1999,
+) -> History:
+    """Steps and changes of slope of several parameters (name to (n,)) over ``times`` (n,), any unit, rising.
+
+    ``events`` are times of known changes (crash, repair, compensation): the history is split there, and the
+    change at an event is no finding. ``u`` (name to (n,)) weighs the runs. ``false_alarm`` is shared
+    equally among parameters and pieces (Bonferroni), so it holds for whatever dependence among them; inside
+    a piece every step that is found splits it again at the same level. Serial correlation of first order is
+    estimated and allowed for. Measured false alarms at 5 %: 5 % for independent runs (4500 histories of 20);
+    with a correlation of 0.3 12 % (20 runs) and 9 % (44), with 0.6 21 % and 11 %: 20 runs do not tell
+    correlation from change. Pieces of fewer than 6 runs are not searched. Raises ``DataError`` for times
+    that fall, unknown names in ``u``, trials that cannot reach the level, or non-finite values.
+    """
+    t = as_vector(times, "times", least=2 * EDGE + 2)
+    if (np.diff(t) < 0.0).any():
+        raise DataError(
+            f"times falls at index {int(np.argmax(np.diff(t) < 0.0)) + 1}; sort the runs by time."
+        )
+    if not values:
+        raise DataError("values holds no parameter; at least one is needed.")
+    as_probability(false_alarm, "false_alarm")
+    unknown = sorted(set(u or {}) - set(values))
+    if unknown:
+        raise DataError(f"u names {unknown[0]!r}; values has {', '.join(values)}.")
+    bounds = [
+        0,
+        *np.unique(np.searchsorted(t, np.sort(as_vector(events, "events", least=0)))).tolist(),
+        len(t),
+    ]
+    pieces = [(a, b) for a, b in pairwise(bounds) if b > a]
+    level = false_alarm / (len(pieces) * len(values))
+    if (trials + 1) * level < 1.0:
+        raise DataError(
+            f"trials is {trials}; {len(values)} parameters in {len(pieces)} pieces at {false_alarm} need at least "
+            f"{int(np.ceil(1.0 / level)) - 1}."
+        )
+    search = _Search(rng, trials)
+    changes: list[Change] = []
+    trends: list[Change] = []
+    for name, recorded in values.items():
+        y = as_vector(recorded, name, length=len(t))
+        own = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
+        series = _Series(name, y, t, own)
+        for start, stop in pieces:
+            found, slopes = search.piece(series.part(start, stop), start, level)
+            changes += found
+            trends += slopes
+    order = {name: i for i, name in enumerate(values)}
+    changes.sort(key=lambda c: (c.index, order[c.parameter]))
+    return History(tuple(changes), tuple(trends), false_alarm, trials)
+
+
+def joint_change(
+    values: npt.ArrayLike, times: npt.ArrayLike, *, rng: np.random.Generator, trials: int = 1999
+) -> Change:
+    """The best common step of all columns of ``values`` (n, p), in any units, and its p-value.
+
+    The statistic is the largest Hotelling T² over all places; its null distribution does not depend on the
+    covariance and is simulated. ``size`` is the Mahalanobis length of the step in units of the scatter.
+    Raises ``DataError`` unless n > p + 4, or for columns that are exactly dependent. Neglected: serial
+    correlation; take day means where runs of a day resemble each other.
+    """
+    y = as_matrix(values, "values", least=2 * EDGE + 2)
+    n, p = y.shape
+    t = as_vector(times, "times", length=n)
+    if n <= p + 4:
+        raise DataError(f"{n} runs for {p} parameters; more than {p + 4} runs are needed.")
+    places = np.arange(EDGE, n - EDGE + 1)
+    steps = (np.arange(n)[:, np.newaxis] >= places).astype(np.float64)
+    steps -= steps.mean(axis=0)
+    steps /= np.sqrt((steps**2).sum(axis=0))
+    centred = y - y.mean(axis=0)
+    norm = np.sqrt((centred**2).sum(axis=0))
+    if (norm == 0.0).any() or np.linalg.svd(centred / norm, compute_uv=False)[-1] < 1e-9:
+        raise DataError("values has columns that never vary or are exactly dependent; leave one out.")
+    share = ((np.linalg.qr(centred / norm)[0].T @ steps) ** 2).sum(axis=0)
+    null = np.concatenate(
+        [_largest_share(rng, min(100, trials - i), n, p, steps) for i in range(0, trials, 100)]
+    )
+    best = int(share.argmax())
+    p_value = (1 + int((null >= share[best]).sum())) / (trials + 1)
+    steps_of: list[Kind] = ["step"] * len(places)
+    found = Scan(
+        "step",
+        int(places[best]),
+        float(share[best]),
+        p_value,
+        0.0,
+        steps[:, best],
+        tuple(steps_of),
+        places,
+        1.0 - share,
+    )
+    ratio = share[best] / max(1.0 - share[best], 1e-300)
+    runs = places[best] * (n - places[best]) / n
+    length = float(np.sqrt(ratio * (n - 2) / runs))
+    when = _when(found, t, p + 2)
+    return Change(
+        "all", "step", found.at, float(t[found.at]), when, length, float(np.sqrt(1.0 / runs)), p_value
+    )
+
+
+def _largest_share(rng: np.random.Generator, trials: int, n: int, p: int, steps: Array) -> Array:
+    """Largest share over all places for normal noise, (trials,)."""
+    draws = rng.standard_normal((trials, n, p))
+    draws -= draws.mean(axis=1, keepdims=True)
+    q = np.linalg.qr(draws)[0].transpose(0, 2, 1)
+    return np.asarray(((q @ steps) ** 2).sum(axis=1).max(axis=1))

@@ -1,0 +1,129 @@
+"""Are the means of the groups equal? One-way ANOVA, Welch's ANOVA, Kruskal-Wallis; all columns at once.
+
+ANOVA is the sharpest when the groups scatter alike; Welch's does not ask for that (but needs two runs in
+each group); Kruskal-Wallis asks for no normal distribution, and loses little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from monitor.records import Array
+from monitor.statistics.sums import GroupedSums, grouped_sums
+
+
+@dataclass(frozen=True)
+class GroupTest:
+    """A test of k groups for p columns: ``statistic``, ``dof_denominator`` and ``p_value`` are (p,).
+
+    ``dof_denominator`` is infinite for a chi-square statistic. NaN marks a column that says nothing
+    because it never varies within nor between the groups.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    statistic: Array
+    dof: int
+    dof_denominator: Array
+    p_value: Array
+
+
+@dataclass(frozen=True)
+class AnalysisOfVariance(GroupTest):
+    """One-way ANOVA with its table; sums and mean squares (p,) in the squared unit of the values."""
+
+    ss_between: Array
+    ss_within: Array
+    ms_between: Array
+    ms_within: Array
+    r_squared: Array
+
+    @property
+    def residual_sd(self) -> Array:
+        """Standard deviation within the groups (p,)."""
+        return np.sqrt(self.ms_within)
+
+
+def divide(numerator: Array, denominator: Array) -> Array:
+    """Quotient with infinity for x/0 and NaN for 0/0, silently: both have a meaning here."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(numerator / denominator)
+
+
+def anova_from_sums(sums: GroupedSums) -> AnalysisOfVariance:
+    """One-way ANOVA of sums that were made before."""
+    f = divide(sums.ms_between, sums.ms_within)
+    dof2 = np.full_like(f, sums.dof_within)
+    return AnalysisOfVariance(
+        name="one-way ANOVA",
+        labels=sums.labels,
+        statistic=f,
+        dof=sums.dof_between,
+        dof_denominator=dof2,
+        p_value=np.asarray(stats.f.sf(f, sums.dof_between, dof2)),
+        ss_between=sums.ss_between,
+        ss_within=sums.ss_within,
+        ms_between=sums.ms_between,
+        ms_within=sums.ms_within,
+        r_squared=divide(sums.ss_between, sums.ss_between + sums.ss_within),
+    )
+
+
+def welch_from_sums(sums: GroupedSums) -> GroupTest:
+    """Welch's ANOVA of sums that were made before (two runs in each group)."""
+    counts = sums.counts[:, np.newaxis].astype(np.float64)
+    k = sums.k
+    # A group that never varies has an infinite weight; the test then says nothing (NaN).
+    weight = divide(counts * (counts - 1.0), sums.ss_by_group)
+    total = weight.sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        centre = (weight * sums.mean_by_group).sum(axis=0) / total
+        spread = ((1.0 - weight / total) ** 2 / (counts - 1.0)).sum(axis=0)
+        numerator = (weight * (sums.mean_by_group - centre) ** 2).sum(axis=0) / (k - 1)
+        f = numerator / (1.0 + 2.0 * (k - 2) / (k**2 - 1) * spread)
+        dof2 = divide(np.full_like(spread, k**2 - 1.0), 3.0 * spread)
+    return GroupTest("Welch ANOVA", sums.labels, f, k - 1, dof2, np.asarray(stats.f.sf(f, k - 1, dof2)))
+
+
+def anova(values: npt.ArrayLike, groups: npt.ArrayLike) -> AnalysisOfVariance:
+    """One-way analysis of variance of ``values`` (n, p), any unit, by ``groups`` (n,).
+
+    Assumes equal variances and normal scatter within the groups. Raises ``DataError`` (see
+    ``grouped_sums``). Reaches 9 digits on NIST StRD SmLs01-06 and on SmLs07-09 what doubles of 13 constant
+    leading digits still hold (tests/statistics/test_means.py).
+    """
+    return anova_from_sums(grouped_sums(values, groups))
+
+
+def welch_anova(values: npt.ArrayLike, groups: npt.ArrayLike) -> GroupTest:
+    """Welch's one-way ANOVA: means compared without assuming equal variances.
+
+    ``values`` (n, p), ``groups`` (n,), at least two runs in each group or ``DataError``. Source: B. L.
+    Welch, On the comparison of several mean values, Biometrika 38 (1951) 330, Eqs. (15) to (17). With
+    small groups it is a little liberal: with five groups of four runs 5.7 % alarms at the nominal 5 % with
+    equal scatter, 7.2 % with standard deviations of 1 to 5 (where ANOVA has 8.1 %).
+    """
+    return welch_from_sums(grouped_sums(values, groups, least_runs=2))
+
+
+def kruskal_wallis(values: npt.ArrayLike, groups: npt.ArrayLike) -> GroupTest:
+    """Kruskal-Wallis test on ranks, corrected for ties; chi-square approximation with k - 1 degrees.
+
+    ``values`` (n, p), ``groups`` (n,). Raises ``DataError`` as ``grouped_sums`` does. Source: Kruskal and
+    Wallis, JASA 47 (1952) 583. The approximation is conservative for small
+    groups: 3.1 % alarms at the nominal 5 % with five groups of four runs.
+    """
+    sums = grouped_sums(values, groups)
+    ranks = np.asarray(stats.rankdata(sums.centred, axis=0))
+    n = sums.n
+    offset = np.vstack([ranks[sums.index == j].mean(axis=0) for j in range(sums.k)]) - (n + 1) / 2.0
+    between = (sums.counts[:, np.newaxis] * offset * offset).sum(axis=0)
+    # The variance of the ranks themselves carries the correction for ties.
+    h = divide(between, ranks.var(axis=0, ddof=1))
+    dof = sums.k - 1
+    p_value = np.asarray(stats.chi2.sf(h, dof))
+    return GroupTest("Kruskal-Wallis", sums.labels, h, dof, np.full_like(h, np.inf), p_value)

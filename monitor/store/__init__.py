@@ -1,0 +1,86 @@
+"""The store: one DuckDB file with the campaigns, their raw files, and everything that was computed.
+
+``Database(path)`` opens it (a ``with`` statement closes it); the functions here take it as their first
+argument. People who query with SQL start from the views ``v_*``; every table and column has a COMMENT with
+its unit. Only this room imports duckdb.
+"""
+
+from monitor.store.analyses import StoredAnalysis, list_analyses, load_analysis, save_analysis
+from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
+from monitor.store.campaigns import Imported, import_campaign, load_campaign
+from monitor.store.catalogue import list_campaigns, list_machines, list_runs
+from monitor.store.certificates import (
+    StoredCertificate,
+    find_certificate,
+    list_certificates,
+    load_certificate,
+    mark_certificate,
+    save_certificate,
+)
+from monitor.store.connection import Database
+from monitor.store.events import list_events, record_event
+from monitor.store.export import export_tables
+from monitor.store.fleet import FleetSums, fleet_sums
+from monitor.store.history import MachineHistory, machine_history, unidentified_campaigns
+from monitor.store.identifications import (
+    identification_by_number,
+    list_identifications,
+    list_parameters,
+    load_identification,
+    save_identification,
+)
+from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
+from monitor.store.results import StoredIdentification, StoredRun
+from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
+from monitor.store.verification import Verification, verify_audit
+
+__all__ = [
+    "Backup",
+    "Database",
+    "FleetSums",
+    "Imported",
+    "MachineHistory",
+    "StoredAnalysis",
+    "StoredCertificate",
+    "StoredIdentification",
+    "StoredModel",
+    "StoredRun",
+    "StoredSelection",
+    "Verification",
+    "export_tables",
+    "find_certificate",
+    "find_selection",
+    "fleet_sums",
+    "identification_by_number",
+    "import_campaign",
+    "list_analyses",
+    "list_backups",
+    "list_campaigns",
+    "list_certificates",
+    "list_events",
+    "list_identifications",
+    "list_machines",
+    "list_models",
+    "list_parameters",
+    "list_runs",
+    "list_selections",
+    "load_analysis",
+    "load_campaign",
+    "load_certificate",
+    "load_identification",
+    "load_model",
+    "machine_history",
+    "mark_certificate",
+    "model_history",
+    "record_event",
+    "restore",
+    "save_analysis",
+    "save_certificate",
+    "save_identification",
+    "save_model",
+    "save_selection",
+    "snapshot",
+    "take_backup",
+    "unidentified_campaigns",
+    "verify_audit",
+]

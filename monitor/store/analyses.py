@@ -1,0 +1,158 @@
+"""Results that are kept as one JSON document: uncertainties, comparisons, explanations, statistics, trends.
+
+Nothing is replaced: the latest of its kind is what ``load_analysis`` gives.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import pandas as pd
+
+from monitor import __version__
+from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.store import audit
+from monitor.store.catalogue import campaign_number, check_machine
+from monitor.store.connection import Database, utc_now
+
+
+@dataclass(frozen=True)
+class StoredAnalysis:
+    """A result as it was stored; ``seed`` is None where no random numbers were drawn."""
+
+    number: int
+    kind: str
+    machine: str | None
+    campaign: str | None
+    run: int | None
+    model: str | None
+    model_version: int | None
+    method: str
+    seed: int | None
+    document: Mapping[str, Any]
+    software_version: str
+    computed_at: datetime
+
+
+def save_analysis(
+    db: Database,
+    kind: str,
+    document: Mapping[str, Any],
+    *,
+    method: str,
+    campaign: str | None = None,
+    machine: str | None = None,
+    run: int | None = None,
+    model: str | None = None,
+    model_version: int | None = None,
+    seed: int | None = None,
+) -> int:
+    """Keep a result; its number. ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend.
+
+    Raises DataError for a document that is not JSON (NaN and infinities included), NotFoundError for a
+    campaign or machine that is not there.
+    """
+    if not kind.strip():
+        raise InputError("a result needs a kind, for example 'uncertainty'")
+    try:
+        text = json.dumps(document, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError) as fault:
+        raise DataError(f"the {kind} result cannot be kept as JSON: {fault}") from fault
+    with db.transaction():
+        campaign_id = None if campaign is None else campaign_number(db, campaign)
+        if machine is not None:
+            check_machine(db, machine)
+        number = db.next_number("analysis", "analysis_id")
+        db.execute(
+            "INSERT INTO analysis VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            [
+                number,
+                kind,
+                machine,
+                campaign_id,
+                run,
+                model,
+                model_version,
+                method,
+                None if seed is None else str(seed),
+                text,
+                __version__,
+                utc_now(),
+            ],
+        )
+        audit.record(db, "save", "analysis", str(number), analysis_content(db, number))
+    return number
+
+
+def load_analysis(
+    db: Database,
+    kind: str,
+    *,
+    campaign: str | None = None,
+    machine: str | None = None,
+    run: int | None = None,
+    model: str | None = None,
+    model_version: int | None = None,
+    method: str | None = None,
+) -> StoredAnalysis:
+    """The latest result of a kind; what is named narrows the choice. Raises NotFoundError."""
+    found = db.rows(
+        """
+        SELECT a.analysis_id, a.kind, a.machine, c.campaign, a.run, a.model, a.model_version, a.method, a.seed,
+               a.document, a.software_version, a.computed_at
+        FROM analysis AS a LEFT JOIN campaign AS c USING (campaign_id)
+        WHERE a.kind = $kind
+          AND ($campaign IS NULL OR c.campaign = $campaign)
+          AND ($machine IS NULL OR coalesce(a.machine, c.machine) = $machine)
+          AND ($run IS NULL OR a.run = $run) AND ($model IS NULL OR a.model = $model)
+          AND ($version IS NULL OR a.model_version = $version) AND ($method IS NULL OR a.method = $method)
+        ORDER BY a.analysis_id DESC LIMIT 1
+        """,
+        {
+            "kind": kind,
+            "campaign": campaign,
+            "machine": machine,
+            "run": run,
+            "model": model,
+            "version": model_version,
+            "method": method,
+        },
+    )
+    if not found:
+        named = [campaign, machine, None if run is None else f"run {run}", model, method]
+        about = ", ".join(name for name in named if name is not None)
+        raise NotFoundError(f"there is no stored {kind} result{' of ' + about if about else ''} yet")
+    *head, seed, document, version, computed_at = found[0]
+    number, kind, machine, campaign, run, model, model_version, method = head
+    return StoredAnalysis(
+        number,
+        kind,
+        machine,
+        campaign,
+        run,
+        model,
+        model_version,
+        method,
+        None if seed is None else int(seed),
+        json.loads(document),
+        version,
+        computed_at,
+    )
+
+
+def list_analyses(db: Database, kind: str | None = None) -> pd.DataFrame:
+    """All results without their documents, the latest first: from the view ``v_analyses``."""
+    return db.frame(
+        "SELECT * EXCLUDE (document) FROM v_analyses WHERE $kind IS NULL OR kind = $kind "
+        "ORDER BY analysis_id DESC",
+        {"kind": kind},
+    )
+
+
+def analysis_content(db: Database, number: int) -> str:
+    """The hash of all that is stored of a result."""
+    return audit.digest(*db.rows("SELECT * FROM analysis WHERE analysis_id = ?", [number]))

@@ -1,0 +1,64 @@
+"""The audit chain: every change adds an entry that holds the hash of what was stored and of the entry before.
+
+An entry that is altered, or left out between two others, no longer fits its neighbours. Entries cut off at
+the end are seen where the things that they tell of are still there (``verification``).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from datetime import datetime
+from typing import Any
+
+from monitor import __version__
+from monitor.store.connection import Database, utc_now
+
+#: What stands in the first entry for the hash of the entry before.
+NO_ENTRY_BEFORE = "0" * 64
+
+_COLUMNS = (
+    "entry, made_at, actor, action, subject, key, content_sha256, software_version, "
+    "previous_sha256, entry_sha256"
+)
+
+
+def digest(*values: Any) -> str:
+    """SHA-256 of plain values (None, numbers, text, bytes, datetimes, lists, mappings), hexadecimal."""
+    text = json.dumps(values, ensure_ascii=False, sort_keys=True, separators=(",", ":"), default=_plain)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def record(db: Database, action: str, subject: str, key: str, content_sha256: str) -> None:
+    """Add an entry, inside the transaction of the change that it tells of."""
+    last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
+    number, previous = last[0] if last else (0, NO_ENTRY_BEFORE)
+    values = [number + 1, utc_now(), db.actor, action, subject, key, content_sha256, __version__, previous]
+    db.execute(
+        f"INSERT INTO audit ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", [*values, digest(*values)]
+    )
+
+
+def chain_faults(db: Database) -> tuple[str, ...]:
+    """What is wrong with the chain, entry by entry; empty where nothing is."""
+    faults = []
+    previous = NO_ENTRY_BEFORE
+    for expected, row in enumerate(db.rows(f"SELECT {_COLUMNS} FROM audit ORDER BY entry"), start=1):
+        *values, entry_sha256 = row
+        if values[0] != expected:
+            faults.append(f"audit entry {expected} is missing")
+            break
+        if digest(*values) != entry_sha256:
+            faults.append(f"audit entry {expected} was altered")
+        if values[-1] != previous:
+            faults.append(f"audit entry {expected} does not follow the one before it")
+        previous = entry_sha256
+    return tuple(faults)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return hashlib.sha256(value).hexdigest()
+    if isinstance(value, datetime):
+        return value.isoformat()
+    raise TypeError(f"{type(value).__name__} cannot be hashed")

@@ -1,0 +1,173 @@
+"""Backups and snapshots: a second file, compared with the first table by table, and a manifest beside it.
+
+A backup can be made while the database is in use by this process; it shows one moment. ``restore`` puts it
+back only where it is, byte for byte, what the manifest says.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import duckdb
+
+from monitor import __version__
+from monitor.exceptions import StoreError
+from monitor.store.connection import Database, utc_now
+
+_MANIFEST_END = ".manifest.json"
+
+
+@dataclass(frozen=True)
+class Backup:
+    """A backup: its file and hash, when it was made (UTC), and rows and checksum of every table.
+
+    The checksum is DuckDB's own hash, summed over the rows; it compares tables within ``duckdb_version`` only.
+    """
+
+    path: str
+    sha256: str
+    made_at: str
+    software_version: str
+    duckdb_version: str
+    tables: Mapping[str, tuple[int, str]]
+
+
+def take_backup(db: Database, target: str | Path) -> Backup:
+    """Copy the database into the new file ``target`` and write ``target.manifest.json``.
+
+    Raises StoreError where the target exists or cannot be written, or the copy differs from the original.
+    """
+    target = Path(target)
+    _refuse_existing(target)
+    partial = target.with_name(target.name + ".partial")
+    _remove(partial)
+    try:
+        tables = _copy(db, partial)
+        made = Backup(
+            target.name, _file_sha256(partial), utc_now().isoformat(), __version__, duckdb.__version__, tables
+        )
+        _manifest(target).write_text(
+            json.dumps(asdict(made), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
+        os.replace(partial, target)
+    except (OSError, duckdb.Error) as fault:
+        raise StoreError(f"the backup {target} could not be written: {fault}") from fault
+    finally:
+        _remove(partial)
+    return made
+
+
+def snapshot(db: Database, folder: str | Path) -> Backup:
+    """A backup in ``folder``, named after the database and the present moment. Raises StoreError."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    return take_backup(db, folder / f"{Path(db.path).stem}-{utc_now():%Y%m%dT%H%M%S%fZ}.duckdb")
+
+
+def list_backups(folder: str | Path) -> tuple[Backup, ...]:
+    """The backups and snapshots in a folder that have a manifest, the oldest first."""
+    found = [_read_manifest(path) for path in Path(folder).glob(f"*{_MANIFEST_END}")]
+    return tuple(sorted(found, key=lambda made: (made.made_at, made.path)))
+
+
+def restore(source: str | Path, target: str | Path) -> Backup:
+    """Put a backup back as the new database ``target``, which must not exist yet.
+
+    Raises StoreError without a manifest, where a byte differs from it, or where this software cannot open it.
+    """
+    source, target = Path(source), Path(target)
+    if not source.is_file():
+        raise StoreError(f"there is no backup {source}")
+    if not _manifest(source).is_file():
+        raise StoreError(
+            f"{source} has no manifest {_manifest(source).name} beside it, so it cannot be checked"
+        )
+    _refuse_existing(target)
+    made = _read_manifest(_manifest(source))
+    partial = target.with_name(target.name + ".partial")
+    try:
+        shutil.copyfile(source, partial)
+        if _file_sha256(partial) != made.sha256:
+            raise StoreError(
+                f"{source} is not what its manifest says: its SHA-256 differs; use another backup"
+            )
+        with Database(partial, read_only=True) as db:
+            if made.duckdb_version == duckdb.__version__ and _tables(db) != made.tables:
+                raise StoreError(
+                    f"{source} is not what its manifest says: its tables differ; use another backup"
+                )
+        os.replace(partial, target)
+    except OSError as fault:
+        raise StoreError(f"{target} could not be written: {fault}") from fault
+    finally:
+        _remove(partial)
+    return made
+
+
+def _copy(db: Database, partial: Path) -> dict[str, tuple[int, str]]:
+    with db.attached(partial, "backup_copy"):
+        ((own,),) = db.rows("SELECT current_database()")
+        db.execute(f"COPY FROM DATABASE {_quoted(own)} TO backup_copy")
+        tables = _tables(db)
+        copied = _tables(db, "backup_copy")
+    if copied != tables:
+        different = ", ".join(name for name in tables if copied.get(name) != tables[name])
+        raise StoreError(f"the copy differs from the database in {different}; nothing was kept of it")
+    return tables
+
+
+def _tables(db: Database, catalog: str | None = None) -> dict[str, tuple[int, str]]:
+    """Rows and checksum of every table."""
+    names = db.rows(
+        "SELECT database_name, table_name FROM duckdb_tables() "
+        "WHERE database_name = coalesce($catalog, current_database()) ORDER BY table_name",
+        {"catalog": catalog},
+    )
+    found = {}
+    for database, table in names:
+        ((rows, checksum),) = db.rows(
+            "SELECT count(*), CAST(coalesce(sum(CAST(hash(t) AS HUGEINT)), 0) AS VARCHAR) "
+            f"FROM {_quoted(database)}.main.{_quoted(table)} AS t"
+        )
+        found[str(table)] = (int(rows), str(checksum))
+    return found
+
+
+def _manifest(path: Path) -> Path:
+    return path.with_name(path.name + _MANIFEST_END)
+
+
+def _read_manifest(path: Path) -> Backup:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        tables = {name: (int(rows), str(checksum)) for name, (rows, checksum) in data.pop("tables").items()}
+        return Backup(**data, tables=tables)
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as fault:
+        raise StoreError(f"{path} is not a manifest of a backup: {fault}") from fault
+
+
+def _refuse_existing(target: Path) -> None:
+    if target.exists():
+        raise StoreError(f"{target} exists already; name a new file, or move that one away first")
+    if not target.absolute().parent.is_dir():
+        raise StoreError(f"the folder of {target} does not exist; make it first")
+
+
+def _remove(partial: Path) -> None:
+    for path in (partial, partial.with_name(partial.name + ".wal")):
+        path.unlink(missing_ok=True)
+
+
+def _file_sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'

@@ -1,0 +1,220 @@
+"""Campaigns in and out: one import is one transaction, and what comes back equals what went in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta, timezone
+from typing import Literal
+
+import numpy as np
+
+from monitor import __version__
+from monitor.exceptions import CampaignError, DataError, Fault
+from monitor.records import Campaign, Run, SourceFile
+from monitor.store import audit, probings, record_json
+from monitor.store.catalogue import campaign_number
+from monitor.store.connection import Database, utc_now
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What an import did: "imported", or "unchanged" where the same content was there already."""
+
+    campaign: str
+    state: Literal["imported", "unchanged"]
+    runs: int
+    probings: int
+
+    def __str__(self) -> str:
+        size = f"{self.runs} runs, {self.probings} probings"
+        if self.state == "imported":
+            return f"{self.campaign}: imported, {size}"
+        return f"{self.campaign}: was imported before with the same content, nothing changed ({size})"
+
+
+def import_campaign(db: Database, campaign: Campaign) -> Imported:
+    """Keep a campaign and the bytes of its files, or say that the same is there already.
+
+    Raises CampaignError, with nothing kept, where a campaign of that name has other content, or its machine
+    has another topology in the database; DataError where a number is not finite.
+    """
+    rows = probings.printed(campaign.probings)
+    for run in campaign.runs:
+        _check_run(run)
+    content = _content(campaign, rows)
+    done = Imported(campaign.name, "imported", len(campaign.runs), len(campaign.probings))
+    with db.transaction():
+        known = db.rows(
+            "SELECT campaign_id, content_sha256, imported_at FROM campaign WHERE campaign = ?",
+            [campaign.name],
+        )
+        if known:
+            faults = _differences(db, campaign, content, *known[0])
+            if faults:
+                raise CampaignError(campaign.name, faults)
+            return Imported(done.campaign, "unchanged", done.runs, done.probings)
+        _keep_machine(db, campaign)
+        campaign_id = db.next_number("campaign", "campaign_id")
+        db.execute(
+            "INSERT INTO campaign VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            [
+                campaign_id,
+                campaign.name,
+                campaign.machine.id,
+                campaign.method,
+                record_json.machine_json(campaign.machine),
+                record_json.probe_json(campaign.probe),
+                record_json.artefact_json(campaign.artefact),
+                content,
+                __version__,
+                utc_now(),
+            ],
+        )
+        for file in campaign.files:
+            db.execute(
+                "INSERT INTO source_file VALUES (?, ?, ?, ?)",
+                [campaign_id, file.name, file.content, file.sha256],
+            )
+        _insert_runs(db, campaign_id, campaign.runs)
+        probings.insert(db, campaign_id, rows)
+        audit.record(db, "import", "campaign", campaign.name, content)
+    return done
+
+
+def load_campaign(db: Database, name: str) -> Campaign:
+    """The campaign as it was imported. Raises NotFoundError listing what is there."""
+    campaign, _ = _load(db, name)
+    return campaign
+
+
+def stored_content(db: Database, name: str) -> str:
+    """The content hash of a campaign, computed anew from everything that is stored of it."""
+    return _content(*_load(db, name))
+
+
+def _check_run(run: Run) -> None:
+    if run.started_at.utcoffset() is None:
+        raise DataError(f"run {run.run} starts at {run.started_at}, without its offset from UTC")
+    for name, value in run.conditions.items():
+        if not np.isfinite(value):
+            raise DataError(f"condition {name} of run {run.run} must be a finite number, not {value}")
+
+
+def _content(campaign: Campaign, rows: probings.PrintedProbings) -> str:
+    return audit.digest(
+        campaign.name,
+        campaign.method,
+        record_json.machine_json(campaign.machine),
+        record_json.probe_json(campaign.probe),
+        record_json.artefact_json(campaign.artefact),
+        [
+            [
+                r.run,
+                r.started_at.isoformat(),
+                r.day,
+                r.warm_up,
+                {k: float(v) for k, v in r.conditions.items()},
+            ]
+            for r in campaign.runs
+        ],
+        rows.sha256,
+        [[file.name, file.sha256] for file in sorted(campaign.files, key=lambda file: file.name)],
+    )
+
+
+def _differences(
+    db: Database, campaign: Campaign, content: str, campaign_id: int, stored: str, imported_at: datetime
+) -> list[Fault]:
+    """What differs from the campaign of the same name; empty where the content is the same.
+
+    The files decide where there are any: a later version of the reader may read more out of the same bytes.
+    """
+    when = f"{imported_at:%Y-%m-%d %H:%M} UTC"
+    before = dict(db.rows("SELECT file, sha256 FROM source_file WHERE campaign_id = ?", [campaign_id]))
+    now = {file.name: file.sha256 for file in campaign.files}
+    if not before and not now and content != stored:
+        return [Fault("campaign", None, None, f"its content differs from that imported on {when}")]
+    advice = "give the new content another campaign name"
+    faults = []
+    for name in sorted(before.keys() | now.keys()):
+        if name not in now:
+            faults.append(Fault(name, None, None, f"is missing; it was imported on {when}; {advice}"))
+        elif name not in before:
+            faults.append(Fault(name, None, None, f"was not there when imported on {when}; {advice}"))
+        elif before[name] != now[name]:
+            faults.append(Fault(name, None, None, f"differs from the file imported on {when}; {advice}"))
+    return faults
+
+
+def _keep_machine(db: Database, campaign: Campaign) -> None:
+    machine = campaign.machine
+    known = db.rows("SELECT topology FROM machine WHERE machine = ?", [machine.id])
+    if not known:
+        db.execute("INSERT INTO machine VALUES (?, ?, ?)", [machine.id, machine.topology, utc_now()])
+    elif known[0][0] != machine.topology:
+        raise CampaignError(
+            campaign.name,
+            [
+                Fault(
+                    "campaign.toml",
+                    None,
+                    "topology",
+                    f"machine {machine.id} is known as {known[0][0]!r}, here it is {machine.topology!r}; the axes "
+                    "of a machine do not change: correct the topology, or give the machine another id",
+                )
+            ],
+        )
+
+
+def _insert_runs(db: Database, campaign_id: int, added: tuple[Run, ...]) -> None:
+    for position, run in enumerate(added, start=1):
+        offset = run.started_at.utcoffset() or timedelta()
+        db.execute(
+            "INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, map(?::VARCHAR[], ?::DOUBLE[]))",
+            [
+                campaign_id,
+                position,
+                run.run,
+                run.started_at.astimezone(UTC).replace(tzinfo=None),
+                offset.total_seconds(),
+                run.day,
+                run.warm_up,
+                list(run.conditions),
+                [float(value) for value in run.conditions.values()],
+            ],
+        )
+
+
+def _load(db: Database, name: str) -> tuple[Campaign, probings.PrintedProbings]:
+    campaign_id = campaign_number(db, name)
+    ((method, machine, probe, artefact),) = db.rows(
+        "SELECT method, machine_description, probe, artefact FROM campaign WHERE campaign_id = ?",
+        [campaign_id],
+    )
+    rows = probings.select(db, campaign_id)
+    stored_runs = db.rows(
+        "SELECT run, started_at, utc_offset_s, day, warm_up, map_keys(conditions), map_values(conditions) "
+        "FROM run WHERE campaign_id = ? ORDER BY position",
+        [campaign_id],
+    )
+    files = db.rows(
+        "SELECT file, content FROM source_file WHERE campaign_id = ? ORDER BY rowid", [campaign_id]
+    )
+    campaign = Campaign(
+        name=name,
+        method=method,
+        machine=record_json.machine_record(machine),
+        probe=record_json.probe_record(probe),
+        artefact=record_json.artefact_record(artefact),
+        runs=tuple(
+            Run(run, _moment(at, offset), day, warm_up, dict(zip(names, values, strict=True)))
+            for run, at, offset, day, warm_up, names, values in stored_runs
+        ),
+        probings=probings.as_record(rows),
+        files=tuple(SourceFile(file, content) for file, content in files),
+    )
+    return campaign, rows
+
+
+def _moment(at: datetime, offset_s: float) -> datetime:
+    return at.replace(tzinfo=UTC).astimezone(timezone(timedelta(seconds=offset_s)))

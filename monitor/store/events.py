@@ -1,0 +1,56 @@
+"""Events that people know of a machine: a crash, a repair, a compensation applied, another probe."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import pandas as pd
+
+from monitor.exceptions import InputError
+from monitor.store import audit
+from monitor.store.catalogue import check_machine
+from monitor.store.connection import Database, utc_now
+
+
+def record_event(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> int:
+    """Keep an event of a machine; its number. ``happened_at`` has an offset from UTC.
+
+    Raises InputError for a time without an offset or an empty kind, NotFoundError for an unknown machine.
+    """
+    offset = happened_at.utcoffset()
+    if offset is None:
+        raise InputError(
+            f"the time of an event needs its offset from UTC; {happened_at.isoformat()} has none"
+        )
+    if not kind.strip():
+        raise InputError("an event needs a kind, for example 'repair'")
+    with db.transaction():
+        check_machine(db, machine)
+        number = db.next_number("event", "event_id")
+        db.execute(
+            "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?, ?)",
+            [
+                number,
+                machine,
+                happened_at.astimezone(UTC).replace(tzinfo=None),
+                offset.total_seconds(),
+                kind,
+                description,
+                utc_now(),
+            ],
+        )
+        audit.record(db, "record", "event", str(number), event_content(db, number))
+    return number
+
+
+def list_events(db: Database, machine: str | None = None) -> pd.DataFrame:
+    """The events of all machines or of one, in the order of time: the view ``v_events``."""
+    return db.frame(
+        "SELECT * FROM v_events WHERE $machine IS NULL OR machine = $machine ORDER BY machine, happened_at",
+        {"machine": machine},
+    )
+
+
+def event_content(db: Database, number: int) -> str:
+    """The hash of all that is stored of an event."""
+    return audit.digest(*db.rows("SELECT * FROM event WHERE event_id = ?", [number]))

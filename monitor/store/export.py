@@ -1,0 +1,91 @@
+"""Everything as CSV or Parquet, for other software and for the day when this one is no longer there.
+
+A folder with a file for every table and view, ``columns.csv`` with the meaning and unit of every column, and
+the imported files, byte for byte, under ``source_files/NUMBER OF THE CAMPAIGN/``. In CSV the maps and lists
+are text, and bytes are left out; Parquet has everything.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import duckdb
+
+from monitor.exceptions import InputError, StoreError
+from monitor.store.connection import Database
+
+_OPTIONS = {"csv": "FORMAT csv, HEADER", "parquet": "FORMAT parquet, COMPRESSION zstd"}
+
+
+def export_tables(
+    db: Database, folder: str | Path, form: Literal["csv", "parquet"] = "csv"
+) -> tuple[Path, ...]:
+    """Write all tables, views and imported files into a new or empty folder; the files written.
+
+    Raises InputError for another form or a folder that is not empty, StoreError where it cannot be written.
+    """
+    if form not in _OPTIONS:
+        raise InputError(f"a database is exported as csv or parquet, not {form!r}")
+    folder = Path(folder)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder} is not an empty folder; name a new one")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        written = [_copy(db, name, folder, form) for name in _names(db)]
+        written.append(_columns(db, folder))
+        written += _source_files(db, folder)
+    except (OSError, duckdb.IOException) as fault:
+        raise StoreError(f"the export to {folder} could not be written: {fault}") from fault
+    return tuple(written)
+
+
+def _names(db: Database) -> list[str]:
+    return [
+        name
+        for (name,) in db.rows(
+            "SELECT DISTINCT table_name FROM duckdb_columns() "
+            "WHERE database_name = current_database() AND NOT internal ORDER BY table_name"
+        )
+    ]
+
+
+def _copy(db: Database, name: str, folder: Path, form: str) -> Path:
+    path = folder / f"{name}.{form}"
+    columns = []
+    for column, kind in db.rows(
+        "SELECT column_name, data_type FROM duckdb_columns() "
+        "WHERE database_name = current_database() AND table_name = ? ORDER BY column_index",
+        [name],
+    ):
+        if form == "csv" and kind == "BLOB":
+            continue
+        columns.append(
+            f'to_json("{column}") AS "{column}"' if form == "csv" and "MAP" in kind else f'"{column}"'
+        )
+    # The names come from the catalogue; the path is the only text of the user's.
+    literal = str(path).replace("'", "''")
+    db.execute(f"COPY (SELECT {', '.join(columns)} FROM \"{name}\") TO '{literal}' ({_OPTIONS[form]})")
+    return path
+
+
+def _columns(db: Database, folder: Path) -> Path:
+    path = folder / "columns.csv"
+    db.frame(
+        "SELECT table_name, column_name, data_type, comment FROM duckdb_columns() "
+        "WHERE database_name = current_database() AND NOT internal ORDER BY table_name, column_index"
+    ).to_csv(path, index=False)
+    return path
+
+
+def _source_files(db: Database, folder: Path) -> list[Path]:
+    written = []
+    for campaign_id, file, content in db.rows(
+        "SELECT campaign_id, file, content FROM source_file ORDER BY ALL"
+    ):
+        # Only the last part of a stored name: nothing is written outside the folder.
+        path = folder / "source_files" / str(campaign_id) / Path(file).name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        written.append(path)
+    return written

@@ -1,0 +1,240 @@
+"""Identifications in and out, and the parameters of runs as people read them.
+
+Nothing is replaced: a later identification stands beside an earlier one, and the views show the latest.
+"""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+
+from monitor import __version__
+from monitor.exceptions import NotFoundError
+from monitor.store import audit
+from monitor.store.catalogue import campaign_number
+from monitor.store.connection import Database, utc_now
+from monitor.store.results import (
+    StoredIdentification,
+    StoredRun,
+    check_identification,
+    identification_content,
+)
+from monitor.units import Unit
+
+
+def save_identification(db: Database, identification: StoredIdentification) -> int:
+    """Keep an identification; its number. Raises DataError for arrays that do not fit, NotFoundError."""
+    check_identification(identification)
+    with db.transaction():
+        campaign_id = campaign_number(db, identification.campaign)
+        known = {run for (run,) in db.rows("SELECT run FROM run WHERE campaign_id = ?", [campaign_id])}
+        strange = sorted({run.run for run in identification.runs} - known)
+        if strange:
+            raise NotFoundError(f"campaign {identification.campaign!r} has no run {strange[0]}")
+        number = db.next_number("identification", "identification_id")
+        db.execute(
+            "INSERT INTO identification VALUES (?, ?, ?, ?, ?, ?::VARCHAR[], ?::VARCHAR[], ?::DOUBLE[], ?, ?, ?)",
+            [
+                number,
+                campaign_id,
+                identification.model,
+                identification.model_version,
+                identification.method,
+                list(identification.parameters),
+                [unit.name for unit in identification.units],
+                [unit.factor for unit in identification.units],
+                len(identification.runs),
+                __version__,
+                utc_now(),
+            ],
+        )
+        for run in identification.runs:
+            _insert_run(db, number, run)
+        _insert_values(db, number, identification)
+        _insert_residuals(db, number, identification.runs)
+        audit.record(
+            db, "save", "identification", str(number), identification_content(number, identification)
+        )
+    return number
+
+
+def load_identification(
+    db: Database,
+    campaign: str,
+    model: str | None = None,
+    version: int | None = None,
+    *,
+    run: int | None = None,
+) -> StoredIdentification:
+    """The latest identification with the most runs, or the latest that holds ``run`` where one is named.
+
+    ``model`` and ``version`` narrow the choice. Raises NotFoundError saying what to type.
+    """
+    campaign_id = campaign_number(db, campaign)
+    found = db.rows(
+        """
+        SELECT identification_id FROM identification AS i
+        WHERE campaign_id = $campaign_id
+          AND ($model IS NULL OR model = $model) AND ($version IS NULL OR model_version = $version)
+          AND ($run IS NULL OR EXISTS (
+              SELECT 1 FROM identified_run AS f WHERE f.identification_id = i.identification_id AND f.run = $run))
+        ORDER BY CASE WHEN $run IS NULL THEN run_count ELSE 0 END DESC, identification_id DESC LIMIT 1
+        """,
+        {"campaign_id": campaign_id, "model": model, "version": version, "run": run},
+    )
+    if not found:
+        wanted = "".join(
+            f" {word} {value}"
+            for word, value in (("model", model), ("version", version), ("run", run))
+            if value is not None
+        )
+        raise NotFoundError(
+            f"campaign {campaign!r} has not been identified yet{' for' + wanted if wanted else ''}; "
+            f"type `monitor identify {campaign}`"
+        )
+    return identification_by_number(db, found[0][0])
+
+
+def identification_by_number(db: Database, number: int) -> StoredIdentification:
+    """The identification of a number that ``save_identification`` returned. Raises NotFoundError."""
+    head = db.rows(
+        "SELECT campaign, model, model_version, i.method, parameters, units, display_factors "
+        "FROM identification AS i JOIN campaign USING (campaign_id) WHERE identification_id = ?",
+        [number],
+    )
+    if not head:
+        raise NotFoundError(f"there is no identification number {number}")
+    campaign, model, version, method, parameters, units, factors = head[0]
+    return StoredIdentification(
+        campaign,
+        model,
+        version,
+        method,
+        tuple(parameters),
+        tuple(Unit(name, factor) for name, factor in zip(units, factors, strict=True)),
+        _runs(db, number, len(parameters)),
+    )
+
+
+def list_identifications(db: Database, campaign: str | None = None) -> pd.DataFrame:
+    """All identifications, or those of a campaign: the view ``v_identifications``."""
+    return db.frame(
+        "SELECT * FROM v_identifications WHERE $campaign IS NULL OR campaign = $campaign ORDER BY ALL",
+        {"campaign": campaign},
+    )
+
+
+def list_parameters(
+    db: Database, *, machine: str | None = None, campaign: str | None = None, parameter: str | None = None
+) -> pd.DataFrame:
+    """Parameters of runs in display units, in the order of time: the view ``v_parameters``."""
+    return db.frame(
+        "SELECT * FROM v_parameters WHERE ($machine IS NULL OR machine = $machine) "
+        "AND ($campaign IS NULL OR campaign = $campaign) AND ($parameter IS NULL OR parameter = $parameter) "
+        "ORDER BY started_at, campaign, run, model, model_version, parameter",
+        {"machine": machine, "campaign": campaign, "parameter": parameter},
+    )
+
+
+def stored_identification_content(db: Database, number: int) -> str:
+    """The content hash computed anew from what is stored; "" where the parameter rows contradict it."""
+    identification = identification_by_number(db, number)
+    rows = db.rows(
+        "SELECT run, parameter, value, u, unit, display_factor FROM parameter_value "
+        "WHERE identification_id = ? ORDER BY rowid",
+        [number],
+    )
+    expected = [
+        tuple(None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row)
+        for row in _values(identification).itertuples(index=False, name=None)
+    ]
+    return identification_content(number, identification) if rows == expected else ""
+
+
+def _insert_run(db: Database, number: int, run: StoredRun) -> None:
+    db.execute(
+        "INSERT INTO identified_run VALUES (?, ?, ?, ?, ?, ?, ?::DOUBLE[], ?)",
+        [
+            number,
+            run.run,
+            float(run.rms_mm),
+            int(run.iterations),
+            int(run.degrees_of_freedom),
+            float(run.chi_square),
+            [float(value) for value in run.covariance.ravel()],
+            json.dumps(
+                [{"parameters": list(group), "why": why} for group, why in run.refused], ensure_ascii=False
+            ),
+        ],
+    )
+
+
+def _insert_values(db: Database, number: int, identification: StoredIdentification) -> None:
+    incoming = _values(identification)
+    db.insert("INSERT INTO parameter_value SELECT ?, * FROM incoming", incoming, [number])
+
+
+def _values(identification: StoredIdentification) -> pd.DataFrame:
+    """The rows of ``parameter_value``."""
+    count = len(identification.parameters)
+    repeats = len(identification.runs)
+    return pd.DataFrame(
+        {
+            "run": np.repeat([run.run for run in identification.runs], count),
+            "parameter": np.tile(np.array(identification.parameters, dtype=object), repeats),
+            "value": np.concatenate([run.estimate for run in identification.runs]),
+            "u": np.concatenate([np.sqrt(np.diag(run.covariance)) for run in identification.runs]),
+            "unit": np.tile(np.array([unit.name for unit in identification.units], dtype=object), repeats),
+            "factor": np.tile([unit.factor for unit in identification.units], repeats),
+        }
+    )
+
+
+def _insert_residuals(db: Database, number: int, runs: tuple[StoredRun, ...]) -> None:
+    vectors = np.concatenate([run.residuals for run in runs])
+    incoming = pd.DataFrame(
+        {
+            "run": np.repeat([run.run for run in runs], [len(run.sequence) for run in runs]),
+            "sequence": np.concatenate([run.sequence for run in runs]),
+            "dx": vectors[:, 0],
+            "dy": vectors[:, 1],
+            "dz": vectors[:, 2],
+        }
+    )
+    db.insert("INSERT INTO residual SELECT ?, * FROM incoming", incoming, [number])
+
+
+def _runs(db: Database, number: int, count: int) -> tuple[StoredRun, ...]:
+    values = db.arrays(
+        "SELECT run, value FROM parameter_value WHERE identification_id = ? ORDER BY rowid", [number]
+    )
+    left = db.arrays(
+        "SELECT run, sequence, dx_mm, dy_mm, dz_mm FROM residual WHERE identification_id = ? ORDER BY rowid",
+        [number],
+    )
+    vectors = np.column_stack([left["dx_mm"], left["dy_mm"], left["dz_mm"]])
+    estimates = np.ma.filled(np.ma.asarray(values["value"]), np.nan)
+    found = []
+    for run, rms, iterations, freedom, chi_square, covariance, refused in db.rows(
+        "SELECT run, rms_mm, iterations, degrees_of_freedom, chi_square, covariance, refused "
+        "FROM identified_run WHERE identification_id = ? ORDER BY rowid",
+        [number],
+    ):
+        own = np.asarray(left["run"] == run)
+        found.append(
+            StoredRun(
+                run,
+                estimates[np.asarray(values["run"] == run)],
+                np.array(covariance, dtype=np.float64).reshape(count, count),
+                tuple((tuple(group["parameters"]), group["why"]) for group in json.loads(refused)),
+                rms,
+                iterations,
+                freedom,
+                chi_square,
+                np.asarray(left["sequence"][own], dtype=np.int64),
+                vectors[own],
+            )
+        )
+    return tuple(found)

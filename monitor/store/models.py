@@ -1,0 +1,156 @@
+"""Models and their versions: a list of effects, where it came from, and what was added or taken away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import pandas as pd
+
+from monitor import __version__
+from monitor.exceptions import InputError, NotFoundError
+from monitor.store import audit
+from monitor.store.connection import Database, utc_now
+
+
+@dataclass(frozen=True)
+class StoredModel:
+    """A version of a model; ``parent`` is a name and a version, None for a base model.
+
+    ``added`` are the effects that the parent does not have, ``removed`` those of the parent that are gone.
+    """
+
+    name: str
+    version: int
+    parent: tuple[str, int] | None
+    effects: tuple[str, ...]
+    added: tuple[str, ...]
+    removed: tuple[str, ...]
+    note: str
+    created_at: datetime
+
+
+_SELECT = "SELECT model, version, parent, parent_version, effects, added, removed, note, created_at FROM model WHERE "
+
+
+def save_model(
+    db: Database,
+    name: str,
+    effects: Sequence[str],
+    *,
+    parent: tuple[str, int] | None = None,
+    note: str = "",
+) -> StoredModel:
+    """Keep a model under the next version of its name; the same effects again are the version that is there.
+
+    Raises InputError for an empty name or an effect listed twice, NotFoundError for an unknown parent.
+    """
+    if not name.strip():
+        raise InputError("a model needs a name")
+    twice = sorted({effect for effect in effects if list(effects).count(effect) > 1})
+    if twice:
+        raise InputError(f"the model {name} lists an effect twice: {', '.join(twice)}")
+    with db.transaction():
+        versions = _found(db, "model = ? ORDER BY version DESC", [name])
+        if versions and versions[0].effects == tuple(effects):
+            return versions[0]
+        before = load_model(db, *parent).effects if parent else ()
+        model = StoredModel(
+            name,
+            versions[0].version + 1 if versions else 1,
+            parent,
+            tuple(effects),
+            tuple(effect for effect in effects if effect not in before) if parent else (),
+            tuple(effect for effect in before if effect not in effects),
+            note,
+            utc_now(),
+        )
+        parent_name, parent_version = parent or (None, None)
+        db.execute(
+            "INSERT INTO model VALUES (?, ?, ?, ?, ?::VARCHAR[], ?::VARCHAR[], ?::VARCHAR[], ?, ?, ?)",
+            [
+                name,
+                model.version,
+                parent_name,
+                parent_version,
+                list(model.effects),
+                list(model.added),
+                list(model.removed),
+                note,
+                __version__,
+                model.created_at,
+            ],
+        )
+        audit.record(db, "save", "model", model_key(name, model.version), model_content(model))
+    return model
+
+
+def load_model(db: Database, name: str, version: int | None = None) -> StoredModel:
+    """A version of a model, the latest where none is named. Raises NotFoundError listing what is there."""
+    found = _found(db, "model = ? ORDER BY version DESC", [name])
+    chosen = [model for model in found if version is None or model.version == version]
+    if chosen:
+        return chosen[0]
+    if found:
+        raise NotFoundError(f"model {name!r} has no version {version}; it has 1 to {found[0].version}")
+    names = [row[0] for row in db.rows("SELECT DISTINCT model FROM model ORDER BY model")]
+    there = (
+        f"there are {', '.join(names)}" if names else "there is none yet; `monitor identify` makes the first"
+    )
+    raise NotFoundError(f"there is no model {name!r}; {there}")
+
+
+def model_history(db: Database, name: str, version: int | None = None) -> tuple[StoredModel, ...]:
+    """A version and its ancestors, the base model first. Raises NotFoundError."""
+    line = [load_model(db, name, version)]
+    while line[-1].parent is not None:
+        line.append(load_model(db, *line[-1].parent))
+    return tuple(reversed(line))
+
+
+def list_models(db: Database) -> pd.DataFrame:
+    """All models and versions: the table ``model``."""
+    return db.frame("SELECT * FROM model ORDER BY model, version")
+
+
+def all_models(db: Database) -> list[StoredModel]:
+    """All versions of all models."""
+    return _found(db, "true ORDER BY model, version", [])
+
+
+def model_key(name: str, version: int) -> str:
+    """The key of a version in the audit."""
+    return f"{name} version {version}"
+
+
+def model_content(model: StoredModel) -> str:
+    """The hash of all that is stored of a version."""
+    return audit.digest(
+        model.name,
+        model.version,
+        model.parent,
+        model.effects,
+        model.added,
+        model.removed,
+        model.note,
+        model.created_at,
+    )
+
+
+def _found(db: Database, condition: str, parameters: list[object]) -> list[StoredModel]:
+    return [
+        StoredModel(
+            name,
+            version,
+            None if parent is None else (parent, parent_version),
+            tuple(effects),
+            tuple(added),
+            tuple(removed),
+            note,
+            created_at,
+        )
+        for name, version, parent, parent_version, effects, added, removed, note, created_at in db.rows(
+            _SELECT + condition, parameters
+        )
+    ]

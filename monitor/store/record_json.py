@@ -1,0 +1,69 @@
+"""Machine, probe and artefact as JSON and back, to the last bit (Python prints doubles so that they return)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+from monitor.records import Artefact, AxisSettings, Ball, Machine, Probe, ScaleBar
+
+
+def machine_json(machine: Machine) -> str:
+    """A machine as text; strokes in mm or rad, scale pitches in mm, tolerances in display units."""
+    return _text(
+        {
+            "id": machine.id,
+            "topology": machine.topology,
+            "manufacturer": machine.manufacturer,
+            "model": machine.model,
+            "serial_number": machine.serial_number,
+            "location": machine.location,
+            "axes": {name: asdict(settings) for name, settings in machine.axes.items()},
+            "tolerances": dict(machine.tolerances),
+        }
+    )
+
+
+def machine_record(text: str) -> Machine:
+    """The machine of ``machine_json``."""
+    data = json.loads(text)
+    axes = {
+        name: AxisSettings(**{**settings, "stroke": _tuple(settings["stroke"])})
+        for name, settings in data.pop("axes").items()
+    }
+    return Machine(**data, axes=axes)
+
+
+def probe_json(probe: Probe) -> str:
+    """A probe as text; lengths in mm."""
+    return _text(asdict(probe))
+
+
+def probe_record(text: str) -> Probe:
+    """The probe of ``probe_json``."""
+    data = json.loads(text)
+    return Probe(**{**data, "tip": _tuple(data["tip"])})
+
+
+def artefact_json(artefact: Artefact) -> str:
+    """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C."""
+    return _text(asdict(artefact))
+
+
+def artefact_record(text: str) -> Artefact:
+    """The artefact of ``artefact_json``."""
+    data = json.loads(text)
+    balls = tuple(Ball(**{**ball, "nominal": _tuple(ball["nominal"])}) for ball in data["balls"])
+    bar = data["scale_bar"]
+    return Artefact(
+        data["id"], balls, None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])})
+    )
+
+
+def _text(data: dict[str, Any]) -> str:
+    return json.dumps(data, ensure_ascii=False, allow_nan=False)
+
+
+def _tuple(values: list[Any] | None) -> Any:
+    return None if values is None else tuple(values)

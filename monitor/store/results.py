@@ -1,0 +1,105 @@
+"""Records of an identification: the parameters of a model, run by run, with covariance and residuals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.store import audit
+from monitor.units import Unit
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """The k parameters of one run, in internal units (mm, rad, 1).
+
+    ``estimate`` (k,) and ``covariance`` (k, k) are NaN where a parameter was refused; ``refused`` are groups of
+    parameters and why. ``residuals`` (n, 3) in mm belong to the touches ``sequence`` (n,). ``rms_mm`` is the
+    root mean square of all their components, ``chi_square`` the sum of their normalised squares.
+    """
+
+    run: int
+    estimate: Array
+    covariance: Array
+    refused: tuple[tuple[tuple[str, ...], str], ...]
+    rms_mm: float
+    iterations: int
+    degrees_of_freedom: int
+    chi_square: float
+    sequence: npt.NDArray[np.int64]
+    residuals: Array
+
+
+@dataclass(frozen=True)
+class StoredIdentification:
+    """An identification of a campaign by a version of a model: ``parameters`` and display ``units``, k each."""
+
+    campaign: str
+    model: str
+    model_version: int
+    method: str
+    parameters: tuple[str, ...]
+    units: tuple[Unit, ...]
+    runs: tuple[StoredRun, ...]
+
+
+def identification_content(number: int, identification: StoredIdentification) -> str:
+    """The hash of all that is stored of an identification."""
+    return audit.digest(
+        number,
+        identification.campaign,
+        identification.model,
+        identification.model_version,
+        identification.method,
+        identification.parameters,
+        [[unit.name, unit.factor] for unit in identification.units],
+        [
+            [
+                run.run,
+                _bits(run.estimate),
+                _bits(run.covariance),
+                run.refused,
+                [float(run.rms_mm), int(run.iterations), int(run.degrees_of_freedom), float(run.chi_square)],
+                [int(sequence) for sequence in run.sequence],
+                _bits(run.residuals),
+            ]
+            for run in identification.runs
+        ],
+    )
+
+
+def _bits(values: Array) -> bytes:
+    return np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes()
+
+
+def check_identification(identification: StoredIdentification) -> None:
+    count = len(identification.parameters)
+    if len(identification.units) != count:
+        raise DataError(f"{count} parameters need {count} units, not {len(identification.units)}")
+    if not identification.runs:
+        raise DataError("an identification needs at least one run")
+    for run in identification.runs:
+        name = f"run {run.run} of {identification.campaign}"
+        if run.estimate.shape != (count,) or run.covariance.shape != (count, count):
+            raise DataError(
+                f"{name}: estimate and covariance must be ({count},) and ({count}, {count}), "
+                f"not {run.estimate.shape} and {run.covariance.shape}"
+            )
+        if run.residuals.shape != (len(run.sequence), 3):
+            raise DataError(
+                f"{name}: residuals must be ({len(run.sequence)}, 3), a row for every touch, "
+                f"not {run.residuals.shape}"
+            )
+        numbers = [run.rms_mm, run.chi_square, *run.residuals.ravel()]
+        if not np.all(np.isfinite(numbers)):
+            raise DataError(f"{name}: rms, chi-square and residuals must be finite")
+        if np.isinf(run.estimate).any() or np.isinf(run.covariance).any():
+            raise DataError(f"{name}: estimates and covariances must be finite, or NaN where refused")
+        held = {parameter for group, _ in run.refused for parameter in group}
+        for parameter, value in zip(identification.parameters, run.estimate, strict=True):
+            if np.isnan(value) and parameter not in held:
+                raise DataError(f"{name}: {parameter} has no number and no reason why it was refused")

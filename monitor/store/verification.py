@@ -1,0 +1,101 @@
+"""Is the database as it was written? Everything that is stored is hashed anew and held against the audit.
+
+Seen are: an altered, added or removed row of any result, campaign or file; an altered or missing audit entry,
+those at the end included as long as what they tell of is there. Not seen is a database put back as a whole to
+an earlier state: keep the last hash (``Verification.last_sha256``) elsewhere, for example on paper.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from monitor.exceptions import MonitorError
+from monitor.store import audit
+from monitor.store.analyses import analysis_content
+from monitor.store.campaigns import stored_content
+from monitor.store.certificates import certificate_faults
+from monitor.store.connection import Database
+from monitor.store.events import event_content
+from monitor.store.identifications import stored_identification_content
+from monitor.store.models import all_models, model_content, model_key
+from monitor.store.selections import selection_content
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What was found: the number of audit entries, the hash of the last, and every fault in words."""
+
+    entries: int
+    last_sha256: str
+    faults: tuple[str, ...]
+
+    @property
+    def ok(self) -> bool:
+        """True where nothing is wrong."""
+        return not self.faults
+
+
+def verify_audit(db: Database) -> Verification:
+    """Hash everything anew and hold it against the audit; takes as long as reading the whole database."""
+    faults = [*audit.chain_faults(db), *certificate_faults(db), *_file_faults(db), *_machine_faults(db)]
+    told = {
+        (subject, key): content
+        for subject, key, content in db.rows("SELECT subject, key, content_sha256 FROM audit ORDER BY entry")
+    }
+    found = dict(_contents(db))
+    for subject, key in sorted(told.keys() | found.keys()):
+        name = f"{subject} {key}"
+        if (subject, key) not in found:
+            faults.append(f"{name} is in the audit, but no longer in the database")
+        elif (subject, key) not in told:
+            faults.append(f"{name} is in the database, but not in the audit")
+        elif told[subject, key] != found[subject, key]:
+            faults.append(f"{name} was altered after it was stored")
+    last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
+    entries, last_sha256 = last[0] if last else (0, audit.NO_ENTRY_BEFORE)
+    return Verification(entries, last_sha256, tuple(faults))
+
+
+def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
+    for (name,) in db.rows("SELECT campaign FROM campaign ORDER BY campaign_id"):
+        try:
+            content = stored_content(db, name)
+        except (MonitorError, ValueError, KeyError, TypeError):
+            # What can no longer be read was altered, too; the empty hash agrees with nothing.
+            content = ""
+        yield ("campaign", name), content
+    for model in all_models(db):
+        yield ("model", model_key(model.name, model.version)), model_content(model)
+    for (number,) in db.rows("SELECT identification_id FROM identification ORDER BY ALL"):
+        try:
+            content = stored_identification_content(db, number)
+        except (MonitorError, ValueError, KeyError, TypeError):
+            content = ""
+        yield ("identification", str(number)), content
+    for (number,) in db.rows("SELECT analysis_id FROM analysis ORDER BY ALL"):
+        yield ("analysis", str(number)), analysis_content(db, number)
+    for (number,) in db.rows("SELECT event_id FROM event ORDER BY ALL"):
+        yield ("event", str(number)), event_content(db, number)
+    for (number,) in db.rows("SELECT selection_id FROM selection ORDER BY ALL"):
+        yield ("selection", str(number)), selection_content(db, number)
+    for number, entry, own in db.rows("SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"):
+        yield ("certificate", f"{number} entry {entry}"), own
+
+
+def _file_faults(db: Database) -> Iterator[str]:
+    for campaign, file, content, sha256 in db.rows(
+        "SELECT campaign, file, content, sha256 FROM source_file JOIN campaign USING (campaign_id) ORDER BY ALL"
+    ):
+        if hashlib.sha256(content).hexdigest() != sha256:
+            yield f"the file {file} of campaign {campaign} was altered after it was imported"
+
+
+def _machine_faults(db: Database) -> Iterator[str]:
+    for campaign, machine in db.rows(
+        "SELECT campaign, machine FROM campaign LEFT JOIN machine USING (machine) "
+        "WHERE topology IS DISTINCT FROM (machine_description ->> 'topology') "
+        "OR machine IS DISTINCT FROM (machine_description ->> 'id') ORDER BY ALL"
+    ):
+        yield f"machine {machine} was altered: it differs from its description in campaign {campaign}"

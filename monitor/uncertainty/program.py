@@ -1,0 +1,273 @@
+"""A chain and its model as a program of elementary turns and shifts, from which trials are computed fast.
+
+The vector from target to tip is the end of a walk from the last work axis through the bed to the tip. Every
+step turns about or shifts along one coordinate axis; its amount is a set angle, a reading, or an unknown times
+a number. Probings that share all set angles share the walk: a *class*. Only the readings, which are shifts,
+differ within a class, so each probing costs three multiplications an axis. Nothing is linearised.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.effects import Context, Effect
+from monitor.effects.effect import ChainBasis
+from monitor.machine import LOCATION, MOTION, Joint
+from monitor.records import Array
+from monitor.uncertainty.run_problem import RunProblem
+
+Ints = npt.NDArray[np.int64]
+
+#: Kinds of steps.
+TURN_SET, TURN_ERROR, SHIFT_SET, SHIFT_READING, SHIFT_ERROR = range(5)
+#: The kernel has room for so many linear axes (conventions: up to three).
+AXES = 3
+#: Error angles beyond this are left to the plain solver: the kernel's sine and cosine are series to the eighth
+#: power, whose next terms are below 1e-19 here.
+LARGEST_ANGLE = 1e-2
+#: Half the step, in mm, by which basis functions are differentiated along a linear axis.
+_STEP = 0.5e-3
+
+
+@dataclass(frozen=True)
+class Program:
+    """Steps k in walking order, entries e of error steps, classes c, probings i in order of their class.
+
+    ``kind``, ``axis`` (0 x, 1 y, 2 z), ``sign`` (K,) and ``first`` (K + 1,): a step's entries are
+    ``first[k]:first[k + 1]``; for a reading ``reading[k]`` is the place of its axis. ``amount`` (C, K) holds
+    set angles and shifts. ``item``, ``begin``, ``end``, ``moves`` are the walk in segments (``_segments``).
+    An entry adds ``value[c, e]`` times unknown ``unknown[e]``, times the reading of axis ``along[e]`` unless
+    that is -1. ``start`` (C + 1,), ``target``, ``row`` (n, 3) of inputs (-1 for an axis that is not there)
+    and ``weight`` (n, 3) describe the probings; ``between`` (D, 2), ``length_row``, ``length_weight`` (D,)
+    the distances. ``scale`` (3,) turns readings into displacements. Unknowns beyond ``unknowns`` are ``held``
+    values.
+    """
+
+    kind: Ints
+    axis: Ints
+    sign: Array
+    reading: Ints
+    first: Ints
+    amount: Array
+    unknown: Ints
+    along: Ints
+    value: Array
+    item: Ints
+    begin: Ints
+    end: Ints
+    moves: npt.NDArray[np.bool_]
+    start: Ints
+    target: Ints
+    row: Ints
+    weight: Array
+    scale: Array
+    between: Ints
+    length_row: Ints
+    length_weight: Array
+    targets_at: int
+    unknowns: int
+    held: Array
+
+
+@dataclass
+class _Step:
+    """One step under construction: (n,) amounts of a set step, entries of an error step."""
+
+    kind: int
+    axis: int
+    sign: float
+    amount: Array
+    reading: int = -1
+    entries: tuple[tuple[int, int, Array], ...] = ()
+
+
+def compile_program(run: RunProblem) -> Program | None:
+    """The program of a run's problem, or None where its model needs the plain way.
+
+    That is so for effects of the artefact and for chains with more than three linear axes.
+    """
+    bases = _entries(run)
+    if bases is None or len(run.linear) > AXES:
+        return None
+    steps = _walk(run, bases)
+    return _assemble(run, steps)
+
+
+def _entries(run: RunProblem) -> dict[tuple[int, int, int], list[tuple[int, int, Array]]] | None:
+    """For every error term its entries: unknown, axis (-1: none) and value at every probing (n,)."""
+    problem = run.problem
+    context = problem.context
+    found: dict[tuple[int, int, int], list[tuple[int, int, Array]]] = {}
+    number = 0
+    for effects, first in ((problem.base, 0), (problem.added, len(problem.local_names))):
+        number = first
+        for effect in effects:
+            basis = effect.basis(context)
+            if not isinstance(basis, ChainBasis):
+                return None
+            columns = basis.columns
+            slopes = [_slope(effect, context, int(a)) for a in run.linear]
+            entries = found.setdefault((basis.term.joint, basis.term.stage, basis.term.component), [])
+            for column in range(columns.shape[1]):
+                constant = columns[:, column].copy()
+                for place, (a, slope) in enumerate(zip(run.linear, slopes, strict=True)):
+                    if np.any(slope[:, column]):
+                        constant -= slope[:, column] * context.positions[:, a]
+                        entries.append((number, place, slope[:, column]))
+                constant[np.abs(constant) < 1e-9 * np.max(np.abs(columns[:, column]), initial=0.0)] = 0.0
+                if np.any(constant):
+                    entries.append((number, -1, constant))
+                number += 1
+    return found
+
+
+def _slope(effect: Effect, context: Context, axis: int) -> Array:
+    """Derivative (n, k) of the basis along a linear axis, with rounding taken off."""
+    ends = []
+    for side in (-_STEP, _STEP):
+        positions = context.positions.copy()
+        positions[:, axis] += side
+        # A new context: its cached travel directions must be those of the shifted positions.
+        basis = effect.basis(replace(context, positions=positions))
+        assert isinstance(basis, ChainBasis)
+        ends.append(basis.columns)
+    slope = np.asarray((ends[1] - ends[0]) / (2.0 * _STEP))
+    size = np.max(np.abs(slope), axis=0, initial=0.0)
+    rounding = 1e-9 * np.max(np.abs(ends[0]), axis=0, initial=0.0)
+    slope[:, size < rounding] = 0.0
+    # Slopes that are the same everywhere up to rounding are made so: their probings share a class.
+    mean = slope.mean(axis=0)
+    same = np.max(np.abs(slope - mean), axis=0, initial=0.0) < 1e-7 * np.maximum(size, 1e-300)
+    slope[:, same] = np.round(mean[same], 9)
+    return slope
+
+
+def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int, Array]]]) -> list[_Step]:
+    chain = run.problem.context.chain
+    count = run.probings
+    places = {int(a): i for i, a in enumerate(run.linear)}
+
+    def small(joint: int, stage: int, sign: float) -> list[_Step]:
+        order = [0, 1, 2, 5, 4, 3]  # shift, then R_C R_B R_A
+        steps = []
+        for component in order if sign > 0 else order[::-1]:
+            entries = tuple(bases.get((joint, stage, component), ()))
+            if entries:
+                kind = SHIFT_ERROR if component < 3 else TURN_ERROR
+                steps.append(_Step(kind, component % 3, sign, np.zeros(count), entries=entries))
+        return steps
+
+    def motion(place: int, joint: Joint, sign: float) -> list[_Step]:
+        axis = int(np.argmax(np.abs(joint.direction)))
+        if joint.turns:
+            return [_Step(TURN_SET, axis, sign, run.problem.context.positions[:, place])]
+        return [_Step(SHIFT_READING, axis, sign, np.zeros(count), reading=places[place])]
+
+    def offset(joint: Joint, sign: float) -> list[_Step]:
+        return [
+            _Step(SHIFT_SET, axis, sign, np.full(count, joint.offset[axis]))
+            for axis in range(3)
+            if joint.offset[axis]
+        ]
+
+    steps: list[_Step] = []
+    for place in range(len(chain.work) - 1, -1, -1):
+        joint = chain.joints[place]
+        steps += small(place, MOTION, -1.0) + motion(place, joint, -1.0)
+        steps += small(place, LOCATION, -1.0) + offset(joint, -1.0)
+    for place in range(len(chain.work), len(chain.joints)):
+        joint = chain.joints[place]
+        steps += offset(joint, 1.0) + small(place, LOCATION, 1.0)
+        steps += motion(place, joint, 1.0) + small(place, MOTION, 1.0)
+    tip = len(run.problem.local_names) - 3
+    ones = np.ones(count)
+    steps += [
+        _Step(SHIFT_ERROR, axis, 1.0, np.zeros(count), entries=((tip + axis, -1, ones),)) for axis in range(3)
+    ]
+    return steps
+
+
+def _assemble(run: RunProblem, steps: list[_Step]) -> Program:
+    count = run.probings
+    problem = run.problem
+    entries = [entry for step in steps for entry in step.entries]
+    amounts = np.array([step.amount for step in steps]).T
+    values = np.array([value for _, _, value in entries]).T.reshape(count, len(entries))
+    key = np.concatenate([amounts, values], axis=1)
+    # A turn whose angle follows a reading differs from probing to probing.
+    if any(step.kind == TURN_ERROR and along >= 0 for step in steps for _, along, _ in step.entries):
+        key = np.column_stack([key, np.arange(count)])
+    size = np.max(np.abs(key), axis=0, initial=0.0)
+    _, sample, inverse = np.unique(
+        np.round(key / np.where(size > 0.0, size, 1.0), 11), axis=0, return_index=True, return_inverse=True
+    )
+    order = np.argsort(inverse.ravel(), kind="stable")
+    targets = np.searchsorted(np.array(problem.targets), problem.context.target)
+    rows = np.full((count, AXES), -1, dtype=np.int64)
+    rows[:, : len(run.linear)] = np.arange(count * len(run.linear)).reshape(count, -1)
+    scale = np.zeros(AXES)
+    scale[: len(run.linear)] = run.signs
+    first = np.concatenate([[0], np.cumsum([len(step.entries) for step in steps])])
+    item, begin, end, moves = _segments(steps, amounts, values, first)
+    return Program(
+        kind=np.array([step.kind for step in steps]),
+        axis=np.array([step.axis for step in steps]),
+        sign=np.array([step.sign for step in steps]),
+        reading=np.array([step.reading for step in steps]),
+        first=first.astype(np.int64),
+        amount=np.ascontiguousarray(amounts[sample]),
+        unknown=np.array([number for number, _, _ in entries], dtype=np.int64),
+        along=np.array([along for _, along, _ in entries], dtype=np.int64),
+        value=np.ascontiguousarray(values[sample]),
+        item=item,
+        begin=begin,
+        end=end,
+        moves=moves,
+        start=np.concatenate([[0], np.cumsum(np.bincount(inverse.ravel()))]).astype(np.int64),
+        target=targets[order].astype(np.int64),
+        row=np.ascontiguousarray(rows[order]),
+        weight=np.ascontiguousarray(problem.sigma[order] ** -2.0),
+        scale=scale,
+        between=np.array(
+            [[problem.targets.index(name) for name in d.between] for d in problem.distances], dtype=np.int64
+        ).reshape(-1, 2),
+        length_row=count * len(run.linear) + np.arange(len(problem.distances)),
+        length_weight=np.array([d.standard_uncertainty**-2.0 for d in problem.distances]),
+        targets_at=len(problem.base_names),
+        unknowns=run.unknowns,
+        held=np.asarray(run.common, dtype=np.float64),
+    )
+
+
+def _segments(
+    steps: list[_Step], amounts: Array, values: Array, first: Ints
+) -> tuple[Ints, Ints, Ints, npt.NDArray[np.bool_]]:
+    """The walk as items: segments of steps that are the same for all probings, and single steps between.
+
+    ``item`` is a segment's number or -1, ``begin`` and ``end`` its steps, ``moves`` (items, 3) whether a reading
+    acts in it.
+    """
+    items: list[tuple[int, int, int]] = []
+    segments = 0
+    for k, step in enumerate(steps):
+        follows = step.kind == TURN_ERROR and any(along >= 0 for _, along, _ in step.entries)
+        mine = values[:, first[k] : first[k + 1]]
+        same = not follows and np.ptp(amounts[:, k]) == 0.0 and bool(np.all(np.ptp(mine, axis=0) == 0.0))
+        if same and items and items[-1][0] >= 0:
+            items[-1] = (items[-1][0], items[-1][1], k + 1)
+        elif same:
+            items.append((segments, k, k + 1))
+            segments += 1
+        else:
+            items.append((-1, k, k + 1))
+    moves = np.zeros((len(items), AXES), dtype=np.bool_)
+    for place, (_, begin, end) in enumerate(items):
+        for step in steps[begin:end]:
+            acting = {along for _, along, _ in step.entries if along >= 0}
+            for axis in acting | ({step.reading} if step.reading >= 0 else set()):
+                moves[place, axis] = True
+    item, begin_of, end_of = (np.array(column, dtype=np.int64) for column in zip(*items, strict=True))
+    return item, begin_of, end_of, moves

@@ -1,0 +1,66 @@
+"""Units: mm, rad, s and °C inside; what people see is converted here, at the edge.
+
+A ``Unit`` is a name as printed and the factor that turns a number in it into the internal unit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as printed; ``internal = displayed * factor``."""
+
+    name: str
+    factor: float
+
+    def to_internal(self, displayed: float) -> float:
+        """The internal value of a displayed number."""
+        return displayed * self.factor
+
+    def to_display(self, internal: float) -> float:
+        """The displayed number of an internal value."""
+        return internal / self.factor
+
+    def per(self, other: Unit) -> Unit:
+        """The quotient of two units, for example µm per K."""
+        return Unit(f"{self.name}/{other.name}", self.factor / other.factor)
+
+
+ONE = Unit("1", 1.0)
+MILLIMETRE = Unit("mm", 1.0)
+MICROMETRE = Unit("µm", 1e-3)
+METRE = Unit("m", 1e3)
+RADIAN = Unit("rad", 1.0)
+MICRORADIAN = Unit("µrad", 1e-6)
+DEGREE = Unit("°", math.pi / 180.0)
+SECOND = Unit("s", 1.0)
+MINUTE = Unit("min", 60.0)
+HOUR = Unit("h", 3600.0)
+DEGREE_CELSIUS = Unit("°C", 1.0)
+KELVIN = Unit("K", 1.0)
+PERCENT = Unit("%", 1.0)
+HECTOPASCAL = Unit("hPa", 1.0)
+
+#: The suffix of a column of a campaign file, and the unit it names.
+COLUMN_UNITS = {
+    "um": MICROMETRE,
+    "mm": MILLIMETRE,
+    "deg": DEGREE,
+    "s": SECOND,
+    "min": MINUTE,
+    "degC": DEGREE_CELSIUS,
+    "percent": PERCENT,
+    "hPa": HECTOPASCAL,
+}
+
+#: The units a condition or a channel may be recorded in (campaign format 1); kept as recorded.
+CONDITION_SUFFIXES = ("degC", "percent", "hPa", "min")
+
+
+def column_unit(column: str) -> Unit | None:
+    """The unit that a column's name ends in, or None: ``column_unit("x_mm")`` is the millimetre."""
+    stem, _, suffix = column.rpartition("_")
+    return COLUMN_UNITS.get(suffix) if stem else None

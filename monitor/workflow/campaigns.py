@@ -1,0 +1,91 @@
+"""Campaign folders into the database, and what is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from monitor.exceptions import InputError, NotFoundError
+from monitor.readers import read_campaign
+from monitor.records import Campaign
+from monitor.store import Database, import_campaign, list_campaigns, list_runs, load_campaign
+
+Document = dict[str, Any]
+
+
+def import_folders(
+    db: Database, folders: Sequence[Path], progress: Callable[[str], None] = lambda name: None
+) -> Document:
+    """Import every folder, all or nothing each; the first refusal stops, what was imported before stays.
+
+    Raises CampaignError with all faults of the folder that is refused.
+    """
+    done: list[Document] = []
+    for folder in folders:
+        progress(str(folder))
+        try:
+            imported = import_campaign(db, read_campaign(Path(folder)))
+        except InputError as error:
+            if not done:
+                raise
+            before = ", ".join(one["campaign"] for one in done)
+            raise InputError(f"{error}\nIn the database before it was met: {before}") from error
+        done.append(
+            {
+                "campaign": imported.campaign,
+                "folder": str(folder),
+                "state": imported.state,
+                "runs": imported.runs,
+                "probings": imported.probings,
+                "message": str(imported),
+            }
+        )
+    return {"imported": done}
+
+
+def campaigns(db: Database) -> Document:
+    """The campaigns in the database."""
+    return {"campaigns": records(list_campaigns(db))}
+
+
+def runs(db: Database, campaign: str) -> Document:
+    """The runs of a campaign with their conditions."""
+    return {"campaign": campaign, "runs": records(list_runs(db, campaign))}
+
+
+def records(frame: Any) -> list[Document]:
+    """The rows of a table as JSON knows them; moments in ISO 8601, with Z where they are in UTC."""
+    return [
+        {str(key): _plain(value, str(key)) for key, value in row.items()} for row in frame.to_dict("records")
+    ]
+
+
+def _plain(value: Any, name: str = "") -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, datetime):
+        # The store keeps UTC without its zone; local times are named so.
+        zone = "Z" if value.tzinfo is None and not name.endswith("_local") else ""
+        return None if str(value) == "NaT" else value.isoformat() + zone
+    if hasattr(value, "isoformat"):
+        return None if str(value) == "NaT" else value.isoformat()
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return None if value != value else value
+
+
+def chosen(db: Database, campaign: str | None) -> list[str]:
+    """The campaign named, or all. Raises NotFoundError where there is none."""
+    if campaign is not None:
+        return [campaign]
+    found = [str(name) for name in list_campaigns(db)["campaign"]]
+    if not found:
+        raise NotFoundError("the database has no campaign yet; type `monitor import FOLDER`")
+    return found
+
+
+def load(db: Database, campaign: str) -> Campaign:
+    """A campaign by its name."""
+    return load_campaign(db, campaign)

@@ -1,0 +1,174 @@
+"""All machines at once: what needs attention, ranked. The rows stay in the database; only sums come out of it."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+from monitor.records import Array
+from monitor.statistics import control_false_discoveries
+from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
+from monitor.store import Database, FleetSums, fleet_sums
+from monitor.workflow.models import resolve
+from monitor.workflow.trend_parameter import DAYS_PER_YEAR, SHORTEST_DAYS
+
+Document = dict[str, Any]
+
+#: A drift that reaches the limit within so many years is worth a word now.
+SOON_YEARS = 1.0
+#: False discovery rate over all machines and parameters.
+RATE = 0.05
+#: Days of one machine usually differ: they are worth a word where they scatter so much more than runs.
+DAYS_OVER_RUNS = 3.0
+#: Fewer days than this make a difference, not a drift.
+FEWEST_DAYS = 5
+#: The latest day stands out where it lies so many standard deviations of the days from their mean.
+STANDS_OUT = 3.0
+
+
+def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
+    """Bartlett, ANOVA and drift (a day) of every machine and parameter from its sums."""
+    cells = cells_from_sums(
+        GroupSums(
+            sums.groups, sums.runs, sums.offset, sums.squares, sums.within, sums.repeated, sums.least_variance,
+            sums.log_variances, sums.inverse_dof,
+        )
+    )  # fmt: skip
+    return cells, drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
+
+
+def _limits(db: Database, sums: FleetSums) -> Array:
+    """Limit of the absolute value of each cell by the machine's latest campaign; NaN where none is stated."""
+    stated = {
+        (machine, parameter): float(limit)
+        for machine, parameter, limit in db.rows(
+            "SELECT t.machine, t.parameter, t.tolerance FROM v_tolerances AS t JOIN v_machines AS m "
+            "ON m.machine = t.machine AND m.latest_campaign = t.campaign"
+        )
+    }
+    keys = zip(sums.machine.tolist(), sums.parameter.tolist(), strict=True)
+    return np.array([stated.get(key, np.nan) for key in keys])
+
+
+def _rank(
+    sums: FleetSums, cells: CellTests, drift: CellDrift, drift_q: Array, limit: Array
+) -> tuple[Array, Array, Array]:
+    """Class of each cell (0 is the most urgent), its measure within the class (larger first), years to the limit."""
+    latest = sums.origin + sums.latest
+    share = np.abs(latest) / limit
+    per_year = drift.slope * DAYS_PER_YEAR
+    with np.errstate(divide="ignore", invalid="ignore"):
+        years = (np.where(per_year >= 0.0, limit, -limit) - latest) / per_year
+        # Against the other days: the latest one is taken out of their mean.
+        k = sums.groups
+        others = (sums.sum_m - sums.latest) / (k - 1.0)
+        squares = sums.sum_mm - sums.latest**2 - (k - 1.0) * others**2
+        sd = np.sqrt(np.maximum(squares, 0.0) / (k - 2.0) * (1.0 + 1.0 / (k - 1.0)))
+        z = np.abs(sums.latest - others) / np.where(k >= 6.0, sd, np.nan)
+        ratio = cells.between / cells.sd_pooled
+    drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
+    kind = np.full(len(share), 5)
+    measure = np.nan_to_num(ratio, nan=0.0, posinf=0.0)
+    for number, holds, size in (
+        (4, ratio > DAYS_OVER_RUNS, ratio),
+        (3, drifting, np.abs(drift.slope / drift.u)),
+        (2, z > STANDS_OUT, z),
+        (1, drifting & (years >= 0.0) & (years < SOON_YEARS), -years),
+        (0, share >= 1.0, share),
+    ):
+        chosen = np.asarray(holds, dtype=np.bool_)
+        kind[chosen], measure[chosen] = number, np.nan_to_num(size)[chosen]
+    return kind, measure, years
+
+
+WORDS = (
+    "out of tolerance",
+    "drifts out of tolerance within a year",
+    "the latest day stands out",
+    "drifts",
+    "days differ much more than runs",
+    "as usual",
+)
+
+
+def _date(days: float) -> str | None:
+    return (
+        None
+        if not np.isfinite(days)
+        else (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(days=days)).isoformat()
+    )
+
+
+def _without_short_histories(sums: FleetSums, drift: CellDrift) -> CellDrift:
+    """No slope a year from less than ``SHORTEST_DAYS``: evenly spread days have a standard deviation of their span
+    over the root of 12."""
+    mean = sums.sum_t / sums.groups
+    spread = np.sqrt(np.maximum(sums.sum_tt / sums.groups - mean**2, 0.0))
+    short = spread < SHORTEST_DAYS / np.sqrt(12.0)
+    return CellDrift(*(np.where(short, np.nan, values) for values in (drift.slope, drift.u, drift.p_value)))
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def fleet(db: Database, model: str | None = None, top: int | None = 20) -> Document:
+    """Every machine and parameter of one model (the method's own by default), the most urgent first.
+
+    ``top`` rows are listed (None: all). Raises NotFoundError where nothing was identified.
+    """
+    name, version = None, None
+    if model is not None:
+        stored = resolve(db, model)
+        name, version = stored.name, stored.version
+    sums = fleet_sums(db, name, version)
+    cells, drift = cell_tests(sums)
+    drift = _without_short_histories(sums, drift)
+    limit = _limits(db, sums)
+    q = {
+        "anova": control_false_discoveries(cells.anova_p, rate=RATE).q_value,
+        "bartlett": control_false_discoveries(cells.bartlett_p, rate=RATE).q_value,
+        "drift": control_false_discoveries(drift.p_value, rate=RATE).q_value,
+    }
+    kind, measure, years = _rank(sums, cells, drift, q["drift"], limit)
+    order = np.lexsort((sums.parameter, sums.machine, -measure, kind))
+    rows = [
+        {
+            "rank": rank,
+            "machine": str(sums.machine[i]),
+            "parameter": str(sums.parameter[i]),
+            "attention": WORDS[int(kind[i])],
+            "unit": str(sums.unit[i]),
+            "n": int(sums.runs[i]),
+            "days": int(sums.groups[i]),
+            "mean": float(sums.origin[i] + cells.mean[i]),
+            "sd_all": _number(cells.sd_all[i]),
+            "sd_pooled": _number(cells.sd_pooled[i]),
+            "between_days": _number(cells.between[i]),
+            "bartlett": _number(cells.bartlett[i]),
+            "bartlett_p": _number(cells.bartlett_p[i]),
+            "bartlett_q": _number(q["bartlett"][i]),
+            "anova_f": _number(cells.anova_f[i]),
+            "anova_p": _number(cells.anova_p[i]),
+            "anova_q": _number(q["anova"][i]),
+            "slope_per_year": _number(drift.slope[i] * DAYS_PER_YEAR),
+            "u_slope": _number(drift.u[i] * DAYS_PER_YEAR),
+            "drift_p": _number(drift.p_value[i]),
+            "drift_q": _number(q["drift"][i]),
+            "latest": _number(sums.origin[i] + sums.latest[i]),
+            "latest_at": _date(float(sums.last_d[i])),
+            "limit": _number(limit[i]),
+            "years_to_limit": _number(years[i]) if kind[i] == 1 else None,
+        }
+        for rank, i in enumerate(order[:top], start=1)
+    ]
+    return {
+        "machines": len(np.unique(sums.machine)),
+        "rows": len(sums.machine),
+        "values": int(sums.runs.sum()),
+        "false_discovery_rate": RATE,
+        "attention": {words: int((kind == number).sum()) for number, words in enumerate(WORDS)},
+        "table": rows,
+    }

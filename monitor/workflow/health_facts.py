@@ -1,0 +1,202 @@
+"""What stands on a machine's page of the health report, put together from stored documents and found changes."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+from monitor.reporting.health import (
+    Change,
+    ConditionRange,
+    DataQuality,
+    Drift,
+    History,
+    MissingEffect,
+    ModelHealth,
+    ParameterHealth,
+)
+from monitor.reporting.health_words import in_words
+from monitor.reporting.symbols import describe
+from monitor.statistics import Change as Found
+from monitor.store import Database
+from monitor.units import COLUMN_UNITS
+from monitor.workflow.health_history import DriftFound, Event, PastRun, Series, moment, plain
+from monitor.workflow.trend_parameter import SHORTEST_DAYS
+from monitor.workflow.weeks import Week
+
+Document = dict[str, Any]
+
+
+def parameter_of(
+    one: Series,
+    evaluated: Document,
+    tolerance: float | None,
+    probability_out: float | None,
+    changes: list[Found],
+    drift: DriftFound | None,
+    origin: datetime,
+    week: Week,
+) -> ParameterHealth:
+    guf = evaluated["guf"]
+    beyond = None
+    if tolerance is not None and abs(one.values[-1]) > tolerance:
+        inside = np.flatnonzero(np.abs(one.values) <= tolerance)
+        beyond = one.times[int(inside[-1]) + 1 if inside.size else 0]
+    return ParameterHealth(
+        name=one.name,
+        description=describe(one.name),
+        unit=evaluated["units"][one.name],
+        estimate=float(guf["estimate"][one.name]),
+        u=float(guf["u"][one.name]),
+        expanded=float(guf["expanded"][one.name]),
+        tolerance=tolerance,
+        probability_out=probability_out,
+        out_since=beyond,
+        history=History(
+            one.times,
+            tuple(one.values.tolist()),
+            tuple(one.u.tolist()),
+            tuple(week.holds(at) for at in one.times),
+        ),
+        changed_at=tuple(origin + timedelta(days=change.at) for change in changes),
+        # Scatter of a few days, stated a year, would only mislead.
+        drift=None if drift is None or drift.horizon < SHORTEST_DAYS else _drift(drift, origin),
+    )
+
+
+def _drift(found: DriftFound, origin: datetime) -> Drift:
+    def day(days: float | None) -> Any:
+        at = None if days is None else moment(origin, days)
+        return None if at is None else at.date()
+
+    return Drift(
+        found.slope,
+        found.u_slope,
+        found.p_value,
+        day(found.crosses),
+        (day(found.crosses_between[0]), day(found.crosses_between[1])),
+    )
+
+
+def changes_noted(
+    found: dict[str, list[Found]],
+    series: dict[str, Series],
+    events: list[Event],
+    explained: Document | None,
+    runs: list[PastRun],
+    campaign: str,
+    origin: datetime,
+    week: Week,
+) -> list[Change]:
+    """Everything that changed, the latest first."""
+    noted = [
+        Change(
+            "change",
+            origin + timedelta(days=one.interval[0]),
+            origin + timedelta(days=one.at),
+            _change_words(one, series[name].unit),
+            one.p_value,
+            week.holds(origin + timedelta(days=one.at)),
+        )
+        for name, every in found.items()
+        for one in every
+    ]
+    at = {run.run: run.at for run in runs if run.campaign == campaign}
+    for move in (explained or {}).get("changes", []):
+        if "target" in move and move["run"] in at:
+            words = f"ball {move['target']} moved by {move['size']:.1f} {move['unit']} (run {move['run']})"
+            moved = at[move["run"]]
+            noted.append(Change("change", None, moved, words, move["p_value"], week.holds(moved)))
+    noted += [event_noted(event, week) for event in events]
+    return sorted(noted, key=lambda one: one.at, reverse=True)
+
+
+def event_noted(one: Event, week: Week) -> Change:
+    return Change("event", None, one.at, f"{one.kind}: {one.what}", None, week.holds(one.at))
+
+
+def _change_words(one: Found, unit: str) -> str:
+    size, u = in_words(one.size, one.u, sign=True)
+    if one.kind == "step":
+        return f"{one.parameter} stepped by {size} {unit} (u = {u} {unit})"
+    if one.kind == "slope":
+        return f"{one.parameter} began to drift by {size} {unit} a day (u = {u} {unit} a day)"
+    return f"{one.parameter}: {one.kind} of {size} {unit} (u = {u} {unit})"
+
+
+def conditions_of(here: list[PastRun]) -> tuple[ConditionRange, ...]:
+    names = sorted({name for run in here for name in run.conditions})
+    found = []
+    for name in names:
+        stem, _, suffix = name.rpartition("_")
+        unit = COLUMN_UNITS.get(suffix) if stem else None
+        values = [run.conditions[name] for run in here if name in run.conditions]
+        words = (stem if unit else name).replace("_", " ")
+        found.append(
+            ConditionRange(words, unit.name if unit else "", min(values), float(np.mean(values)), max(values))
+        )
+    return tuple(found)
+
+
+def model_of(explained: Document | None, span: tuple[int, datetime, datetime] | None) -> ModelHealth | None:
+    """The comparison, which is of all runs of the campaign: their number and days (``span``) are said with it."""
+    if explained is None or span is None:
+        return None
+    count, first, last = span
+    runs = "the one run" if count == 1 else f"all {count} runs"
+    days = f"{first:%Y-%m-%d}" if first.date() == last.date() else f"{first:%Y-%m-%d} to {last:%Y-%m-%d}"
+    return ModelHealth(
+        campaign=explained["campaign"],
+        runs=f"{runs} of campaign {explained['campaign']}, {days}",
+        model=explained["model"],
+        verdict=explained["verdict"],
+        answer=explained["answer"],
+        rms_um=explained["rms_um"],
+        repeatability_um=plain(explained["repeatability_um"]),
+        lack_of_fit_f=plain(explained["lack_of_fit"]["f"]),
+        lack_of_fit_p=plain(explained["lack_of_fit"]["p"]),
+        missing=tuple(
+            MissingEffect(
+                one["effect"],
+                one["meaning"],
+                one["cause"],
+                one["remedy"],
+                plain(one["peak_um"]),
+                plain(one["rms_before_um"]),
+                plain(one["rms_after_um"]),
+                tuple(one["indistinguishable_from"]),
+            )
+            for one in explained["missing"]
+        ),
+    )
+
+
+def quality_of(
+    db: Database,
+    here: list[PastRun],
+    explained: Document | None,
+    evaluated: Document | None,
+    remarks: list[str],
+) -> DataQuality:
+    runs = {run.run for run in here}
+    probings = sum(
+        db.rows("SELECT count(*) FROM v_probings WHERE campaign = ? AND run = ?", [run.campaign, run.run])[0][
+            0
+        ]
+        for run in here
+    )
+    suspect = tuple(
+        f"run {one['run']}, touch {one['sequence']}, ball {one['target']}: "
+        f"{one['axis']} is off by {one['size_um']:.1f} µm"
+        for one in (explained or {}).get("suspect_data", [])
+        if one["run"] in runs
+    )
+    refused = tuple(
+        (", ".join(one["parameters"]), one["why"]) for one in (evaluated or {}).get("refused", [])
+    )
+    blind = tuple((explained or {}).get("blind_spots", []))
+    return DataQuality(
+        len(here), probings, sum(run.warm_up for run in here), suspect, refused, blind, tuple(remarks)
+    )

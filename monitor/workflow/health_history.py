@@ -1,0 +1,249 @@
+"""The past of a machine as a health report needs it: runs up to the week's end, parameters over time, what changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.records import Array
+from monitor.statistics import Change as Found
+from monitor.statistics import find_changes, forecast, trend
+from monitor.store import Database, StoredModel
+from monitor.workflow.weeks import Week
+
+DAY = 86400.0
+#: Probability of any change where there is none, over all parameters and the whole history of a machine.
+FALSE_ALARM = 0.01
+#: Fewer runs than this between two events are not searched (``find_changes``).
+FEWEST_RUNS = 6
+#: Seed of the simulated null distributions of the search, so that a report can be made again.
+SEED = 20260310
+DAYS_A_YEAR = 365.25
+
+
+@dataclass(frozen=True)
+class PastRun:
+    """A run with its local start and its conditions."""
+
+    campaign: str
+    run: int
+    at: datetime
+    warm_up: bool
+    conditions: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Event:
+    """What people recorded."""
+
+    at: datetime
+    kind: str
+    what: str
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """A parameter over the runs: times, days since the first run (n,), values and standard uncertainties (n,)."""
+
+    name: str
+    unit: str
+    times: tuple[datetime, ...]
+    t: Array
+    values: Array
+    u: Array
+    warm_up: Array
+
+
+@dataclass(frozen=True)
+class DriftFound:
+    """A drift since the last change, and how long a run stays in tolerance with 95 % (days from ``now``)."""
+
+    slope: float
+    u_slope: float
+    p_value: float
+    crosses: float | None
+    crosses_between: tuple[float, float]
+    good_for: float | None
+    horizon: float
+
+
+def past_runs(
+    db: Database, machine: str, week: Week, campaigns: tuple[str, ...]
+) -> tuple[list[PastRun], list[str]]:
+    """Runs of a machine up to the end of the week, in the order of time, and remarks on campaigns left out.
+
+    One machine cannot make two campaigns at a time: where runs of one lie within the span of another, only the
+    campaign imported first counts, unless ``campaigns`` names others. Raises NotFoundError for such a name.
+    """
+    spans = db.rows(
+        "SELECT campaign, min(started_at), max(started_at), any_value(campaign_id) AS number "
+        "FROM v_runs JOIN v_campaigns USING (campaign, machine) WHERE machine = ? GROUP BY campaign ORDER BY number",
+        [machine],
+    )
+    known = {campaign: (first, last) for campaign, first, last, _ in spans}
+    chosen = [name for name in campaigns if name in known] if campaigns else list(known)
+    kept: list[str] = []
+    remarks = []
+    for name in chosen:
+        first, last = known[name]
+        other = next((one for one in kept if known[one][0] <= last and first <= known[one][1]), None)
+        if other is None:
+            kept.append(name)
+        else:
+            remarks.append(
+                f"campaign {name} was left out: its runs lie within the time of {other}, which was imported first"
+            )
+    rows = db.rows(
+        "SELECT campaign, run, started_at_local, warm_up, map_keys(conditions), map_values(conditions) FROM v_runs "
+        "WHERE machine = ? AND started_at_local < ? ORDER BY started_at, campaign, run",
+        [machine, week.ends],
+    )
+    runs = [
+        PastRun(
+            campaign, run, at, warm_up, {k: v for k, v in zip(names, values, strict=True) if v is not None}
+        )
+        for campaign, run, at, warm_up, names, values in rows
+        if campaign in kept
+    ]
+    return runs, remarks
+
+
+def check_campaigns(db: Database, campaigns: tuple[str, ...]) -> None:
+    """Raise NotFoundError for a campaign that is not there."""
+    known = [str(name) for (name,) in db.rows("SELECT campaign FROM campaign ORDER BY campaign")]
+    for name in campaigns:
+        if name not in known:
+            raise NotFoundError(f"there is no campaign '{name}'; there are {', '.join(known[:20])}")
+
+
+def makers(db: Database, campaigns: tuple[str, ...]) -> set[str] | None:
+    """The machines that the chosen campaigns are of; None where none is chosen: all machines count then."""
+    if not campaigns:
+        return None
+    rows = db.rows("SELECT campaign, machine FROM v_campaigns")
+    return {str(machine) for campaign, machine in rows if campaign in campaigns}
+
+
+def first_run(db: Database, machine: str, campaigns: tuple[str, ...]) -> tuple[datetime, str] | None:
+    """Local start and campaign of the first run of a machine in the chosen campaigns (empty: all), of any week."""
+    rows = db.rows(
+        "SELECT started_at_local, campaign FROM v_runs WHERE machine = ? ORDER BY started_at, campaign",
+        [machine],
+    )
+    return next(((at, name) for at, name in rows if not campaigns or name in campaigns), None)
+
+
+def campaign_span(db: Database, campaign: str) -> tuple[int, datetime, datetime]:
+    """Number of runs of a campaign and the local starts of its first and last."""
+    ((count, first, last),) = db.rows(
+        "SELECT count(*), min(started_at_local), max(started_at_local) FROM v_runs WHERE campaign = ?",
+        [campaign],
+    )
+    return int(count), first, last
+
+
+def past_events(db: Database, machine: str, week: Week) -> list[Event]:
+    """Events of a machine up to the end of the week."""
+    rows = db.rows(
+        "SELECT happened_at_local, kind, description FROM v_events WHERE machine = ? AND happened_at_local < ? "
+        "ORDER BY happened_at",
+        [machine, week.ends],
+    )
+    return [Event(at, kind, what) for at, kind, what in rows]
+
+
+def series_of(db: Database, machine: str, model: StoredModel, runs: list[PastRun]) -> dict[str, Series]:
+    """Every parameter that the runs have a number of, under one version of a model."""
+    at = {(one.campaign, one.run): one for one in runs}
+    rows = db.rows(
+        "SELECT campaign, run, parameter, value, u, unit FROM v_parameters "
+        "WHERE machine = ? AND model = ? AND model_version = ? AND value IS NOT NULL "
+        "ORDER BY started_at, campaign, run",
+        [machine, model.name, model.version],
+    )
+    found: dict[str, list[tuple[PastRun, float, float, str]]] = {}
+    for campaign, run, parameter, value, u, unit in rows:
+        if (campaign, run) in at and np.isfinite(value):
+            found.setdefault(parameter, []).append((at[campaign, run], value, u, unit))
+    origin = runs[0].at if runs else None
+    return {
+        name: Series(
+            name,
+            points[-1][3],
+            tuple(one.at for one, *_ in points),
+            np.array([(one.at - origin).total_seconds() / DAY for one, *_ in points]),
+            np.array([value for _, value, _, _ in points]),
+            np.array([u for _, _, u, _ in points]),
+            np.array([one.warm_up for one, *_ in points], dtype=np.float64),
+        )
+        for name, points in found.items()
+        if origin is not None
+    }
+
+
+def changes_of(series: dict[str, Series], events: list[Event], origin: datetime) -> dict[str, list[Found]]:
+    """Changes of every parameter, runs that were warming up left out; the false-alarm probability is shared.
+
+    Parameters that were found in the same runs are searched together. The index of a change is not that of
+    the series but its ``at`` and ``interval`` are times in days since ``origin``.
+    """
+    groups: dict[bytes, list[Series]] = {}
+    for one in series.values():
+        steady = one.warm_up == 0
+        if steady.sum() >= FEWEST_RUNS:
+            groups.setdefault(one.t[steady].tobytes(), []).append(one)
+    share = FALSE_ALARM / max(len(groups), 1)
+    split = sorted((event.at - origin).total_seconds() / DAY for event in events)
+    found: dict[str, list[Found]] = {}
+    rng = np.random.default_rng(SEED)
+    for group in groups.values():
+        steady = group[0].warm_up == 0
+        times = group[0].t[steady]
+        pieces = len({0, *np.searchsorted(times, split).tolist()})
+        trials = max(1999, int(2 * len(group) * pieces / share))
+        history = find_changes(
+            {one.name: one.values[steady] for one in group}, times,
+            rng=rng, events=split, false_alarm=share, trials=trials,
+        )  # fmt: skip
+        for change in history.changes:
+            found.setdefault(change.parameter, []).append(change)
+    return found
+
+
+def drift_of(one: Series, since: float, now: float, tolerance: float | None) -> DriftFound | None:
+    """The drift of a parameter since its last change (days since the first run); None with fewer than three days.
+
+    Nothing is said of times further ahead than the history is long.
+    """
+    kept = (one.warm_up == 0) & (one.t >= since)
+    days = np.array([at.toordinal() for at in one.times])[kept]
+    if len(set(days.tolist())) < 3:
+        return None
+    try:
+        line = trend(one.values[kept], one.t[kept], u=one.u[kept], days=days)
+        span = float(np.ptp(one.t[kept]))
+        if tolerance is None:
+            return DriftFound(
+                line.slope * DAYS_A_YEAR, line.u_slope * DAYS_A_YEAR, line.p_value, None, (np.inf, np.inf), None, span
+            )  # fmt: skip
+        ahead = forecast(line, (-tolerance, tolerance), now, [], horizon=now + span)
+    except (DataError, InputError):
+        return None
+    return DriftFound(
+        line.slope * DAYS_A_YEAR, line.u_slope * DAYS_A_YEAR, line.p_value,
+        ahead.crossing.at, ahead.crossing.interval, float(min(ahead.recommended_interval, span)), span,
+    )  # fmt: skip
+
+
+def moment(origin: datetime, days: float) -> datetime | None:
+    """A time given in days since the first run; None where it is infinite."""
+    return origin + timedelta(days=days) if np.isfinite(days) else None
+
+
+def plain(value: Any) -> float | None:
+    """A number, None where there is none."""
+    return None if value is None or not np.isfinite(value) else float(value)

@@ -1,0 +1,181 @@
+"""Sends a report by e-mail through an SMTP server that a configuration file names.
+
+``examples/mail.toml`` shows every key. The password stands in a file of its own, never in the configuration, and
+is sent over an encrypted connection only.
+"""
+
+from __future__ import annotations
+
+import smtplib
+import ssl
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from email.message import EmailMessage
+from email.utils import formatdate, make_msgid
+from pathlib import Path
+from typing import Any
+
+from monitor.exceptions import InputError
+
+#: Port that goes with each kind of security (RFC 8314 section 3.3; RFC 6409; RFC 5321 section 4.5.4.2).
+PORTS = {"tls": 465, "starttls": 587, "none": 25}
+#: Servers refuse more; a larger file is named in the text instead of attached. Base64 adds a third to it.
+LARGEST_BYTES = 15_000_000
+TIMEOUT_S = 30.0
+_KEYS = {
+    "server": str,
+    "port": int,
+    "security": str,
+    "user": str,
+    "password_file": str,
+    "ca_file": str,
+    "from": str,
+    "to": list,
+    "only_on_alarm": bool,
+}
+_LOOPBACK = ("localhost", "127.0.0.1", "::1")
+
+
+@dataclass(frozen=True)
+class MailSettings:
+    """Where and how to send; ``security`` is tls, starttls or none."""
+
+    server: str
+    port: int
+    security: str
+    user: str | None
+    password_file: Path | None
+    ca_file: Path | None
+    sender: str
+    recipients: tuple[str, ...]
+    only_on_alarm: bool
+
+
+def read_mail_settings(path: Path) -> MailSettings:
+    """The section ``[mail]`` of a TOML file. Raises InputError naming every key that is wrong or missing."""
+    try:
+        tables = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path} is not TOML in UTF-8: {error}") from error
+    found = tables.get("mail")
+    if not isinstance(found, dict):
+        raise InputError(f"{path} has no section [mail]")
+    faults = _faults(found)
+    if faults:
+        raise InputError("\n  ".join([f"{path} was refused:", *faults]))
+    security = found.get("security", "starttls")
+
+    def beside(key: str) -> Path | None:
+        return path.parent / found[key] if key in found else None
+
+    return MailSettings(
+        server=found["server"],
+        port=found.get("port", PORTS[security]),
+        security=security,
+        user=found.get("user"),
+        password_file=beside("password_file"),
+        ca_file=beside("ca_file"),
+        sender=found["from"],
+        recipients=tuple(found["to"]),
+        only_on_alarm=found.get("only_on_alarm", False),
+    )
+
+
+def _faults(found: dict[str, Any]) -> list[str]:
+    faults = [f"[mail] has no key {key}; it has {', '.join(_KEYS)}" for key in found if key not in _KEYS]
+    faults += [f"[mail] lacks {key}" for key in ("server", "from", "to") if key not in found]
+    for key, kind in _KEYS.items():
+        if key in found and (not isinstance(found[key], kind) or (kind is int and found[key] is True)):
+            faults.append(f"{key} must be a {kind.__name__}, but is {found[key]!r}")
+    if found.get("security", "starttls") not in PORTS:
+        faults.append(f"security is one of {', '.join(PORTS)}, not {found['security']!r}")
+    addresses = found.get("to")
+    if isinstance(addresses, list) and not (
+        addresses and all(isinstance(one, str) and "@" in one for one in addresses)
+    ):
+        faults.append('to is a list of addresses, for example ["maintenance@example.org"]')
+    if ("user" in found) != ("password_file" in found):
+        faults.append("user and password_file go together")
+    if "user" in found and found.get("security") == "none" and found.get("server") not in _LOOPBACK:
+        faults.append("a password is not sent unencrypted: set security to tls or starttls")
+    return faults
+
+
+def message_of(settings: MailSettings, report: dict[str, Any]) -> EmailMessage:
+    """The e-mail of a report's document: the fleet table as text, the PDF files attached."""
+    alarms = report["alarms"]
+    message = EmailMessage()
+    message["Subject"] = f"Machine health {report['week']}: " + (
+        f"{len(alarms)} alarm{'s' if len(alarms) != 1 else ''}" if alarms else "no alarm"
+    )
+    message["From"] = settings.sender
+    message["To"] = ", ".join(settings.recipients)
+    message["Date"] = formatdate()
+    message["Message-ID"] = make_msgid(domain=settings.sender.rpartition("@")[2].rstrip(">") or None)
+    lines = [f"Week {report['week']}, {report['from']} to {report['to']}", ""]
+    for one in report["machines"]:
+        p = one["probability_out"]
+        out = "" if p is None else f", probability out of tolerance {p:.2g}"
+        lines += [
+            f"{one['machine']}: {one['state']}{out}",
+            f"  {one['changed']}; next check {one['next_check']}",
+        ]
+    if report["message"]:
+        lines += ["", report["message"]]
+    room = LARGEST_BYTES
+    attached: list[tuple[str, bytes]] = []
+    for file in (Path(name) for name in report["files"] if name.endswith(".pdf")):
+        size = file.stat().st_size
+        if size <= room:
+            room -= size
+            attached.append((file.name, file.read_bytes()))
+        else:
+            lines.append(f"too large to be attached: {file}")
+    message.set_content("\n".join(lines) + "\n")
+    for name, content in attached:
+        message.add_attachment(content, maintype="application", subtype="pdf", filename=name)
+    return message
+
+
+def send(settings: MailSettings, message: EmailMessage) -> Sequence[str]:
+    """Hand a message to the server; the addresses that it took. Raises InputError saying what the server said."""
+    place = f"{settings.server}:{settings.port}"
+    try:
+        context = ssl.create_default_context(cafile=settings.ca_file)
+        if settings.security == "tls":
+            server: smtplib.SMTP = smtplib.SMTP_SSL(
+                settings.server, settings.port, timeout=TIMEOUT_S, context=context
+            )
+        else:
+            server = smtplib.SMTP(settings.server, settings.port, timeout=TIMEOUT_S)
+        with server:
+            if settings.security == "starttls":
+                server.starttls(context=context)
+            if settings.user is not None and settings.password_file is not None:
+                server.login(settings.user, settings.password_file.read_text(encoding="utf-8").strip())
+            refused = server.send_message(message)
+    except smtplib.SMTPResponseException as error:
+        said = (
+            error.smtp_error.decode(errors="replace")
+            if isinstance(error.smtp_error, bytes)
+            else error.smtp_error
+        )
+        raise InputError(f"the mail server {place} refused the message: {error.smtp_code} {said}") from error
+    except smtplib.SMTPRecipientsRefused as error:
+        raise InputError(f"the mail server {place} took none of {', '.join(error.recipients)}") from error
+    except (smtplib.SMTPException, OSError) as error:
+        raise InputError(f"the mail server {place} could not be used: {error}") from error
+    if refused:
+        raise InputError(f"the mail server {place} refused {', '.join(refused)}; the others have the message")
+    return settings.recipients
+
+
+def mail_report(path: Path, report: dict[str, Any]) -> list[str]:
+    """Send a report as a configuration file says; the addresses it went to (none where only alarms are sent)."""
+    settings = read_mail_settings(path)
+    if settings.only_on_alarm and not report["alarms"]:
+        return []
+    return list(send(settings, message_of(settings, report)))

@@ -1,0 +1,156 @@
+"""Models and their versions: resolve a name, add an effect, take one out, show what is there.
+
+A model is the complete set of base effects of the method (free in every run) and the effects added to it
+(shared by all runs of a campaign). ``samba`` exists from the start; ``samba@2`` names a version.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from monitor.effects import parse_effect
+from monitor.effects.words import describe
+from monitor.exceptions import InputError, NotFoundError
+from monitor.machine import parse_topology
+from monitor.methods import METHODS
+from monitor.methods.base_effects import base_effects
+from monitor.methods.model import Model
+from monitor.store import Database, StoredModel, list_machines, list_models, load_model, save_model
+
+Document = dict[str, Any]
+
+
+def resolve(db: Database, name: str | None, method: str = "samba") -> StoredModel:
+    """The stored model of a name, ``NAME`` (its latest version) or ``NAME@VERSION``; the method's own by default."""
+    wanted, _, version = (name or method).partition("@")
+    if version and not version.isdigit():
+        raise InputError(f"model '{name}': after @ comes the number of a version, for example {wanted}@1")
+    try:
+        return load_model(db, wanted, int(version) if version else None)
+    except NotFoundError as error:
+        if wanted in METHODS and not version.strip("1"):
+            # The method's own model needs nobody to make it.
+            return save_model(db, wanted, (), note="the method's own model")
+        if list_models(db).empty:
+            if wanted in METHODS:
+                raise NotFoundError(f"model '{wanted}' has no version {version}; it has 1") from error
+            raise NotFoundError(f"there is no model '{wanted}'; there are {', '.join(METHODS)}") from error
+        raise
+
+
+def label(model: StoredModel) -> str:
+    """How a version is called: the name alone for the first, ``name@2`` for the second."""
+    return model.name if model.version == 1 else f"{model.name}@{model.version}"
+
+
+def as_model(stored: StoredModel) -> Model:
+    """The model as the methods take it."""
+    return Model(label(stored), added=stored.effects)
+
+
+def _document(stored: StoredModel) -> Document:
+    return {
+        "model": label(stored),
+        "name": stored.name,
+        "version": stored.version,
+        "parent": None if stored.parent is None else _label_of(stored.parent),
+        "effects": list(stored.effects),
+        "added": list(stored.added),
+        "removed": list(stored.removed),
+        "note": stored.note,
+        "created_at": stored.created_at.isoformat() + "Z",
+    }
+
+
+def _label_of(parent: tuple[str, int]) -> str:
+    name, version = parent
+    return name if version == 1 else f"{name}@{version}"
+
+
+def list_(db: Database) -> Document:
+    """All models with their versions."""
+    for method in METHODS:
+        resolve(db, method)
+    frame = list_models(db)
+    return {
+        "models": [
+            _document(load_model(db, str(name), int(version)))
+            for name, version in zip(frame["model"], frame["version"], strict=True)
+        ]
+    }
+
+
+def show(db: Database, name: str) -> Document:
+    """A model, its added effects in words, and its base effects on every machine that is there."""
+    stored = resolve(db, name)
+    machines = list_machines(db)
+    base: dict[str, list[str]] = {}
+    words: dict[str, str] = {}
+    for machine, topology in zip(machines["machine"], machines["topology"], strict=True):
+        chain = parse_topology(str(topology))
+        base[str(machine)] = list(base_effects(chain))
+        for text in stored.effects:
+            try:
+                words.setdefault(text, describe(parse_effect(text, chain)).meaning)
+            except InputError:
+                continue
+    return {**_document(stored), "base": base, "meaning": words}
+
+
+def add(db: Database, effect: str, to: str, as_: str | None = None, note: str = "") -> StoredModel:
+    """A new version with one more effect; its parent is the old one.
+
+    The effect must exist on one of the machines that are there. Raises EffectError, NotFoundError.
+    """
+    parent = resolve(db, to)
+    text = _known(db, effect)
+    if _is_base(db, text):
+        raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
+    if text in parent.effects:
+        raise InputError(
+            f"model {label(parent)} has {text} already; add another effect, or take it out first"
+        )
+    if as_ is not None and as_ != parent.name and as_ in set(list_models(db)["model"]):
+        raise InputError(f"there is a model {as_} already: add to it with --to {as_}, or choose another name")
+    return save_model(
+        db, _name(as_, parent), (*parent.effects, text), parent=(parent.name, parent.version), note=note
+    )
+
+
+def remove(db: Database, effect: str, from_: str, as_: str | None = None) -> StoredModel:
+    """A new version without one of the added effects."""
+    parent = resolve(db, from_)
+    if effect not in parent.effects:
+        there = ", ".join(parent.effects) or "none; the base effects cannot be taken out"
+        raise InputError(f"model {label(parent)} has no added effect {effect}; it has {there}")
+    left = tuple(text for text in parent.effects if text != effect)
+    return save_model(db, _name(as_, parent), left, parent=(parent.name, parent.version))
+
+
+def _name(as_: str | None, parent: StoredModel) -> str:
+    if as_ is None:
+        return parent.name
+    if "@" in as_ or not as_.strip():
+        raise InputError(f"'{as_}' cannot name a model: leave out @, which separates name and version")
+    return as_
+
+
+def _is_base(db: Database, effect: str) -> bool:
+    """Whether an effect is a base effect on every machine."""
+    topologies = dict.fromkeys(str(topology) for topology in list_machines(db)["topology"])
+    return all(effect in base_effects(parse_topology(topology)) for topology in topologies)
+
+
+def _known(db: Database, effect: str) -> str:
+    """The effect in its own words, if any machine has it."""
+    topologies = [str(topology) for topology in list_machines(db)["topology"]]
+    if not topologies:
+        raise NotFoundError("there is no machine yet that could have an effect; import a campaign first")
+    fault: InputError | None = None
+    for topology in dict.fromkeys(topologies):
+        try:
+            return parse_effect(effect, parse_topology(topology)).text
+        except InputError as error:
+            fault = fault or error
+    assert fault is not None
+    raise fault

@@ -1,0 +1,44 @@
+"""A virtual campaign folder, to rehearse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from monitor.exceptions import InputError
+from monitor.methods.virtual import virtual_campaign
+from monitor.readers import write_campaign
+from monitor.units import MICROMETRE
+
+
+def simulate(out: Path, effect: str | None, peak_um: float, noise_um: float, seed: int) -> dict[str, Any]:
+    """Write a campaign folder named after ``out``; its hidden effect has the peak displacement ``peak_um``."""
+    if noise_um <= 0 or not np.isfinite(noise_um):
+        raise InputError(f"--noise {noise_um}: the noise of a reading must be above 0 µm")
+    if not np.isfinite(peak_um) or peak_um <= 0:
+        raise InputError(f"--peak {peak_um}: the peak must be a number of µm above 0")
+    if seed < 0:
+        raise InputError(f"--seed {seed}: a seed is a whole number from 0 on")
+    campaign = virtual_campaign(
+        out.resolve().name,
+        np.random.default_rng(seed),
+        effect=effect,
+        peak=MICROMETRE.to_internal(peak_um),
+        noise=MICROMETRE.to_internal(noise_um),
+    )
+    write_campaign(campaign, out)
+    touches = len(campaign.probings) // len(campaign.runs)
+    hidden = f"{effect} with a peak of {peak_um:g} µm is hidden" if effect else "nothing is hidden"
+    return {
+        "folder": str(out),
+        "campaign": campaign.name,
+        "effect": effect,
+        "peak_um": peak_um if effect else None,
+        "noise_um": noise_um,
+        "seed": seed,
+        "runs": len(campaign.runs),
+        "probings": len(campaign.probings),
+        "message": f"{out}: {len(campaign.runs)} runs of {touches} probings; {hidden}",
+    }

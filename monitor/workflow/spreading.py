@@ -1,0 +1,51 @@
+"""Where the trials of a Monte Carlo are computed: threads of this process, other processes, or a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+
+from threadpoolctl import threadpool_limits
+
+from monitor.exceptions import InputError
+from monitor.uncertainty import BlockSampler, Inputs, normal_inputs, run_estimator
+from monitor.uncertainty.cluster import cluster, processes, spread
+from monitor.uncertainty.propagation import Model
+from monitor.uncertainty.run_problem import RunProblem
+
+# Threads of this process where nothing else was asked for: the trials release the interpreter's lock.
+THREADS = 2
+
+
+@contextmanager
+def trials_of(
+    one: RunProblem,
+    inputs: Inputs,
+    names: tuple[str, ...],
+    seed: int,
+    workers: int | None = None,
+    address: str | None = None,
+) -> Iterator[tuple[Model, BlockSampler, int]]:
+    """Model, sampler and number of threads for ``adaptive_monte_carlo``: the same numbers wherever they are made.
+
+    ``workers`` processes of this machine, or the Dask cluster at ``address``, or else threads of this process.
+    Raises InputError where both are asked for.
+    """
+    if workers is not None and address is not None:
+        raise InputError(
+            "--workers starts processes here, --cluster uses those of a cluster: choose one of them"
+        )
+    recipe = partial(run_estimator, one, inputs, names, seed=seed)
+    sampler = BlockSampler(normal_inputs(inputs), seed=seed)
+    if workers is None and address is None:
+        # As in the workers: with several threads the linear algebra of the recipe may round otherwise.
+        with threadpool_limits(1, "blas"):
+            model = recipe()
+        yield model, sampler, THREADS
+        return
+    with (
+        processes(workers) if workers is not None else cluster(str(address)) as engine,
+        spread(engine, recipe, sampler) as (remote, blocks),
+    ):
+        yield remote, blocks, 1

@@ -1,0 +1,332 @@
+"""The long view of one machine: drift, changes, dependence, cycles, warm-up, alarms, forecast of each parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.records import Array
+from monitor.statistics import Change, History, Trend, control_false_discoveries, find_changes
+from monitor.store import (
+    Database,
+    MachineHistory,
+    list_events,
+    machine_history,
+    save_analysis,
+    unidentified_campaigns,
+)
+from monitor.workflow.identification import identify
+from monitor.workflow.models import resolve
+from monitor.workflow.trend_campaigns import chosen_only, same_hours
+from monitor.workflow.trend_control import Charts, Points
+from monitor.workflow.trend_parameter import (
+    DAYS_PER_YEAR,
+    SHORTEST_DAYS,
+    Series,
+    conditions,
+    cycles,
+    date,
+    drift,
+    number,
+    prediction,
+    warming,
+)
+
+Document = dict[str, Any]
+
+# Seeds what is simulated: the null distributions of changes and warm-up, the limit of MEWMA; stored with the result.
+SEED = 20260302
+SECONDS_PER_DAY = 86400.0
+#: From so many days on, changes and alarms are sought in the means of the days, which hide no day component.
+DAYS_FOR_MEANS = 15
+#: Uncertainties that differ by less than this factor weigh runs alike (it costs less than 1 % of the precision).
+ALIKE = 1.25
+#: The next check where none is named: as far away as the campaigns lie apart (median), or this many days.
+NEXT_CHECK_D = 30.0
+FALSE_ALARM = 0.05
+TRIALS = 1999
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the user asked for; times in days since 1970, None where not named."""
+
+    parameter: str | None = None
+    since: datetime | None = None
+    next_check: datetime | None = None
+    reference: tuple[datetime, datetime] | None = None
+    reliability: float = 0.95
+    campaigns: tuple[str, ...] = ()
+    model: str | None = None
+
+
+@dataclass(frozen=True)
+class Trends:
+    """The document, and what it was computed from (for the figures)."""
+
+    document: Document
+    series: tuple[Series, ...]
+    lines: Mapping[str, Trend | None]
+
+
+def _days(moment: datetime) -> float:
+    return moment.timestamp() / SECONDS_PER_DAY
+
+
+def _history(db: Database, machine: str, choice: Choice) -> MachineHistory:
+    """The history of a machine; campaigns not yet identified are identified first where the database may be written."""
+    model, version = None, None
+    if choice.model is not None:
+        stored = resolve(db, choice.model)
+        model, version = stored.name, stored.version
+    if not db.read_only:
+        for campaign in unidentified_campaigns(db, machine, model, version):
+            try:
+                identify(db, campaign, choice.model)
+            except DataError:
+                # A campaign that cannot be identified does not keep the others from being followed.
+                continue
+    found = machine_history(
+        db, machine, model=model, version=version, parameter=choice.parameter, since=choice.since
+    )
+    found = chosen_only(found, choice.campaigns)
+    if choice.parameter is not None and len(found.run) and choice.parameter not in found.parameters:
+        there = machine_history(db, machine, model=model, version=version).parameters
+        raise NotFoundError(
+            f"machine {machine} has no parameter {choice.parameter!r}; it has {', '.join(there) or 'none yet'}"
+        )
+    return found
+
+
+def _series(history: MachineHistory) -> list[tuple[Series, npt.NDArray[np.bool_]]]:
+    """Each parameter with the runs that have it."""
+    t = history.seconds / SECONDS_PER_DAY
+    days = np.array(
+        [f"{campaign} day {day}" for campaign, day in zip(history.campaign, history.day, strict=True)], dtype=np.str_
+    )  # fmt: skip
+    hour = np.array([at.hour + at.minute / 60.0 for at in history.started_at])
+    offset = (history.started_at[-1].utcoffset() if history.started_at else None) or timedelta()
+    found = []
+    for j, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
+        own = np.isfinite(history.values[:, j])
+        whole = Series(name, unit, history.values[:, j], history.u[:, j], t, days, hour, offset)
+        found.append((whole.part(own), own))
+    return found
+
+
+def day_means(series: Series) -> tuple[Array, Array, Array | None]:
+    """Times, means and uncertainties of the means by day, in order of time; None where the days weigh alike."""
+    labels, first, index = np.unique(series.days, return_index=True, return_inverse=True)
+    weight = 1.0 / series.u**2 if series.weights() is not None else np.ones_like(series.values)
+    total = np.bincount(index, weight)
+    order = np.argsort(first, kind="stable")
+    t, y = (np.bincount(index, weight * x) / total for x in (series.t, series.values))
+    u = 1.0 / np.sqrt(total)
+    assert len(labels) == len(total)
+    return t[order], y[order], u[order] if u.max() > ALIKE * u.min() else None
+
+
+def _changes(
+    all_series: Sequence[Series], events: list[float]
+) -> dict[str, tuple[History | None, str | None]]:
+    """Steps, bends and transients of each parameter; or why none were sought.
+
+    Parameters measured at the same times share one search, and with it the simulated null distribution. Which
+    search a parameter is in does not change its share of the false-alarm probability.
+    """
+    searches: dict[tuple[bytes, bytes], tuple[Array, Array | None, dict[str, Array]]] = {}
+    for series in all_series:
+        if len(np.unique(series.days)) >= DAYS_FOR_MEANS:
+            t, y, u = day_means(series)
+        else:
+            t, y = series.t, series.values
+            u = series.u if series.weights() is not None and series.u.max() > ALIKE * series.u.min() else None
+        key = (t.tobytes(), b"" if u is None else u.tobytes())
+        searches.setdefault(key, (t, u, {}))[2][series.name] = y
+    found: dict[str, tuple[History | None, str | None]] = {}
+    for t, u, values in searches.values():
+        try:
+            history = find_changes(
+                values, t, rng=np.random.default_rng([SEED, len(t)]), events=events,
+                u=None if u is None else dict.fromkeys(values, u),
+                false_alarm=FALSE_ALARM * len(values) / len(all_series), trials=TRIALS,
+            )  # fmt: skip
+        except DataError as error:
+            found |= dict.fromkeys(values, (None, f"no search for changes: {error}"))
+            continue
+        for name in values:
+            own = [
+                tuple(one for one in part if one.parameter == name)
+                for part in (history.changes, history.trends)
+            ]
+            found[name] = (replace(history, changes=own[0], trends=own[1]), None)
+    return found
+
+
+def _change(one: Change, series: Series) -> Document:
+    slope = one.kind in ("slope", "trend")
+    # A slope of a short history is stated a day: see SHORTEST_DAYS.
+    period, days = ("day", 1.0) if np.ptp(series.t) < SHORTEST_DAYS else ("year", DAYS_PER_YEAR)
+    return {
+        "at": date(one.at, series.offset),
+        "interval": [date(x, series.offset) for x in one.interval],
+        "kind": one.kind,
+        "size": one.size * (days if slope else 1.0),
+        "u": one.u * (days if slope else 1.0),
+        "unit": f"{series.unit}/{period}" if slope else series.unit,
+        "p_value": one.p_value,
+    }
+
+
+def _piece_begins(series: Series, found: History | None, events: list[float]) -> float:
+    """When the present piece of history began: at the last event or change."""
+    moments = [at for at in events if at <= series.t[-1]]
+    moments += [one.at for one in found.changes] if found is not None else []
+    return max(moments, default=-np.inf)
+
+
+def _steady(series: Series, warm: npt.NDArray[np.bool_]) -> Series:
+    """The runs that are not marked warm_up, where six or more are not: a warming machine is another matter."""
+    return series.part(~warm) if (~warm).sum() >= 6 else series
+
+
+def _parameter(
+    series: Series, history: MachineHistory, own: npt.NDArray[np.bool_], events: list[float], check: float,
+    choice: Choice, charts: Charts, place: int, searched: dict[str, tuple[History | None, str | None]],
+) -> tuple[Document, Trend | None]:  # fmt: skip
+    steady = _steady(series, history.warm_up[own])
+    found, why = searched[series.name]
+    begins = _piece_begins(steady, found, events)
+    slope, line = drift(steady, begins)
+    channels = {name: values[own] for name, values in history.conditions.items()}
+    coefficients, why_conditions = conditions(series, channels, begins)
+    waves, why_cycles = cycles(steady, begins)
+    warmth, why_warm = warming(
+        series, history.warm_up[own], np.random.default_rng([SEED, len(series.t)]), history.campaign[own]
+    )
+    limit = history.tolerances.get(series.name)
+    ahead, _ = prediction(steady, line, limit, check, choice.reliability)
+    last = steady.days == steady.days[-1]
+    return {
+        "unit": series.unit,
+        **slope,
+        "latest": float(steady.values[last].mean()),
+        "latest_at": date(float(steady.t[-1]), series.offset),
+        "changes": [] if found is None else [_change(one, series) for one in found.changes],
+        "drifts": [] if found is None else [_change(one, series) for one in found.trends],
+        "why_no_changes": why,
+        "conditions": coefficients,
+        "why_no_conditions": why_conditions,
+        "cycles": waves,
+        "why_no_cycles": why_cycles,
+        "warm_up": warmth,
+        "why_no_warm_up": why_warm,
+        **ahead,
+        "control": charts.of(place),
+    }, line
+
+
+def _points(history: MachineHistory, series: list[tuple[Series, npt.NDArray[np.bool_]]]) -> Points:
+    """Points of the charts: runs, or day means where there are enough days; runs of a warming machine left out."""
+    t = history.seconds / SECONDS_PER_DAY
+    offset = series[0][0].offset
+    keep = ~history.warm_up if (~history.warm_up).sum() >= 6 else np.ones(len(t), dtype=np.bool_)
+    labels = np.array([f"{c} day {d}" for c, d in zip(history.campaign, history.day, strict=True)])[keep]
+    distinct, first, index = np.unique(labels, return_index=True, return_inverse=True)
+    if len(distinct) < DAYS_FOR_MEANS:
+        return Points(history.values[keep], t[keep], "runs", offset)
+    values = history.values[keep]
+    here = np.isfinite(values)
+    sums, counts = np.zeros((len(distinct), values.shape[1])), np.zeros((len(distinct), values.shape[1]))
+    np.add.at(sums, index, np.where(here, values, 0.0))
+    np.add.at(counts, index, here)
+    means = sums / np.where(counts > 0, counts, np.nan)
+    order = np.argsort(first, kind="stable")
+    moments = np.bincount(index, t[keep]) / np.bincount(index)
+    return Points(means[order], moments[order], "days", offset)
+
+
+def _next_check(history: MachineHistory, choice: Choice) -> float:
+    last = history.seconds[-1] / SECONDS_PER_DAY
+    if choice.next_check is not None:
+        at = _days(choice.next_check)
+        if at < last:
+            raise InputError(
+                f"--next-check {choice.next_check.date()} lies before the last run, {history.started_at[-1].date()}"
+            )
+        return at
+    seconds = history.seconds
+    starts = np.sort([seconds[history.campaign == name].min() for name in set(history.campaign.tolist())])
+    apart = np.diff(starts) / SECONDS_PER_DAY
+    return float(last + (np.median(apart) if len(apart) else NEXT_CHECK_D))
+
+
+def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
+    """Follow every parameter of a machine; the document is stored where all parameters were asked for.
+
+    Raises NotFoundError for a machine or parameter that is not there, InputError for dates that cannot be.
+    """
+    choice = choice or Choice()
+    history = _history(db, machine, choice)
+    frame = list_events(db, machine)
+    moments = [at.to_pydatetime().replace(tzinfo=UTC) for at in frame["happened_at"]]
+    known = [
+        {"at": at.isoformat(), "kind": kind, "description": text}
+        for at, kind, text in zip(moments, frame["kind"], frame["description"], strict=True)
+    ]
+    head: Document = {
+        "machine": machine,
+        "since": None if choice.since is None else choice.since.isoformat(),
+        "runs": len(history.run),
+        "campaigns": list(dict.fromkeys(history.campaign.tolist())),
+        "events": known,
+        "notes": same_hours(history),
+        "false_alarm": FALSE_ALARM,
+        "seed": SEED,
+    }
+    if not len(history.run):
+        when = "yet" if choice.since is None else f"since {choice.since:%Y-%m-%d}"
+        of = f" of campaign {', '.join(choice.campaigns)}" if choice.campaigns else ""
+        why = f"machine {machine} has no identified run{of} {when}"
+        return Trends({**head, "why": why, "parameters": {}}, (), {})
+    series = _series(history)
+    events = [_days(at) for at in moments]
+    reference = None if choice.reference is None else (_days(choice.reference[0]), _days(choice.reference[1]))
+    charts = Charts(_points(history, series), reference)
+    check = _next_check(history, choice)
+    searched = _changes([_steady(one, history.warm_up[own]) for one, own in series if len(one.t)], events)
+    judged = {
+        one.name: _parameter(one, history, own, events, check, choice, charts, place, searched)
+        for place, (one, own) in enumerate(series)
+        if len(one.t)
+    }
+    parameters = {name: one for name, (one, _) in judged.items()}
+    lines = {name: line for name, (_, line) in judged.items()}
+    _discoveries(parameters)
+    document: Document = {
+        **head,
+        "why": None,
+        "next_check": date(check, series[0][0].offset),
+        "control": {
+            **charts.period(),
+            "vector": charts.of_vector(history.parameters, np.random.default_rng(SEED)),
+        },
+        "parameters": parameters,
+    }
+    if choice == Choice() and not db.read_only:
+        save_analysis(db, "trend", document, method="all parameters", machine=machine, seed=SEED)
+    return Trends(document, tuple(one for one, _ in series), lines)
+
+
+def _discoveries(parameters: Mapping[str, Document]) -> None:
+    """The false discovery rate over the drifts of all parameters."""
+    p = [np.nan if one["p_value"] is None else one["p_value"] for one in parameters.values()]
+    q = control_false_discoveries(p).q_value
+    for one, rate in zip(parameters.values(), q, strict=True):
+        one["q_value"] = number(float(rate))

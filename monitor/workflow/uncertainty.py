@@ -1,0 +1,362 @@
+"""Uncertainty of one run's geometric errors after JCGM 102:2011: GUM framework, Monte Carlo, validation.
+
+The inputs are the readings of the linear axes at every probing and the length of the bar. Their covariance is
+pooled by day from the repeated runs where there are enough of them, else all runs together, else the probe's
+stated standard uncertainty, uncorrelated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from monitor.discovery import Fit, fit
+from monitor.discovery.compare import lack_of_fit
+from monitor.discovery.model_uncertainty import model_uncertainty as model_uncertainty_of
+from monitor.discovery.variants import variants_of
+from monitor.effects.catalogue import catalogue
+from monitor.exceptions import DataError, InputError
+from monitor.methods import method_named
+from monitor.methods.identification import Refusal
+from monitor.records import Array, Campaign
+from monitor.store import Database, StoredModel, load_campaign, save_analysis
+from monitor.uncertainty import (
+    FrameworkResult,
+    Inputs,
+    MonteCarloResult,
+    OutputContribution,
+    Validation,
+    adaptive_monte_carlo,
+    gum_framework,
+    joined,
+    joint_coverage,
+    overall,
+    pooled_by_day,
+    uncorrelated,
+    validate,
+)
+from monitor.uncertainty.coverage import ellipsoid_factor, rectangle_factor
+from monitor.uncertainty.run_problem import RunProblem, repeated_readings, run_problem
+from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
+from monitor.units import Unit
+from monitor.workflow.models import as_model, label, resolve
+from monitor.workflow.selections import selected_readings
+from monitor.workflow.spreading import trials_of
+
+Document = dict[str, Any]
+
+# A validation compares within a numerical tolerance, so the Monte Carlo result has to be steadier than that. JCGM 101
+# 8.2 recommends a fifth; two fifths need a sixth of the trials, and `validate` says "undecided" where that shows.
+VALIDATION_TIGHTENING = 2.5
+READINGS = "readings"
+BAR = "scale bar"
+LACK_OF_FIT = "lack of fit of the model"
+# A covariance from fewer degrees of freedom than this says little about itself; then the next choice is taken.
+FEWEST_DEGREES_OF_FREEDOM = 8
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """What was evaluated for one run; ``units`` are the display units of ``framework.names``.
+
+    ``causes`` are the effects that lack of fit may come from, with their probabilities.
+    """
+
+    campaign: Campaign
+    model: StoredModel
+    fit: Fit
+    run: int
+    framework: FrameworkResult
+    units: tuple[Unit, ...]
+    refused: tuple[Refusal, ...]
+    input_covariance: str
+    monte_carlo: MonteCarloResult | None
+    validation: Validation | None
+    causes: tuple[tuple[str, float], ...] = ()
+
+
+def _reading_inputs(
+    db: Database, found: Fit, campaign: Campaign, one: RunProblem, model: StoredModel, select: str | None
+) -> tuple[Inputs, str]:
+    """Inputs of the readings of a run, and in words where their covariance is from: all runs, or a stored selection."""
+    count = one.probings * len(one.linear)
+    names, units = one.input_names[:count], ("mm",) * count
+    days = {run.run: run.day for run in campaign.runs}
+    labels = np.array([days[int(run)] for run in found.problem.runs])
+    if select is not None:
+        values, labels = selected_readings(db, select, campaign.name, model, found.problem)
+        if len(labels) - 1 < FEWEST_DEGREES_OF_FREEDOM:
+            raise DataError(
+                f"--select {select}: {len(labels)} runs leave {len(labels) - 1} degrees of freedom for a covariance; "
+                f"at least {FEWEST_DEGREES_OF_FREEDOM} are needed"
+            )
+    else:
+        try:
+            values = repeated_readings(found.problem)
+        except DataError:
+            values = np.zeros((0, count))
+    runs = len(labels)
+    stated = campaign.probe.standard_uncertainty
+    if len(values) and runs - len(np.unique(labels)) >= FEWEST_DEGREES_OF_FREEDOM:
+        inputs = pooled_by_day(values, labels, names, units, source=READINGS)
+        words = f"repeated runs, pooled by day, {runs - len(np.unique(labels))} degrees of freedom"
+    elif len(values) and runs - 1 >= FEWEST_DEGREES_OF_FREEDOM:
+        inputs = overall(values, names, units, source=READINGS)
+        words = f"all {runs} runs, {runs - 1} degrees of freedom"
+    else:
+        repeatability = lack_of_fit(found)[1]
+        u = max(stated, repeatability or 0.0)
+        inputs = uncorrelated(names, units, one.inputs[:count], np.full(count, u), source=READINGS)
+        words = f"the probe's stated standard uncertainty of {stated * 1e3:g} µm; too few repeated runs of one plan"
+        if u > stated:
+            words = f"the repeatability of {u * 1e3:.2g} µm, which exceeds the probe's statement; too few runs for more"
+    if select is not None:
+        words = f"selection {select}: {words}"
+    # The estimate is that of the run itself: its results are stated.
+    own = Inputs(
+        inputs.names, inputs.units, one.inputs[:count], inputs.covariance, inputs.sources, inputs.dof
+    )
+    return own, words
+
+
+def _bar_inputs(one: RunProblem) -> Inputs | None:
+    distances = one.problem.distances
+    if not distances:
+        return None
+    count = one.probings * len(one.linear)
+    return uncorrelated(
+        one.input_names[count:],
+        ("mm",) * len(distances),
+        one.inputs[count:],
+        [distance.standard_uncertainty for distance in distances],
+        source=BAR,
+    )
+
+
+def _lack_of_fit(
+    found: Fit, place: int, outputs: Array, pitches: dict[str, float]
+) -> tuple[OutputContribution | None, tuple[tuple[str, float], ...]]:
+    """What lack of fit leaves over repeatability, as a covariance of the outputs, and its most probable causes."""
+    chain, known = found.problem.context.chain, [effect.text for effect in found.problem.base]
+    known += [effect.text for effect in found.problem.added]
+    # Only what depends on the time within a run, not on its day, can be the same in every run.
+    effects = catalogue(chain, known, ("run_time",), pitches)
+    left = model_uncertainty_of(found, place, [one for effect in effects for one in variants_of(effect)])
+    if left is None:
+        return None, ()
+    covariance = left.covariance[np.ix_(outputs, outputs)]
+    return OutputContribution(LACK_OF_FIT, covariance, dof=left.dof), left.effects
+
+
+def evaluate(
+    db: Database,
+    campaign: str,
+    run: int | None = None,
+    *,
+    model: str | None = None,
+    method: str = "both",
+    digits: int = 2,
+    seed: int = 1,
+    p: float = 0.95,
+    model_uncertainty: bool = True,
+    workers: int | None = None,
+    cluster: str | None = None,
+    select: str | None = None,
+) -> Evaluated:
+    """Evaluate the uncertainty of one run (the last by default). Raises InputError, DataError, NotFoundError.
+
+    ``select`` names a stored selection, or a campaign of the same plan: its runs give the covariance of the readings.
+    The trials go to ``workers`` processes or the Dask scheduler at the address ``cluster``, else to threads.
+    """
+    if method not in ("guf", "mcm", "both"):
+        raise InputError(f"--method {method}: choose guf, mcm or both")
+    if not 1 <= digits <= 4:
+        raise InputError(f"--digits {digits}: choose 1 to 4 significant digits")
+    if not 0 <= seed < 2**63:
+        raise InputError(f"--seed {seed}: a seed is a whole number from 0 to 9223372036854775807")
+    if not 0.0 < p < 1.0:
+        raise InputError(f"-p {p}: a coverage probability lies between 0 and 1")
+    loaded = load_campaign(db, campaign)
+    stored = resolve(db, model, loaded.method)
+    found = fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
+    number = int(found.problem.runs[-1]) if run is None else run
+    # The uncertainty of shared effects and time constants is not propagated into a run's own parameters.
+    fixed, coefficients = found.problem.resolved(found.solution.common)
+    one = run_problem(fixed, number, coefficients)
+    readings, words = _reading_inputs(db, found, loaded, one, stored, select)
+    bar = _bar_inputs(one)
+    inputs = joined(readings, bar) if bar is not None else readings
+    place = int(np.flatnonzero(found.problem.runs == number)[0])
+    at = sensitivity_of(one, start=found.solution.local[place])
+    names = tuple(name for name in found.problem.base_names if at.determined[at.names.index(name)])
+    units = _units(found, names)
+    outputs = np.array([found.problem.base_names.index(name) for name in names])
+    extra: OutputContribution | None = None
+    causes: tuple[tuple[str, float], ...] = ()
+    if model_uncertainty:
+        extra, causes = _lack_of_fit(
+            found,
+            place,
+            outputs,
+            {name: axis.scale_pitch for name, axis in loaded.machine.axes.items() if axis.scale_pitch},
+        )
+    framework = _framework(at, inputs, names, units, p, [extra] if extra is not None else [])
+    mcm = validation = None
+    if method != "guf":
+        with trials_of(one, inputs, names, seed, workers, cluster) as (trials, sampler, threads):
+            mcm = adaptive_monte_carlo(
+                trials,
+                sampler,
+                names,
+                framework.units,
+                p=p,
+                digits=digits,
+                tighten=VALIDATION_TIGHTENING if method == "both" else 1.0,
+                workers=threads,
+            )
+    if mcm is not None and method == "both":
+        plain = gum_framework(
+            inputs,
+            at.rows(names),
+            at.unknowns[at.places(names)],
+            names,
+            framework.units,
+            p=p,
+            finite_dof=False,
+        )
+        validation = validate(plain, mcm, digits=digits)
+    refused = method_named(loaded.method).refusals(found.problem, found.solution.null_space[place], number)
+    return Evaluated(loaded, stored, found, number, framework, units, refused, words, mcm, validation, causes)
+
+
+def _units(found: Fit, names: tuple[str, ...]) -> tuple[Unit, ...]:
+    units = {
+        name: effect.unit
+        for effect in found.problem.base
+        for name in effect.parameters(found.problem.context)
+    }
+    return tuple(units[name] for name in names)
+
+
+def _framework(
+    at: Sensitivity,
+    inputs: Inputs,
+    names: tuple[str, ...],
+    units: tuple[Unit, ...],
+    p: float,
+    contributions: list[OutputContribution],
+) -> FrameworkResult:
+    return gum_framework(
+        inputs,
+        at.rows(names),
+        at.unknowns[at.places(names)],
+        names,
+        [unit.name for unit in units],
+        p=p,
+        contributions=contributions,
+    )
+
+
+def _values(names: tuple[str, ...], units: tuple[Unit, ...], values: Array) -> Document:
+    return {
+        name: unit.to_display(float(value)) for name, unit, value in zip(names, units, values, strict=True)
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def document(found: Evaluated) -> Document:
+    """The result as people see it."""
+    guf, units = found.framework, found.units
+    result: Document = {
+        "campaign": found.campaign.name,
+        "machine": found.campaign.machine.id,
+        "run": found.run,
+        "model": label(found.model),
+        "p": guf.p,
+        "parameters": list(guf.names),
+        "units": {name: unit.name for name, unit in zip(guf.names, units, strict=True)},
+        "input_covariance": found.input_covariance,
+        "refused": [{"parameters": list(one.parameters), "why": one.why} for one in found.refused],
+        "guf": {
+            "estimate": _values(guf.names, units, guf.estimate),
+            "u": _values(guf.names, units, guf.u),
+            "correlation": guf.correlation.tolist(),
+            # JCGM 102:2011 6.5 as it stands: normal outputs. Beside them what so few runs allow to claim.
+            "k_p": ellipsoid_factor(guf.rank, guf.p),
+            "k_q": rectangle_factor(len(guf.names), guf.p),
+            "lambda_max": guf.lambda_max,
+            "degrees_of_freedom": _finite(guf.dof),
+            "k_p_with_degrees_of_freedom": _finite(guf.k_p),
+            "k_q_with_degrees_of_freedom": _finite(guf.k_q),
+            "expanded": _values(guf.names, units, guf.expanded),
+            "joint_coverage_of_k_2_each": joint_coverage(guf.correlation).value,
+            "budget": {
+                line.source: dict(zip(guf.names, map(float, shares), strict=True))
+                for line, shares in zip(guf.budget, guf.budget_shares(), strict=True)
+            },
+        },
+    }
+    if found.causes:
+        result["lack_of_fit_causes"] = [
+            {"effect": name, "probability": probability} for name, probability in found.causes[:5]
+        ]
+    mcm = found.monte_carlo
+    if mcm is not None:
+        result["mcm"] = {
+            "estimate": _values(mcm.names, units, mcm.estimate),
+            "u": _values(mcm.names, units, mcm.u),
+            "correlation": mcm.correlation.tolist(),
+            "k_p": mcm.k_p,
+            "k_q": mcm.k_q,
+            "lambda_max": mcm.lambda_max,
+            "trials": mcm.trials,
+            "not_converged": mcm.not_converged,
+            "seconds": mcm.seconds,
+            "stable": mcm.stable,
+            "seed": mcm.seed,
+        }
+    if found.validation is not None:
+        result["validation"] = {
+            "passed": found.validation.passed,
+            "verdict": found.validation.verdict,
+            "differences": {
+                _what(one): _scaled(one, found, one.difference) for one in found.validation.comparisons
+            },
+            "tolerances": {
+                _what(one): _scaled(one, found, one.tolerance) for one in found.validation.comparisons
+            },
+        }
+    return result
+
+
+def _what(one: Any) -> str:
+    return f"{one.quantity} {one.output}".strip()
+
+
+def _scaled(one: Any, found: Evaluated, value: float) -> float:
+    if not one.output:
+        return float(value)
+    return found.units[found.framework.names.index(one.output)].to_display(float(value))
+
+
+def uncertainty(db: Database, campaign: str, run: int | None = None, **options: Any) -> Document:
+    """Evaluate, store and return the document. ``options`` are those of ``evaluate``."""
+    found = evaluate(db, campaign, run, **options)
+    result = document(found)
+    # How long it took is no part of what is stored: the same result has the same document.
+    kept = (
+        {**result, "mcm": {k: v for k, v in result["mcm"].items() if k != "seconds"}}
+        if "mcm" in result
+        else result
+    )
+    save_analysis(
+        db, "uncertainty", kept, method=options.get("method", "both"), campaign=campaign, run=found.run,
+        model=found.model.name, model_version=found.model.version,
+        seed=None if found.monte_carlo is None else found.monte_carlo.seed,
+    )  # fmt: skip
+    return result

@@ -1,0 +1,282 @@
+"""The volumetric error over the stroke: the document of `map`, its figures and its compensation tables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from monitor.effects import ChainEffect
+from monitor.exceptions import DataError, InputError
+from monitor.machine import Chain
+from monitor.methods.least_squares import eliminate
+from monitor.records import Array, Campaign
+from monitor.store import Database, save_analysis
+from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
+from monitor.units import DEGREE, MICROMETRE
+from monitor.workflow.models import label
+from monitor.workflow.uncertainty import Evaluated, evaluate
+
+Document = dict[str, Any]
+# Points along each axis: an error of a serial machine with straight axes bends with the square of the position at
+# most, so five show the worst; more make a finer picture.
+POINTS = 7
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A map: the errors of the machine, and what they do at every point of a grid over the strokes.
+
+    ``ranges`` are the readings from and to of every linear axis, mm; ``poses`` (P, J) the rotary poses, at each of
+    which the grid was laid; ``left_out`` says which parameters the map does not know, and why.
+    """
+
+    evaluated: Evaluated
+    known: GeometricErrors
+    ranges: dict[str, tuple[float, float]]
+    from_strokes: bool
+    poses: Array
+    points: int
+    error: VolumetricError
+    left_out: dict[str, str]
+
+
+def geometric_errors(found: Evaluated) -> tuple[GeometricErrors, dict[str, str]]:
+    """What is known of the machine from one evaluated run, and what is not, with the reason."""
+    problem, solution = found.fit.problem, found.fit.solution
+    context = problem.context
+    fixed, coefficients = problem.resolved(solution.common)
+    left_out = {name: refusal.why for refusal in found.refused for name in refusal.parameters}
+    effects: list[ChainEffect] = []
+    names: list[str] = []
+    for effect in problem.base:
+        own = effect.parameters(context)
+        if isinstance(effect, ChainEffect) and all(name in found.framework.names for name in own):
+            effects.append(effect)
+            names += own
+        else:
+            left_out |= {name: "it has no number in this run" for name in own if name not in left_out}
+    places = [found.framework.names.index(name) for name in names]
+    local = [problem.base_names.index(name) for name in names]
+    estimate = [float(found.framework.estimate[place]) for place in places]
+    shared: list[int] = []
+    at = coefficient = 0
+    for one, plain in zip(problem.shared, fixed.added, strict=True):
+        own_places = range(at, at + one.size)
+        at += one.unknowns
+        if not isinstance(plain, ChainEffect):
+            left_out |= dict.fromkeys(one.names(), "it is no error of the machine")
+        elif not all(solution.common_free[list(own_places)]):
+            left_out |= dict.fromkeys(one.names(), "the plan does not determine it")
+        else:
+            effects.append(plain)
+            names += one.effect.parameters(context)
+            estimate += map(float, coefficients[coefficient : coefficient + one.size])
+            shared += own_places
+        coefficient += one.size
+    covariance = np.zeros((len(names), len(names)))
+    covariance[: len(places), : len(places)] = found.framework.covariance[np.ix_(places, places)]
+    if len(solution.common):
+        covariance += _of_shared(found, local, shared)
+    return (
+        GeometricErrors(
+            effects=tuple(effects),
+            names=tuple(names),
+            estimate=np.array(estimate),
+            covariance=covariance,
+            context=context,
+            run=found.run,
+            tip=solution.local[int(np.flatnonzero(problem.runs == found.run)[0]), -3:],
+            degrees_of_freedom=float(np.min(found.framework.dof_by_output)),
+        ),
+        left_out,
+    )
+
+
+def _of_shared(found: Evaluated, local: list[int], shared: list[int]) -> Array:
+    """What the uncertainty of the shared effects adds: their own, and what they pull the run's parameters by.
+
+    The parameters of a run answer a change of the shared ones by D = -pinv(A) B of the whitened Jacobians. For
+    white noise the shared ones and the run's at held shared ones are uncorrelated, because the former rest on
+    what the latter leave of the readings.
+    """
+    solution = found.fit.solution
+    place = int(np.flatnonzero(found.fit.problem.runs == found.run)[0])
+    space = eliminate(solution.last.local[[place]])
+    answer = -(space.inverse[0] @ (space.basis[0].T @ solution.last.common[place]))
+    count = len(solution.common)
+    both = np.concatenate([answer[local], np.eye(count)[shared]])
+    covariance = np.where(np.isfinite(solution.common_covariance), solution.common_covariance, 0.0)
+    added: Array = found.fit.scale**2 * both @ covariance @ both.T
+    return added
+
+
+def _ranges(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, float]], bool]:
+    """Readings of the linear axes: the strokes of the machine file if it has all, else what was visited."""
+    linear = [joint.name for joint in chain.joints if not joint.turns]
+    strokes = {name: campaign.machine.axes[name].stroke for name in linear if name in campaign.machine.axes}
+    given = {name: stroke for name, stroke in strokes.items() if stroke is not None}
+    if len(given) == len(linear):
+        return given, True
+    readings = campaign.probings.readings
+    visited = {
+        name: (float(readings[name].min()), float(readings[name].max()))
+        for name in linear
+        if name in readings
+    }
+    return visited | given, False
+
+
+def _poses(chain: Chain, positions: Array) -> Array:
+    """The rotary poses of the plan (P, J), all at zero first; the spindle at zero."""
+    turned = np.array([joint.kind == "rotary" for joint in chain.joints])
+    poses = np.unique(np.round(np.where(turned, positions, 0.0), 9), axis=0) + 0.0
+    at_zero = np.zeros((1, len(chain.joints)))
+    others = poses[np.any(poses != 0.0, axis=1)]
+    return np.concatenate([at_zero, others])
+
+
+def volumetric_map(
+    db: Database,
+    campaign: str,
+    run: int | None = None,
+    *,
+    model: str | None = None,
+    p: float = 0.95,
+    points: int = POINTS,
+    absolute: bool = False,
+    model_uncertainty: bool = True,
+) -> tuple[Document, Mapped]:
+    """Map the volumetric error of one run (the last by default) over the strokes; the document is stored.
+
+    The grid of ``points`` along every linear axis is laid at every rotary pose of the plan. The workpiece's zero
+    is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``.
+    """
+    if not 2 <= points <= 41:
+        raise InputError(f"--points {points}: choose 2 to 41 points along each axis")
+    found = evaluate(db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty)
+    known, left_out = geometric_errors(found)
+    if not known.names:
+        raise DataError(
+            f"run {found.run} of campaign {campaign} determines no geometric error; there is nothing to map"
+        )
+    ranges, from_strokes = _ranges(found.campaign, known.chain)
+    poses = _poses(known.chain, known.context.positions)
+    datum = None if absolute else middle(known.chain, ranges)
+    error = volumetric_error(known, grid(known.chain, ranges, points, poses), datum)
+    mapped = Mapped(found, known, ranges, from_strokes, poses, points, error, left_out)
+    document = _document(mapped, p)
+    save_analysis(
+        db, "volumetric map", document, method="guf", campaign=campaign, run=found.run,
+        model=found.model.name, model_version=found.model.version,
+    )  # fmt: skip
+    return document, mapped
+
+
+def _um(length: float) -> float:
+    return MICROMETRE.to_display(length)
+
+
+def _at(chain: Chain, position: Array) -> Document:
+    """Readings of a commanded point."""
+    return {
+        f"{joint.name.lower()}_{'deg' if joint.turns else 'mm'}": round(
+            joint.sign * (DEGREE.to_display(float(value)) if joint.turns else float(value)), 6
+        )
+        + 0.0
+        for joint, value in zip(chain.joints, position, strict=True)
+        if joint.kind != "spindle"
+    }
+
+
+def _point(mapped: Mapped, place: int, k: float) -> Document:
+    error = mapped.error
+    u = float(error.u_lengths[place])
+    return {
+        "at": _at(mapped.known.chain, error.positions[place]),
+        "error_um": _um(float(error.lengths[place])),
+        "u_um": _um(u),
+        "expanded_um": _um(k * u),
+        "vector_um": {axis: _um(float(v)) for axis, v in zip(AXES, error.vectors[place], strict=True)},
+        "u_vector_um": {
+            axis: _um(float(np.sqrt(max(v, 0.0))))
+            for axis, v in zip(AXES, np.diag(error.covariance[place]), strict=True)
+        },
+        "covariance_um2": (error.covariance[place] / MICROMETRE.factor**2).tolist(),
+    }
+
+
+def _document(mapped: Mapped, p: float) -> Document:
+    error, chain = mapped.error, mapped.known.chain
+    k = error.factor(p)
+    mean, rms = error.mean, error.rms
+    each = mapped.points ** len(mapped.ranges)
+    worst_at = _point(mapped, error.worst, k)
+    worst_at["by_parameter_um"] = {
+        name: _um(value) for name, value in error.budget(error.worst).items() if np.isfinite(value)
+    }
+    return {
+        "campaign": mapped.evaluated.campaign.name,
+        "machine": mapped.evaluated.campaign.machine.id,
+        "run": mapped.evaluated.run,
+        "model": label(mapped.evaluated.model),
+        "p": p,
+        "k": k,
+        "degrees_of_freedom": error.degrees_of_freedom if np.isfinite(error.degrees_of_freedom) else None,
+        "region": {
+            "readings_mm": {name: list(ends) for name, ends in mapped.ranges.items()},
+            "from": "the machine file's strokes" if mapped.from_strokes else "what the campaign visited",
+            "points_an_axis": mapped.points,
+            "rotary_poses": len(mapped.poses),
+            "points": len(error.lengths),
+        },
+        "datum": None if error.datum is None else _at(chain, error.datum),
+        "parameters": list(error.names),
+        "left_out": [{"parameter": name, "why": why} for name, why in mapped.left_out.items()],
+        "worst": worst_at,
+        "mean": {"error_um": _um(mean[0]), "u_um": _um(mean[1]), "expanded_um": _um(k * mean[1])},
+        "rms": {"error_um": _um(rms[0]), "u_um": _um(rms[1]), "expanded_um": _um(k * rms[1])},
+        "least_certain": _point(mapped, error.least_certain, k),
+        "by_pose": [
+            {
+                "at": {name: value for name, value in _at(chain, pose).items() if name.endswith("_deg")},
+                "worst_um": _um(float(error.lengths[number * each : (number + 1) * each].max())),
+                "rms_um": _um(
+                    float(np.sqrt(np.mean(error.lengths[number * each : (number + 1) * each] ** 2)))
+                ),
+            }
+            for number, pose in enumerate(mapped.poses)
+        ],
+    }
+
+
+def map_figures(document: Document, mapped: Mapped, folder: Path) -> list[str]:
+    """The map as arrows and as slices, at the rotary axes' zero, and the errors along the axes."""
+    from monitor.reporting.figure_style import save
+    from monitor.reporting.figures_volumetric import volumetric_slices
+    from monitor.workflow.figures import make_folder
+
+    make_folder(folder)
+    error, chain = mapped.error, mapped.known.chain
+    linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
+    if len(linear) != 3:
+        raise InputError(f"the map is drawn for three linear axes; '{chain.topology}' has {len(linear)}")
+    each = mapped.points**3
+    signs = np.array([chain.joints[place].sign for place in linear])
+    readings = error.positions[:each][:, linear] * signs
+    worst = document["worst"]
+    figure = volumetric_slices(
+        readings,
+        error.vectors[:each] / MICROMETRE.factor,
+        error.u_lengths[:each] / MICROMETRE.factor * document["k"],
+        names=[chain.joints[place].name for place in linear],
+        title=f"{document['campaign']}, run {document['run']}: at worst {worst['error_um']:.1f} µm "
+        f"± {worst['expanded_um']:.1f} µm, RMS {document['rms']['error_um']:.1f} µm",
+        note=f"Rotary axes at zero. Colour: length of the error; arrows: its part in the slice; numbers: expanded "
+        f"uncertainty (k = {document['k']:.2f}, p = {document['p']:g}). "
+        f"The title is about all {document['region']['rotary_poses']} rotary poses of the plan.",
+    )
+    return [str(save(figure, folder / f"volumetric-error{ending}")) for ending in (".svg", ".png")]

@@ -1,0 +1,37 @@
+"""How long a scan and an explanation take; run with `pytest tests/benchmarks`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from monitor.discovery import explain, fit
+from monitor.discovery.scan import scan
+from monitor.discovery.variants import variants_of
+from monitor.discovery.visible import see
+from monitor.effects.catalogue import catalogue, drivers_of
+from monitor.methods.samba import problem_of
+from monitor.readers import read_campaign
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def test_full_scan_of_150_candidates_on_20_runs(benchmark: Any) -> None:
+    """The design asks for less than a second for 1240 probings; here from the fit on, projection included."""
+    campaign = read_campaign(EXAMPLES / "hidden-reversal-x")
+    now = fit(problem_of(campaign))
+    problem = now.problem
+    base = [effect.text for effect in problem.base]
+    effects = catalogue(problem.context.chain, base, drivers_of(problem.context))
+    variants = [one for effect in effects for one in variants_of(effect) if one.tries == 1][:150]
+    assert len(variants) == 150
+    found = benchmark(lambda: scan(see(now, variants)))
+    assert [one.candidate.family for one in found.findings] == ["EXX:reversal"]
+
+
+def test_whole_explanation_with_all_pitches_and_time_constants(benchmark: Any) -> None:
+    campaign = read_campaign(EXAMPLES / "hidden-spindle-growth")
+    found = benchmark(lambda: explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1)))
+    assert [one.effect for one in found.missing] == ["EZC1:const@warmup"]

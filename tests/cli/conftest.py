@@ -1,0 +1,112 @@
+"""The command line as a user types it: in this process where that is possible, in a process of its own where not."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import monitor
+from monitor.cli import main
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+EXAMPLES = CHECKOUT / "examples"
+CAMPAIGNS = ("five-days", "cold-cold", "hidden-reversal-x")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a verb said and how it ended."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def document(self) -> Any:
+        """The one JSON document on standard output; nothing may stand beside it."""
+        assert self.status in (0, 1), self.err
+        return json.loads(self.out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+
+
+Typed = Callable[..., Answer]
+
+
+@pytest.fixture
+def typed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Typed:
+    """``typed("campaigns", db=path)``: a verb run in this process, in an empty folder."""
+    monkeypatch.delenv("MONITOR_DB", raising=False)
+    monkeypatch.delenv("MONITOR_DEBUG", raising=False)
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+
+    def run(*arguments: object, db: Path | None = None) -> Answer:
+        capsys.readouterr()
+        before = [] if db is None else ["--db", str(db)]
+        try:
+            status = main([*before, *(str(one) for one in arguments)])
+        except SystemExit as ended:
+            status = int(ended.code or 0)
+        out, err = capsys.readouterr()
+        return Answer(status, out, err)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def environment() -> dict[str, str]:
+    """What a process of its own needs to find the package, wherever it is installed."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("MONITOR_")}
+    return {**kept, "PYTHONPATH": str(Path(monitor.__file__).parents[1])}
+
+
+@pytest.fixture
+def started(environment: dict[str, str], tmp_path: Path) -> Callable[..., subprocess.Popen[str]]:
+    """A verb as a process of its own, not waited for."""
+
+    def start(*arguments: object, **options: Any) -> subprocess.Popen[str]:
+        own = {**environment, **options.pop("env", {})}
+        return subprocess.Popen(
+            [sys.executable, "-m", "monitor.cli", *(str(one) for one in arguments)],
+            env=own, cwd=tmp_path, text=True, stdin=subprocess.DEVNULL,
+            **{"encoding": "utf-8", "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options},
+        )  # fmt: skip
+
+    return start
+
+
+@pytest.fixture(scope="session")
+def examples() -> Path:
+    """The example campaigns."""
+    return EXAMPLES
+
+
+@pytest.fixture(scope="session")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with three campaigns. Verbs that only add results may use it; others take ``db``."""
+    path = tmp_path_factory.mktemp("filled") / "shop floor ü.duckdb"
+    assert main(["--db", str(path), "import", *(str(EXAMPLES / name) for name in CAMPAIGNS)]) == 0
+    return path
+
+
+@pytest.fixture
+def db(filled: Path, tmp_path: Path) -> Path:
+    """A database of the test's own with the three campaigns."""
+    path = tmp_path / "own.duckdb"
+    shutil.copyfile(filled, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def laboratory() -> Path:
+    """What a made-up laboratory states about itself."""
+    return EXAMPLES / "laboratory.toml"

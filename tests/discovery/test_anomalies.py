@@ -1,0 +1,120 @@
+"""Bad points, balls that moved, steps, and what varies: told as that, at rates over seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from monitor.discovery import fit
+from monitor.discovery.anomalies import bad_points, ball_moves, plan_places
+from monitor.methods.samba import problem_of
+
+
+def test_places_are_the_same_probing_of_every_run(virtual_campaigns):
+    campaign, told = virtual_campaigns.virtual(1, days=1, runs_per_day=3)
+    places = plan_places(fit(problem_of(campaign)))
+    assert len(set(places)) == 62
+    for sequence in (1, 30, 62):
+        assert len(set(places[told["sequence"] == sequence])) == 1
+
+
+def test_places_of_plans_that_differ_go_by_what_was_probed(virtual_campaigns):
+    campaign, _ = virtual_campaigns.virtual(
+        1, days=1, runs_per_day=2, keep=lambda told: (told["run"] == 1) | (told["sequence"] > 20)
+    )
+    found = fit(problem_of(campaign))
+    places = plan_places(found)
+    context = found.problem.context
+    second = np.flatnonzero(context.run == 2)
+    for row in second[:10]:
+        first = np.flatnonzero((context.run == 1) & (places == places[row]))
+        assert len(first) == 1
+        assert context.target[first[0]] == context.target[row]
+        assert context.sequence[first[0]] == context.sequence[row]
+
+
+def test_false_alarms_for_points_and_balls_are_as_rare_as_stated(virtual_campaigns):
+    """At 1 % a campaign: 60 campaigns with more than four of either would be a chance of 1e-3."""
+    points = moves = 0
+    for seed in range(60):
+        campaign, _ = virtual_campaigns.virtual(seed, days=2, runs_per_day=3)
+        found = fit(problem_of(campaign))
+        points += bool(bad_points(found))
+        moves += bool(ball_moves(found))
+    assert points <= 4
+    assert moves <= 4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bad_points_are_found_with_axis_and_size_and_are_no_effect(virtual_campaigns, explained, seed):
+    bad = [(3, 9, (0.0, 60.0, 0.0)), (3, 40, (0.0, 0.0, -12.0)), (11, 9, (9.0, 0.0, 0.0))]
+    campaign, _ = virtual_campaigns.virtual(seed, bad_points=bad)
+    answer = explained(campaign)
+    assert answer.missing == ()
+    assert answer.moves == ()
+    assert answer.steps == ()
+    assert answer.comparison.verdict == "explained"
+    told = {(point.run, point.sequence): point for point in answer.suspect}
+    assert set(told) == {(3, 9), (3, 40), (11, 9)}
+    for run, sequence, off in bad:
+        axis = int(np.abs(off).argmax())
+        assert told[run, sequence].axis == "xyz"[axis]
+        assert told[run, sequence].size * 1e3 == pytest.approx(off[axis], abs=5.0)
+
+
+def test_a_bad_point_does_not_hide_an_effect(virtual_campaigns, explained):
+    sim = virtual_campaigns.simulator()
+    campaign, _ = virtual_campaigns.virtual(
+        4, [sim.Effect("EYX:poly2", peak_um=6.0)], bad_points=[(5, 20, (80.0, 0.0, 0.0))]
+    )
+    answer = explained(campaign)
+    assert [one.effect for one in answer.missing] == ["EYX:poly2"]
+    assert [(point.run, point.sequence) for point in answer.suspect] == [(5, 20)]
+
+
+def test_a_noisier_run_has_no_bad_points_for_that(virtual_campaigns, explained):
+    campaign, told = virtual_campaigns.virtual(6)
+    rng = np.random.default_rng(6)
+    for axis in "XYZ":
+        readings = campaign.probings.readings[axis]
+        readings[told["run"] == 7] += 2e-3 * rng.standard_normal(62)
+    answer = explained(campaign)
+    assert answer.suspect == ()
+    assert answer.moves == ()
+    assert answer.missing == ()
+
+
+def test_a_ball_that_moved_between_runs_is_a_step_of_that_ball_alone(virtual_campaigns, explained):
+    sim = virtual_campaigns.simulator()
+    loose = sim.Effect("ball:4:moved", coefficients=(0.004, -0.007, 0.003), at=(9, 1))
+    answer = explained(virtual_campaigns.virtual(5, [loose])[0])
+    (step,) = answer.steps
+    assert (step.parameter, step.target, step.run) == (None, "4", 9)
+    assert step.size == pytest.approx(-0.007, abs=1.5e-3)
+    assert answer.missing == ()
+    assert answer.moves == ()
+
+
+def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns, explained):
+    """No recorded column follows it, and no bad points or moved balls are invented."""
+    sim = virtual_campaigns.simulator()
+    sizes = np.random.default_rng(3).standard_normal(20)
+    sizes *= 2e-7 / np.std(sizes, ddof=1)
+    answer = explained(virtual_campaigns.virtual(3, [sim.Effect("EAX:poly1", coefficients=sizes)])[0])
+    (found,) = answer.missing
+    assert found.effect == "EAX:poly1@each_run"
+    assert found.varies
+    assert found.held_out_after is None
+    assert abs(found.amplitude - 2e-7) < 3 * found.u
+    assert "not recorded" in found.words.cause
+    assert answer.suspect == ()
+    assert answer.moves == ()
+    assert answer.comparison.verdict == "something is missing"
+
+
+def test_what_a_recorded_column_follows_is_not_said_to_vary(virtual_campaigns, explained):
+    sim = virtual_campaigns.simulator()
+    campaign, _ = virtual_campaigns.virtual(3, [sim.Effect("EAX:poly1@x_axis_degC", peak_um=8.0)])
+    (found,) = explained(campaign).missing
+    assert found.effect == "EAX:poly1@x_axis_degC"
+    assert not found.varies

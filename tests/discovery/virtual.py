@@ -1,0 +1,113 @@
+"""Virtual campaigns as records, from the independent simulator, without files. Loaded by path: tests/ is no package."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Artefact, AxisSettings, Ball, Campaign, Machine, Probe, Probings, Run, ScaleBar
+
+SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
+
+
+def simulator() -> ModuleType:
+    """The package tests/simulator."""
+    if "simulator" not in sys.modules:
+        spec = importlib.util.spec_from_file_location(
+            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
+        )
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    return sys.modules["simulator"]
+
+
+def as_campaign(
+    plan: Any,
+    machine: Any,
+    schedule: Any,
+    told: dict[str, Any],
+    *,
+    keep: npt.NDArray[np.bool_] | None = None,
+    stated_um: float | None = None,
+    with_channels: bool = True,
+) -> Campaign:
+    """The record of what the simulator told, as a reader makes it; ``stated_um`` is what the probe's file says."""
+    turning = {axis.name for axis in machine.chain.rotary}
+    probings = Probings(
+        told["run"],
+        told["sequence"],
+        told["time_s"],
+        told["target"],
+        {name: np.radians(r) if name in turning else r for name, r in told["readings"].items()},
+        told["channels"] if with_channels else {},
+    )
+    bar = plan.bar and ScaleBar(plan.bar, plan.bar_length_mm, plan.bar_uncertainty_mm, "simulated")
+    runs = zip(schedule.started_at, schedule.day, schedule.warm_up, schedule.ambient_degC, strict=True)
+    stated = plan.probe_uncertainty_um if stated_um is None else stated_um
+    return Campaign(
+        "virtual",
+        "samba",
+        Machine(
+            "V",
+            machine.topology,
+            axes={name: AxisSettings(name, int(sign)) for name, sign in machine.signs.items()},
+        ),
+        Probe("P", "p", stated * 1e-3),
+        Artefact(
+            "A", tuple(Ball(name, tuple(p), plan.ball_diameter_mm) for name, p in plan.balls.items()), bar
+        ),
+        tuple(
+            Run(number, start, day, warm, {"ambient_degC": float(ambient)} if with_channels else {})
+            for number, (start, day, warm, ambient) in enumerate(runs, 1)
+        ),
+        probings if keep is None else probings.rows(keep),
+    )
+
+
+def virtual(
+    seed: int,
+    effects: Any = (),
+    *,
+    noise_um: float = 1.0,
+    stated_um: float | None = None,
+    days: int = 5,
+    runs_per_day: int = 4,
+    cold: bool = False,
+    runs: int = 44,
+    terms: Any = None,
+    wander: float = 0.0,
+    keep: Any = None,
+    with_channels: bool = True,
+    **others: Any,
+) -> tuple[Campaign, dict[str, Any]]:
+    """A campaign of the five-days plan (or the cold-cold one) and what the simulator told.
+
+    ``terms`` replace base terms (numbers or one a run); ``wander`` is their scatter from run to run in parts of
+    their value; ``keep`` takes the told arrays and returns a mask of the probings that are kept.
+    """
+    sim = simulator()
+    rng = np.random.default_rng(seed)
+    plan = sim.cold_cold_plan() if cold else sim.five_days_plan()
+    schedule = (
+        sim.around_the_clock(rng, runs=runs)
+        if cold
+        else sim.working_days(rng, days=days, runs_per_day=runs_per_day)
+    )
+    base = {**sim.SAMBA_TERMS}
+    if wander:
+        base = sim.wandering(base, schedule, rng, per_run=wander)
+    machine = sim.hu40({**base, **(terms or {})}, effects)
+    told = sim.simulate(plan, machine, schedule, rng, noise_um=noise_um, **others)
+    mask = None if keep is None else keep(told)
+    campaign = as_campaign(
+        plan, machine, schedule, told, keep=mask, stated_um=stated_um, with_channels=with_channels
+    )
+    return campaign, told

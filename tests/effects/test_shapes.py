@@ -1,0 +1,272 @@
+"""Every shape of the language, column by column, by numbers worked out by hand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from monitor.effects import Context, drivers, parse_effect, shapes
+from monitor.exceptions import EffectError
+from monitor.machine import Joint, parse_topology
+from monitor.records import Array
+from monitor.units import METRE, MICROMETRE, Unit
+
+CHAIN = parse_topology("w C B X b Z Y (C1) t")
+ROOT_HALF = 0.7071067811865476
+
+
+def columns(text: str, context: Context) -> Array:
+    basis = parse_effect(text, context.chain).basis(context)
+    found: Array = basis.columns  # type: ignore[union-attr]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("EYX:const", [[1.0], [1.0], [1.0]]),
+        ("EXX:poly1", [[-200.0], [0.0], [50.0]]),
+        ("EYX:poly2", [[40000.0], [0.0], [2500.0]]),
+        ("EYX:poly3", [[-8e6], [0.0], [125e3]]),
+        ("EXX:cyclic400mm", [[-1.0, 0.0], [1.0, 0.0], [ROOT_HALF, ROOT_HALF]]),
+        ("EXX:cyclic0.5mm", [[1.0, 0.0], [1.0, 0.0], [1.0, 0.0]]),
+        ("EBB:harmonic1", [[0.0, 1.0], [ROOT_HALF, ROOT_HALF], [-1.0, 0.0]]),
+        ("EBB:harmonic2", [[-1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]),
+        ("EBB:harmonic3", [[0.0, -1.0], [-ROOT_HALF, ROOT_HALF], [-1.0, 0.0]]),
+        ("EAB:poly1", [[np.pi / 2], [np.pi / 4], [np.pi]]),
+        ("EXX:table2", [[1.0, 0.0], [0.2, 0.8], [0.0, 1.0]]),
+        ("EXX:table6", [[1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 1]]),
+        ("EZZ:table3", [[1.0, 0.0, 0.0]] * 3),
+        ("EXX:formula(2*x_mm + 1)", [[-399.0], [1.0], [101.0]]),
+        ("EXX:formula((x_mm > -10) * b_deg)", [[0.0], [45.0], [180.0]]),
+    ],
+)
+def test_language_of_effects_columns_by_hand(
+    make: Callable[..., Context], text: str, expected: list[list[float]]
+) -> None:
+    context = make(
+        {"X": [-200.0, 0.0, 50.0], "B": [np.pi / 2, np.pi / 4, np.pi]},
+        columns={"x_mm": [-200.0, 0.0, 50.0], "b_deg": [90.0, 45.0, 180.0]},
+    )
+    np.testing.assert_allclose(columns(text, context), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_table_hats_add_to_one_everywhere(make: Callable[..., Context]) -> None:
+    context = make({"X": np.linspace(-300.0, 200.0, 101).tolist()})
+    hats = columns("EXX:table", context)
+    assert hats.shape == (101, shapes.TABLE_NODES)
+    np.testing.assert_allclose(hats.sum(axis=1), 1.0, rtol=0, atol=1e-12)
+    assert hats.min() >= 0.0
+
+
+def test_reversal_keeps_the_sign_of_the_last_travel(make: Callable[..., Context]) -> None:
+    context = make({"X": [5.0, 7.0, 7.0, 6.0, 6.0, 9.0], "Y": [0.0, 0.0, -1.0, -1.0, 0.0, 0.0]})
+    assert columns("EXX:reversal", context).ravel().tolist() == [1, 1, 1, -1, -1, 1]
+    # Y has not moved before the third probing: no travel, no sign.
+    assert columns("EYY:reversal", context).ravel().tolist() == [0, 0, -1, -1, 1, 1]
+
+
+def test_reversal_begins_afresh_in_every_run(make: Callable[..., Context]) -> None:
+    context = make({"X": [-3.0, -9.0, -2.0, -2.0, -5.0, -1.0]}, run=[1, 1, 1, 2, 2, 2])
+    # Run 2 begins at -2, reached from the reference point at zero, although run 1 ended at -2 moving up.
+    assert columns("EXX:reversal", context).ravel().tolist() == [-1, -1, 1, -1, -1, 1]
+
+
+def test_reversal_of_runs_that_are_not_side_by_side(make: Callable[..., Context]) -> None:
+    context = make({"X": [1.0, -1.0, 3.0, -4.0, 2.0, -2.0]}, run=[1, 2, 1, 2, 1, 2])
+    assert columns("EXX:reversal", context).ravel().tolist() == [1, -1, 1, -1, -1, 1]
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "factor"),
+    [
+        ("EXX:poly1", "µm/m", 1e-6),
+        ("EYX:poly2", "µm/m²", 1e-9),
+        ("EYX:poly3", "µm/m³", 1e-12),
+        ("EYX:poly4", "µm/m^4", 1e-15),
+        ("EAX:poly1", "µrad/m", 1e-9),
+        ("EBB:poly1", "µrad/rad", 1e-6),
+        ("EBB:harmonic2", "µrad", 1e-6),
+        ("EXX:reversal", "µm", 1e-3),
+        ("EX0C", "µm", 1e-3),
+        ("EA0B", "µrad", 1e-6),
+        ("EXX:table", "µm", 1e-3),
+        ("EXX:cyclic20mm", "µm", 1e-3),
+        ("EXX:poly1@x_axis_degC", "µm/m/K", 1e-6),
+        ("EZC1:const@warmup", "µm", 1e-3),
+        ("EZC1:const@ambient_hPa", "µm/hPa", 1e-3),
+        ("EZC1:const@time_s", "µm/s", 1e-3),
+        ("artefact:expansion@ambient_degC", "µm/m/K", 1e-6),
+        ("stem:gravity", "µm", 1e-3),
+        ("ball:2:moved(run 7, sequence 23)", "µm", 1e-3),
+    ],
+)
+def test_unit_of_the_amplitude(text: str, unit: str, factor: float) -> None:
+    effect = parse_effect(text, CHAIN)
+    assert effect.unit.name == unit
+    assert effect.unit.factor == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("EA0B", ("EA0B",)),
+        ("EA0B:const", ("EA0B",)),
+        ("EXX:poly1", ("EXX",)),
+        ("EXX:poly1@run_time", ("EXX:poly1@run_time",)),
+        ("EYX:poly1", ("EYX:poly1",)),
+        ("EX0X:poly1", ("EX0X:poly1",)),
+        ("EBB:poly1", ("EBB:poly1",)),
+        ("EZC1:const@warmup", ("EZC1:const@warmup",)),
+        ("EBB:harmonic2", ("EBB:harmonic2.cos", "EBB:harmonic2.sin")),
+        ("EXX:table2", ("EXX:table2.node1", "EXX:table2.node2")),
+        (
+            "EAB:harmonic1@gravity",
+            tuple(f"EAB:harmonic1@gravity.{s}.{g}" for s in ("cos", "sin") for g in ("gx", "gy", "gz")),
+        ),
+    ],
+)
+def test_names_of_the_coefficients(make: Callable[..., Context], text: str, names: tuple[str, ...]) -> None:
+    context = make({"X": [1.0, 2.0]})
+    effect = parse_effect(text, CHAIN)
+    assert effect.parameters(context) == names
+    assert columns(text, context).shape == (2, len(names))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("EXX", "'EXX' is an error motion and needs a shape: write for example EXX:poly1 or EXX:const"),
+        ("EXX:poly0", "there is no shape 'poly0'; there are const, poly1 to poly9"),
+        ("EXX:poly10", "there is no shape 'poly10'"),
+        ("EXX:wave", "there is no shape 'wave'"),
+        ("EXX:table100", "there is no shape 'table100'"),
+        ("EXX:Const", "there is no shape 'Const'"),
+        ("EXX:cyclicmm", "there is no shape 'cyclicmm'"),
+        ("EXX:cyclic-20mm", "there is no shape 'cyclic-20mm'"),
+        ("EXX:harmonic1", "a harmonic belongs to a rotary axis; for X write cyclic20mm"),
+        ("EBB:cyclic20mm", "a cyclic pitch in mm belongs to a linear axis; for B write harmonic1"),
+        ("EXQ:poly1", "'EXQ' is no geometric error of 'w C B X b Z Y (C1) t'"),
+        ("", "'' is no geometric error of"),
+        ("EXX:poly1@", "'EXX:poly1@' ends in @ without a driver; write for example EXX:poly1@warmup"),
+        (
+            "EXX:poly1@sunshine",
+            "there is no driver '@sunshine'; there are @warmup (or @warmup45min), @run_time",
+        ),
+        ("EXX:poly1@warmup0min", "the time constant of @warmup must be above 0 min"),
+        ("EXX:poly1@warmup-5min", "there is no driver '@warmup-5min'"),
+        ("ball:2:moved", "must say when: write ball:2:moved(run 7, sequence 23)"),
+        ("ball:2", "there is no effect 'ball:2' of the artefact"),
+        ("stem:wind", "there is no effect 'stem:wind' of the artefact; there are"),
+    ],
+)
+def test_refusals_say_what_would_be_right(text: str, words: str) -> None:
+    with pytest.raises(EffectError, match=re.escape(words)):
+        parse_effect(text, CHAIN)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("EXX:table1", "table1 has too few nodes; write table or table2 and above"),
+        ("EXX:table0", "table0 has too few nodes"),
+        ("EXX:cyclic0mm", "the pitch of cyclic0mm must be above 0 mm"),
+        ("EXX:formula(q_mm)", "names 'q_mm', which was not recorded; recorded are x_mm"),
+    ],
+)
+def test_refusals_that_need_the_data(make: Callable[..., Context], text: str, words: str) -> None:
+    context = make({"X": [1.0, 2.0]}, columns={"x_mm": [1.0, 2.0]})
+    with pytest.raises(EffectError, match=re.escape(words)):
+        columns(text, context)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["EA0B", "EXX:poly1", "EBB:harmonic2@warmup", "EXX:formula(sin(x_mm) > 0)@run_time", "stem:gravity"],
+)
+def test_an_effect_writes_itself_as_it_is_read(text: str) -> None:
+    assert parse_effect(f"  {text} ", CHAIN).text == text
+    assert parse_effect(parse_effect(text, CHAIN).text, CHAIN) == parse_effect(text, CHAIN)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A user's shape: 0 below a position, 1 above; its name has a word in it."""
+
+    side: str
+    at: str
+    pattern: ClassVar[str] = r"step_(?P<side>up|down)(?P<at>-?\d+)mm"
+    labels: ClassVar[tuple[str, ...]] = ("",)
+
+    def columns(self, context: Context, joint: int) -> Array:
+        above: Array = (context.positions[:, joint, None] > float(self.at)).astype(float)
+        return above if self.side == "up" else 1.0 - above
+
+    def unit(self, base: Unit, joint: Joint) -> Unit:
+        return base
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A user's driver: the shift of the day."""
+
+    name: str
+    pattern: ClassVar[str] = r"shift_(?P<name>early|late)"
+
+    def labels(self, context: Context) -> tuple[str, ...]:
+        return ("",)
+
+    def columns(self, context: Context, joint: int | None) -> Array:
+        late: Array = (context.day_time[:, None] > 3600.0).astype(float)
+        return late if self.name == "late" else 1.0 - late
+
+    def unit(self) -> Unit:
+        return MICROMETRE.per(METRE)
+
+
+def test_shape_and_driver_of_the_user_come_through_the_entry_point(
+    make: Callable[..., Context], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    groups: dict[str, tuple[Any, ...]] = {"monitor.shapes": (Step,), "monitor.drivers": (Shift,)}
+    monkeypatch.setattr(shapes, "plug_ins", groups.__getitem__)
+    monkeypatch.setattr(drivers, "plug_ins", groups.__getitem__)
+    context = make({"X": [-20.0, 5.0, 30.0, 40.0]}, day_time=[0.0, 10.0, 20.0, 4000.0])
+    assert columns("EXX:step_up10mm", context).ravel().tolist() == [0, 0, 1, 1]
+    assert columns("EXX:step_down-5mm", context).ravel().tolist() == [1, 0, 0, 0]
+    assert columns("EXX:step_up10mm@shift_late", context).ravel().tolist() == [0, 0, 0, 1]
+    assert columns("EXX:const@shift_early", context).ravel().tolist() == [1, 1, 1, 0]
+    assert parse_effect("EXX:step_up10mm", CHAIN).parameters(context) == ("EXX:step_up10mm",)
+    # What is built in stays as it was.
+    assert columns("EXX:poly1", context).ravel().tolist() == [-20, 5, 30, 40]
+
+
+def test_plug_ins_are_found_by_entry_point_group(monkeypatch: pytest.MonkeyPatch) -> None:
+    from monitor.effects import registry
+
+    @dataclass(frozen=True)
+    class Point:
+        name: str
+        what: type
+
+        def load(self) -> type:
+            return self.what
+
+    asked = []
+
+    def entry_points(*, group: str) -> list[Point]:
+        asked.append(group)
+        return [Point("zeta", Shift), Point("alpha", Step)]
+
+    monkeypatch.setattr(registry, "entry_points", entry_points)
+    registry.plug_ins.cache_clear()
+    try:
+        assert registry.plug_ins("monitor.shapes") == (Step, Shift)
+        assert registry.plug_ins("monitor.shapes") == (Step, Shift)
+        assert asked == ["monitor.shapes"]
+    finally:
+        registry.plug_ins.cache_clear()

@@ -1,0 +1,133 @@
+"""Simulated campaigns as records. The independent simulator is loaded by path: tests/ is no package."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from monitor.records import (
+    Array,
+    Artefact,
+    AxisSettings,
+    Ball,
+    Campaign,
+    Machine,
+    Probe,
+    Probings,
+    Run,
+    ScaleBar,
+)
+
+SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
+
+
+@pytest.fixture(scope="session")
+def simulator() -> ModuleType:
+    """The package tests/simulator."""
+    if "simulator" not in sys.modules:
+        spec = importlib.util.spec_from_file_location(
+            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
+        )
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    return sys.modules["simulator"]
+
+
+@pytest.fixture(scope="session")
+def recorded() -> Callable[..., Campaign]:
+    """Builds the campaign record of what the simulator told, as a reader would."""
+
+    def build(
+        plan: Any,
+        machine: Any,
+        schedule: Any,
+        told: dict[str, Any],
+        *,
+        keep: npt.NDArray[np.bool_] | None = None,
+    ) -> Campaign:
+        turning = {axis.name for axis in machine.chain.rotary}
+        probings = Probings(
+            told["run"],
+            told["sequence"],
+            told["time_s"],
+            told["target"],
+            {name: np.radians(r) if name in turning else r for name, r in told["readings"].items()},
+            told["channels"],
+        )
+        bar = plan.bar and ScaleBar(plan.bar, plan.bar_length_mm, plan.bar_uncertainty_mm, "simulated")
+        runs = zip(schedule.started_at, schedule.day, schedule.warm_up, schedule.ambient_degC, strict=True)
+        return Campaign(
+            "simulated",
+            "samba",
+            Machine(
+                "S",
+                machine.topology,
+                axes={name: AxisSettings(name, int(sign)) for name, sign in machine.signs.items()},
+            ),
+            Probe("P", "p", plan.probe_uncertainty_um * 1e-3),
+            Artefact(
+                "A", tuple(Ball(name, tuple(p), plan.ball_diameter_mm) for name, p in plan.balls.items()), bar
+            ),
+            tuple(
+                Run(number, start, day, warm, {"ambient_degC": float(ambient)})
+                for number, (start, day, warm, ambient) in enumerate(runs, 1)
+            ),
+            probings if keep is None else probings.rows(keep),
+        )
+
+    return build
+
+
+Told = dict[str, Any]
+
+
+@pytest.fixture
+def simulated(
+    simulator: ModuleType, recorded: Callable[..., Campaign]
+) -> Callable[..., tuple[Told, Campaign]]:
+    """What the simulator told of one run of the five-day plan (or what is asked for), and the record of it."""
+
+    def make(
+        seed: int,
+        *,
+        scale: float = 1.0,
+        days: int = 1,
+        runs: int = 1,
+        plan: Any = None,
+        effects: tuple[Any, ...] = (),
+        **options: Any,
+    ) -> tuple[Told, Campaign]:
+        rng = np.random.default_rng(seed)
+        plan = plan or simulator.five_days_plan()
+        schedule = simulator.working_days(rng, days, runs)
+        terms = {name: value * scale for name, value in simulator.SAMBA_TERMS.items()}
+        machine = simulator.hu40(terms, effects)
+        told = simulator.simulate(plan, machine, schedule, rng, **({"noise_um": 1.0} | options))
+        return told, recorded(plan, machine, schedule, told)
+
+    return make
+
+
+@pytest.fixture
+def truth(simulator: ModuleType) -> Array:
+    return np.array(list(simulator.SAMBA_TERMS.values()))
+
+
+@pytest.fixture(scope="session")
+def distance() -> Callable[[Array, Array], float]:
+    """(x - truth)' C^-1 (x - truth), chi-square of as many degrees of freedom where C is right."""
+
+    def of(error: Array, covariance: Array) -> float:
+        return float(error @ np.linalg.solve(covariance, error))
+
+    return of

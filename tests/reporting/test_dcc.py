@@ -1,0 +1,151 @@
+"""The digital certificate: valid by PTB's schemas (where at hand), the record's numbers to the last bit."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import os
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pypdf
+import pytest
+
+from monitor.exceptions import InputError
+from monitor.reporting.certificate import (
+    CertificateRecord,
+    ConformityStatement,
+    ConformityVerdict,
+    IncompleteCertificateError,
+)
+from monitor.reporting.dcc import DCC, SI, dcc_xml, unit_of
+from monitor.reporting.render import certificate_pdf
+from monitor.reporting.results import RefusedParameters
+
+Make = Callable[..., CertificateRecord]
+SPACES = {"dcc": DCC, "si": SI}
+#: PTB's schemas are not ours to ship: they lie beside the checkout, or where this variable says.
+SCHEMAS = Path(
+    os.environ.get(
+        "MONITOR_DCC_SCHEMAS", Path(__file__).resolve().parents[3] / "shared" / "references" / "dcc"
+    )
+)
+#: The signature schema of the W3C, which the DCC's imports and this writer does not use: an element of any content.
+SIGNATURE = """<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" targetNamespace="http://www.w3.org/2000/09/xmldsig#">
+<xs:element name="Signature" type="xs:anyType"/></xs:schema>"""
+
+
+@pytest.fixture(scope="module")
+def record(make_record: Make) -> CertificateRecord:
+    """A record with everything that a digital certificate can hold."""
+    made = make_record(13, (RefusedParameters(("EX0C1", "EY0C1"), "C1 stands at one angle"),))
+    verdicts = tuple(
+        ConformityVerdict(f"EA0{place}", "µrad", 40.0, verdict, 0.5)
+        for place, verdict in enumerate(("pass", "fail", "conditional pass", "conditional fail", "undecided"))
+    )
+    return dataclasses.replace(
+        made,
+        country="DE",
+        conformity=ConformityStatement("a rule", "a risk", verdicts, 0.5),
+        accreditation="none",
+    )
+
+
+@pytest.fixture(scope="module")
+def tree(record: CertificateRecord) -> ET.Element:
+    return ET.fromstring(dcc_xml(record))
+
+
+def test_ptb_dcc_3_2_1_schema_validates_every_part(record: CertificateRecord, make_record: Make) -> None:
+    etree = pytest.importorskip("lxml.etree", reason="lxml validates XML schemas")
+    if not (SCHEMAS / "dcc-3.2.1.xsd").is_file():
+        pytest.skip(f"PTB's schemas are not in {SCHEMAS}; $MONITOR_DCC_SCHEMAS names another folder")
+
+    class Local(etree.Resolver):  # type: ignore[misc, name-defined]
+        def resolve(self, url: str, public_id: str, context: object) -> object:
+            if "xmldsig" in url:
+                return self.resolve_string(SIGNATURE, context)
+            if "SI_Format" in url:
+                return self.resolve_filename(str(SCHEMAS / "SI_Format-2.1.0.xsd"), context)
+            return None
+
+    parser = etree.XMLParser()
+    parser.resolvers.add(Local())
+    schema = etree.XMLSchema(etree.parse(str(SCHEMAS / "dcc-3.2.1.xsd"), parser))
+    for one in (
+        record,
+        dataclasses.replace(make_record(30), country="FR"),
+        dataclasses.replace(make_record(1), country="US"),
+    ):
+        schema.assertValid(etree.fromstring(dcc_xml(one)))
+    broken = dcc_xml(record).replace(b"coverageFactor>", b"coverFactor>")
+    assert not schema.validate(etree.fromstring(broken))
+
+
+@pytest.mark.parametrize(("region", "factor"), [("ellipsoidal", "k_p"), ("rectangular", "k_q")])
+def test_d_si_2_1_both_regions_hold_the_covariance_to_the_last_bit(
+    tree: ET.Element, record: CertificateRecord, region: str, factor: str
+) -> None:
+    assert record.results is not None
+    (result,) = record.results
+    (around,) = tree.iterfind(f".//si:{region}RegionXMLList", SPACES)
+    columns = around.findall("si:covarianceMatrix/si:column", SPACES)
+    values = [
+        [float(str(one.text)) for one in column.iterfind("si:covariance/si:value", SPACES)]
+        for column in columns
+    ]
+    assert np.array_equal(np.array(values).T, result.covariance)
+    assert float(str(around.findtext("si:coverageFactor", None, SPACES))) == getattr(result, factor)
+    assert float(str(around.findtext("si:coverageProbability", None, SPACES))) == result.p
+    units = [one.text for one in columns[0].iterfind("si:covariance/si:unit", SPACES)]
+    assert units[:3] == [r"\micro\radian\micro\radian"] * 2 + [r"\micro\metre\micro\radian"]
+
+
+def test_d_si_2_1_lists_hold_names_values_and_units(tree: ET.Element, record: CertificateRecord) -> None:
+    assert record.results is not None
+    (result,) = record.results
+    lists = tree.findall(".//si:realListXMLList", SPACES)
+    assert len(lists) == 2
+    for one in lists:
+        assert str(one.findtext("si:labelXMLList", None, SPACES)).split() == list(result.names)
+        found = [float(number) for number in str(one.findtext("si:valueXMLList", None, SPACES)).split()]
+        assert found == result.estimate.tolist()
+        assert str(one.findtext("si:unitXMLList", None, SPACES)).split() == [
+            unit_of(unit) for unit in result.units
+        ]
+
+
+def test_every_statement_of_the_record_is_in_it(tree: ET.Element, record: CertificateRecord) -> None:
+    text = " ".join("".join(tree.itertext()).split())
+    assert record.method is not None
+    assert record.customer is not None
+    for words in (
+        record.title, record.number, record.place, record.traceability, record.relates_only, record.reproduction,
+        record.method.document, record.customer.name, "C1 stands at one angle", "bar certificate 2016-04", "a rule",
+    ):  # fmt: skip
+        assert " ".join(str(words).split()) in text
+    status = [one.text for one in tree.iterfind(".//dcc:conformity", SPACES)]
+    assert status == ["pass", "fail", "conditionalPass", "conditionalFail", "noPass"]
+
+
+def test_it_travels_inside_the_pdf_where_the_country_is_known(
+    record: CertificateRecord, make_record: Make
+) -> None:
+    attached = pypdf.PdfReader(
+        io.BytesIO(certificate_pdf(dataclasses.replace(make_record(), country="DE")))
+    ).attachments
+    assert attached["certificate.dcc.xml"][0] == dcc_xml(dataclasses.replace(make_record(), country="DE"))
+    assert (
+        "certificate.dcc.xml" not in pypdf.PdfReader(io.BytesIO(certificate_pdf(make_record()))).attachments
+    )
+
+
+def test_what_is_missing_is_refused_and_not_invented(make_record: Make) -> None:
+    with pytest.raises(InputError, match=r"country by two letters \(ISO 3166-1\).*it has None"):
+        dcc_xml(make_record())
+    with pytest.raises(IncompleteCertificateError, match="place where the calibration was performed"):
+        dcc_xml(dataclasses.replace(make_record(), country="DE", place=None))
+    with pytest.raises(InputError, match="unit furlong has no D-SI notation"):
+        unit_of("furlong")

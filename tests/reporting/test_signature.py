@@ -1,0 +1,139 @@
+"""PAdES signatures: the certificate below stays as it is, and one altered byte anywhere is seen."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pypdf
+import pytest
+
+from monitor.exceptions import InputError
+from monitor.reporting.certificate import CertificateRecord
+from monitor.reporting.render import certificate_pdf
+
+pytest.importorskip("pyhanko", reason="the extra [sign] is not installed")
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import rsa
+from cryptography.hazmat.primitives.serialization import BestAvailableEncryption, Encoding, pkcs12
+from cryptography.x509.oid import NameOID
+
+from monitor.reporting.signature import check_signature, sign
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """PKCS#12 and PEM of a made-up laboratory, and the PEM of another one."""
+    folder = tmp_path_factory.mktemp("keys")
+    found = {}
+    for name in ("lab", "other"):
+        key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+        subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, f"Made-up Laboratory {name}")])
+        now = datetime.now(UTC)
+        certificate = (
+            x509.CertificateBuilder()
+            .subject_name(subject)
+            .issuer_name(subject)
+            .public_key(key.public_key())
+            .serial_number(7)
+            .not_valid_before(now - timedelta(days=1))
+            .not_valid_after(now + timedelta(days=30))
+            .add_extension(x509.KeyUsage(True, True, *[False] * 7), critical=True)
+            .sign(key, hashes.SHA256())
+        )
+        found[name] = folder / f"{name}.p12"
+        found[name].write_bytes(
+            pkcs12.serialize_key_and_certificates(
+                name.encode(), key, certificate, None, BestAvailableEncryption(b"words")
+            )
+        )
+        found[f"{name}.pem"] = folder / f"{name}.pem"
+        found[f"{name}.pem"].write_bytes(certificate.public_bytes(Encoding.PEM))
+    return found
+
+
+@pytest.fixture(scope="module")
+def plain(make_record: Callable[..., CertificateRecord]) -> bytes:
+    return certificate_pdf(make_record())
+
+
+@pytest.fixture(scope="module")
+def signed(plain: bytes, keys: dict[str, Path]) -> bytes:
+    return sign(plain, keys["lab"], "words")
+
+
+def test_en_319_142_the_document_lies_unchanged_below_its_signature(plain: bytes, signed: bytes) -> None:
+    assert signed.startswith(plain)
+    finding = check_signature(signed)
+    assert finding.good is True
+    assert finding.signer == "Common Name: Made-up Laboratory lab"
+    assert finding.faults == ()
+    reader = pypdf.PdfReader(io.BytesIO(signed))
+    field = reader.root_object["/AcroForm"]["/Fields"][0].get_object()
+    assert field["/V"]["/SubFilter"] == "/ETSI.CAdES.detached"
+
+
+def test_signing_keeps_pdf_a_and_attachments(plain: bytes, signed: bytes) -> None:
+    before, after = (pypdf.PdfReader(io.BytesIO(content)) for content in (plain, signed))
+    assert before.attachments == after.attachments
+    assert len(after.root_object["/AF"]) == 3
+    for name in ("/Metadata", "/OutputIntents", "/MarkInfo"):
+        assert name in after.root_object
+    assert 'pdfaid:part="3"' in after.root_object["/Metadata"].get_object().get_data().decode("utf-8")
+
+
+def test_one_altered_byte_at_200_random_places_is_seen(signed: bytes) -> None:
+    rng = np.random.default_rng(200)
+    unseen = []
+    for place in rng.integers(0, len(signed), 200):
+        altered = bytearray(signed)
+        altered[place] ^= 1 << int(rng.integers(0, 8))
+        if check_signature(bytes(altered)).good is True:
+            unseen.append(int(place))
+    assert unseen == []
+
+
+def test_an_altered_attachment_is_seen_and_named_as_altered(plain: bytes, signed: bytes) -> None:
+    start = plain.index(b"/EmbeddedFile")
+    inside = plain.index(b"stream", start) + 40
+    altered = bytearray(signed)
+    altered[inside] ^= 1
+    finding = check_signature(bytes(altered))
+    assert finding.good is False
+    assert "the file was altered after it was signed" in finding.faults
+
+
+def test_what_is_added_afterwards_is_seen(signed: bytes) -> None:
+    finding = check_signature(signed + b"\n% and more\n")
+    assert finding.good is False
+    assert any("does not cover the whole file" in fault for fault in finding.faults)
+
+
+def test_trust_is_said_only_against_certificates_that_are_given(signed: bytes, keys: dict[str, Path]) -> None:
+    assert check_signature(signed, keys["lab.pem"]).good is True
+    finding = check_signature(signed, keys["other.pem"])
+    assert finding.good is False
+    assert finding.faults == (
+        "the certificate of Common Name: Made-up Laboratory lab does not lead to a trusted one",
+    )
+
+
+def test_an_unsigned_certificate_has_no_finding(plain: bytes) -> None:
+    assert check_signature(plain).good is None
+
+
+def test_keys_that_do_not_open_are_refused(plain: bytes, keys: dict[str, Path], tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"lab\.p12 is no PKCS#12 file with a key, or its passphrase is another"
+    ):
+        sign(plain, keys["lab"], "other words")
+    with pytest.raises(InputError, match=r"other\.pem is no PKCS#12 file"):
+        sign(plain, keys["other.pem"], None)
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        sign(plain, tmp_path / "none.p12", None)
+    with pytest.raises(InputError, match="cannot be read as certificates"):
+        check_signature(sign(plain, keys["lab"], "words"), tmp_path / "none.pem")

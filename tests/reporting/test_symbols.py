@@ -1,0 +1,33 @@
+"""ISO 230-1 symbols in words."""
+
+from __future__ import annotations
+
+import pytest
+
+from monitor.reporting.symbols import describe
+
+
+@pytest.mark.parametrize(
+    ("symbol", "words"),
+    [
+        ("EA0B", "orientation about X of axis B"),
+        ("EB0Z", "orientation about Y of axis Z"),
+        ("EB0B", "zero angle of axis B"),
+        ("EX0C", "position in X of axis C"),
+        ("EY0C1", "position in Y of spindle C1"),
+        ("EXX", "positioning gain of axis X"),
+        ("EXX:poly1", "positioning gain of axis X"),
+        ("EXX:cyclic20mm", "positioning error of axis X (cyclic20mm)"),
+        ("EXX:poly1@x_axis_degC", "positioning error of axis X (poly1@x_axis_degC)"),
+        ("EYX:poly2", "straightness error in Y of axis X (poly2)"),
+        ("EAX", "roll of axis X"),
+        ("EBX", "tilt about Y of axis X"),
+        ("EBB:harmonic2", "angular positioning error of axis B (harmonic2)"),
+        ("EAB", "tilt about X of axis B"),
+        ("EZC1:const@warmup", "axial displacement of spindle C1 (const@warmup)"),
+        ("EXC", "displacement in X of axis C"),
+        ("ball:2:moved", "ball:2:moved"),
+    ],
+)
+def test_iso_230_1_symbol_in_words(symbol: str, words: str) -> None:
+    assert describe(symbol) == words

@@ -1,0 +1,148 @@
+"""Opening, sharing and refusing a database file, in words; transactions that are all or nothing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from monitor.exceptions import StoreError
+from monitor.records import Campaign
+from monitor.store import Database, import_campaign, list_campaigns, verify_audit
+
+_HOLD = """
+import sys, duckdb
+connection = duckdb.connect(sys.argv[1])
+print("open", flush=True)
+sys.stdin.read()
+"""
+
+_OPEN = """
+import sys
+from monitor.exceptions import StoreError
+from monitor.store import Database
+try:
+    Database(sys.argv[1], read_only=sys.argv[2] == "read")
+except StoreError as fault:
+    print(fault)
+    sys.exit(2)
+"""
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_second_process_names_the_pid_of_the_first(path: Path, read_only: bool) -> None:
+    Database(path).close()
+    with subprocess.Popen(
+        [sys.executable, "-c", _HOLD, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "open\n"
+        with pytest.raises(StoreError, match=rf"is in use by another process, .*\(PID {holder.pid}\)"):
+            Database(path, read_only=read_only)
+        holder.communicate()
+    with Database(path, read_only=read_only) as db:
+        assert db.rows("SELECT count(*) FROM campaign") == [(0,)]
+
+
+def test_other_process_is_told_while_this_one_works(db: Database, path: Path) -> None:
+    told = subprocess.run(
+        [sys.executable, "-c", _OPEN, str(path), "read"], capture_output=True, text=True, check=False
+    )
+    assert told.returncode == 2
+    assert "in use by another process" in told.stdout
+    assert told.stderr == ""
+
+
+def test_same_process_with_other_options(db: Database, path: Path) -> None:
+    with pytest.raises(StoreError, match="open in this process already, with other options"):
+        Database(path, read_only=True)
+
+
+def test_reading_what_is_not_there_says_how_to_make_it(tmp_path: Path) -> None:
+    with pytest.raises(
+        StoreError, match=r"there is no database .*none\.duckdb; `monitor --db .* import FOLDER`"
+    ):
+        Database(tmp_path / "none.duckdb", read_only=True)
+    assert not (tmp_path / "none.duckdb").exists()
+
+
+def test_file_that_is_no_database(tmp_path: Path) -> None:
+    (tmp_path / "letter.txt").write_text("Dear auditor, " * 1000)
+    with pytest.raises(StoreError, match=r"letter\.txt is not a database of this software"):
+        Database(tmp_path / "letter.txt")
+
+
+def test_folder_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"the folder of .*m\.duckdb does not exist"):
+        Database(tmp_path / "nowhere" / "m.duckdb")
+
+
+def test_folder_instead_of_a_file(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="is a folder; name a file"):
+        Database(tmp_path)
+
+
+def test_threads_one_is_one_thread(path: Path) -> None:
+    with Database(path, threads=1) as db:
+        assert db.rows("SELECT current_setting('threads')") == [(1,)]
+
+
+def test_threads_below_one(path: Path) -> None:
+    with pytest.raises(StoreError, match="threads must be at least 1, not 0"):
+        Database(path, threads=0)
+
+
+def test_database_in_memory_needs_no_file() -> None:
+    with Database(":memory:") as db:
+        assert db.rows("SELECT count(*) FROM schema_migration")[0][0] >= 3
+
+
+def test_nothing_is_fetched_from_the_network(db: Database) -> None:
+    names = ("autoinstall_known_extensions", "autoload_known_extensions")
+    assert [db.rows("SELECT current_setting(?)", [name]) for name in names] == [[(False,)], [(False,)]]
+
+
+def _insert_machine(db: Database, name: str) -> None:
+    db.execute("INSERT INTO machine VALUES (?, 'w X b Y t', '2026-01-01')", [name])
+
+
+def _fail_inside(db: Database) -> None:
+    with db.transaction():
+        _insert_machine(db, "first")
+        with db.transaction():
+            _insert_machine(db, "second")
+        raise RuntimeError("pulled the plug")
+
+
+def test_transaction_keeps_nothing_of_a_failure_nor_of_what_joined_it(db: Database) -> None:
+    with pytest.raises(RuntimeError, match="pulled the plug"):
+        _fail_inside(db)
+    assert db.rows("SELECT machine FROM machine") == []
+    with db.transaction():
+        _insert_machine(db, "third")
+    assert db.rows("SELECT machine FROM machine") == [("third",)]
+
+
+def test_read_only_refuses_changes(path: Path) -> None:
+    Database(path).close()
+    with (
+        Database(path, read_only=True) as db,
+        pytest.raises(StoreError, match="opened for reading only; nothing can be changed"),
+        db.transaction(),
+    ):
+        _insert_machine(db, "any")
+
+
+def test_threads_share_a_database_as_if_one_after_the_other(
+    db: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    names = [f"campaign {number}" for number in range(12)]
+    with ThreadPoolExecutor(4) as pool:
+        states = list(pool.map(lambda name: import_campaign(db, make_campaign(name)).state, names * 2))
+    assert (states.count("imported"), states.count("unchanged")) == (12, 12)
+    assert sorted(list_campaigns(db)["campaign"]) == sorted(names)
+    assert verify_audit(db).faults == ()

@@ -1,0 +1,86 @@
+"""Results kept as documents, and events: what was stored comes back, the latest first, and bad input is refused."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta, timezone
+
+import pytest
+
+from monitor import __version__
+from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.records import Campaign
+from monitor.store import (
+    Database,
+    import_campaign,
+    list_analyses,
+    list_events,
+    load_analysis,
+    record_event,
+    save_analysis,
+)
+
+DOCUMENT = {"guf": {"k_p": 4.73, "u": {"EA0B": 1 / 3}}, "note": 'weiß "nicht"', "runs": [1, 2]}
+
+
+def test_document_comes_back_with_seed_and_version(db: Database, campaign: Campaign) -> None:
+    import_campaign(db, campaign)
+    seed = 2**127 + 1
+    save_analysis(db, "uncertainty", DOCUMENT, method="mcm", campaign=campaign.name, run=2, seed=seed)
+    stored = load_analysis(db, "uncertainty", campaign=campaign.name, run=2)
+    assert (stored.document, stored.seed, stored.software_version) == (DOCUMENT, seed, __version__)
+    assert stored.model is None
+
+
+def test_latest_of_its_kind_is_given_and_the_earlier_stays(db: Database, campaign: Campaign) -> None:
+    import_campaign(db, campaign)
+    for number, method in enumerate(("guf", "mcm", "guf"), start=1):
+        assert (
+            save_analysis(db, "uncertainty", {"n": number}, method=method, campaign=campaign.name) == number
+        )
+    save_analysis(db, "comparison", {"n": 4}, method="lack of fit", campaign=campaign.name, model="samba")
+    assert load_analysis(db, "uncertainty").number == 3
+    assert load_analysis(db, "uncertainty", method="mcm").number == 2
+    assert load_analysis(db, "comparison", machine=campaign.machine.id, model="samba").number == 4
+    assert list(list_analyses(db, "uncertainty")["analysis_id"]) == [3, 2, 1]
+
+
+def test_document_that_is_not_json(db: Database) -> None:
+    with pytest.raises(DataError, match=r"the trend result cannot be kept as JSON: [Oo]ut of range float"):
+        save_analysis(db, "trend", {"slope": float("nan")}, method="robust")
+    with pytest.raises(DataError, match="the trend result cannot be kept as JSON"):
+        save_analysis(db, "trend", {"slope": object()}, method="robust")
+    with pytest.raises(InputError, match="a result needs a kind"):
+        save_analysis(db, "", {}, method="robust")
+
+
+def test_result_of_what_is_not_there(db: Database, campaign: Campaign) -> None:
+    with pytest.raises(NotFoundError, match="there is no campaign 'x'"):
+        save_analysis(db, "trend", {}, method="m", campaign="x")
+    with pytest.raises(NotFoundError, match="there is no machine 'x'"):
+        save_analysis(db, "trend", {}, method="m", machine="x")
+    with pytest.raises(NotFoundError, match="no stored trend result of x, run 2 yet"):
+        load_analysis(db, "trend", campaign="x", run=2)
+
+
+def test_event_is_kept_with_the_shops_clock(db: Database, campaign: Campaign) -> None:
+    import_campaign(db, campaign)
+    at = datetime(2026, 3, 5, 23, 30, tzinfo=timezone(timedelta(hours=-5)))
+    later = record_event(db, campaign.machine.id, at, "repair", "B zero reset; it's fine")
+    first = record_event(db, campaign.machine.id, at - timedelta(days=1), "crash", "")
+    assert list(list_events(db, campaign.machine.id)["event_id"]) == [first, later]
+    assert db.rows(
+        "SELECT CAST(happened_at AS VARCHAR), CAST(happened_at_local AS VARCHAR), kind, description "
+        "FROM v_events WHERE event_id = ?",
+        [later],
+    ) == [("2026-03-06 04:30:00", "2026-03-05 23:30:00", "repair", "B zero reset; it's fine")]
+
+
+def test_event_needs_machine_kind_and_offset(db: Database, campaign: Campaign) -> None:
+    import_campaign(db, campaign)
+    at = datetime(2026, 3, 5, 23, 30)
+    with pytest.raises(InputError, match="needs its offset from UTC; 2026-03-05T23:30:00 has none"):
+        record_event(db, campaign.machine.id, at, "repair", "")
+    with pytest.raises(InputError, match="an event needs a kind"):
+        record_event(db, campaign.machine.id, at.astimezone(), " ", "")
+    with pytest.raises(NotFoundError, match="there is no machine 'x'; there are HU40 'T'"):
+        record_event(db, "x", at.astimezone(), "repair", "")

@@ -1,0 +1,89 @@
+"""Whatever is altered behind the store's back is seen, and named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+
+import pytest
+
+from monitor.records import Campaign
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    import_campaign,
+    record_event,
+    save_analysis,
+    save_certificate,
+    save_identification,
+    save_model,
+    verify_audit,
+)
+
+
+@pytest.fixture
+def filled(
+    db: Database,
+    make_campaign: Callable[..., Campaign],
+    make_identification: Callable[..., StoredIdentification],
+) -> Database:
+    """A database with something of everything."""
+    one = make_campaign("one")
+    import_campaign(db, one)
+    import_campaign(db, make_campaign("two"))
+    save_model(db, "samba", ["EA0B"])
+    save_identification(db, make_identification(one))
+    save_analysis(db, "uncertainty", {"a": 1}, method="guf", campaign="one")
+    save_certificate(db, "C-1", "issued", "one", [1], {"a": 1}, b"pdf")
+    record_event(db, one.machine.id, datetime(2026, 1, 1, tzinfo=UTC), "crash", "x")
+    return db
+
+
+def test_untouched_database_is_in_order(filled: Database) -> None:
+    verification = verify_audit(filled)
+    assert verification.ok
+    assert (verification.entries, len(verification.last_sha256)) == (7, 64)
+    assert filled.rows("SELECT DISTINCT actor FROM audit") == [("the test",)]
+
+
+def test_empty_database_is_in_order(db: Database) -> None:
+    assert verify_audit(db).faults == ()
+
+
+@pytest.mark.parametrize(
+    ("sql", "fault"),
+    [
+        ("UPDATE probing SET readings = map(['X','B','C1'], [1e-9, 0.1, 0.0]) WHERE campaign_id = 2 AND position = 3",
+         "campaign two was altered"),
+        ("DELETE FROM probing WHERE campaign_id = 2 AND position = 6", "campaign two was altered"),
+        ("DELETE FROM probing WHERE campaign_id = 2", "campaign two was altered"),
+        ("UPDATE run SET warm_up = NOT warm_up WHERE campaign_id = 1 AND run = 1", "campaign one was altered"),
+        ("UPDATE run SET utc_offset_s = 0 WHERE campaign_id = 1 AND run = 1", "campaign one was altered"),
+        ("UPDATE source_file SET content = 'x'::BLOB WHERE campaign_id = 1 AND file = 'runs.csv'",
+         "the file runs.csv of campaign one was altered"),
+        ("DELETE FROM source_file WHERE campaign_id = 1", "campaign one was altered"),
+        ("UPDATE campaign SET campaign = 'three' WHERE campaign = 'two'",
+         "campaign two is in the audit, but no longer"),
+        ("UPDATE machine SET topology = 'w t'", "machine HU40 'T' was altered"),
+        ("UPDATE model SET effects = ['EB0C']", "model samba version 1 was altered"),
+        ("DELETE FROM model", "model samba version 1 is in the audit, but no longer"),
+        ("UPDATE parameter_value SET value = value * 1.0000001 WHERE run = 1 AND parameter = 'EX0C'",
+         "identification 1 was altered"),
+        ("UPDATE parameter_value SET u = u / 2 WHERE run = 1", "identification 1 was altered"),
+        ("UPDATE parameter_value SET unit = 'nm' WHERE run = 1", "identification 1 was altered"),
+        ("UPDATE residual SET dx_mm = 0 WHERE run = 1", "identification 1 was altered"),
+        ("DELETE FROM identified_run WHERE run = 1", "identification 1 was altered"),
+        ("UPDATE analysis SET document = '{}'", "analysis 1 was altered"),
+        ("UPDATE event SET happened_at = '2020-01-01'", "event 1 was altered"),
+        ("UPDATE certificate SET state = 'draft'", "certificate entry 1, of C-1, was altered"),
+        ("DELETE FROM certificate", "certificate C-1 entry 1 is in the audit, but no longer"),
+        ("UPDATE audit SET actor = 'nobody' WHERE entry = 3", "audit entry 3 was altered"),
+        ("DELETE FROM audit WHERE entry = 3", "audit entry 3 is missing"),
+        ("DELETE FROM audit WHERE entry = 7", "event 1 is in the database, but not in the audit"),
+    ],
+)  # fmt: skip
+def test_alteration_is_seen_and_named(filled: Database, sql: str, fault: str) -> None:
+    filled.execute(sql)
+    verification = verify_audit(filled)
+    assert not verification.ok
+    assert any(fault in found for found in verification.faults), verification.faults

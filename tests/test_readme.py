@@ -1,0 +1,186 @@
+"""The README tells the truth: what it types is run, what it shows is compared.
+
+- Fenced ``console`` blocks: every line that starts with ``$ `` is a command, the lines below it are what it prints.
+  ``...`` stands for anything, white space may differ, no lines means any output. The exit status has to be 0 unless the
+  command ends in ``# exit status 1``.
+- Fenced ``python`` blocks are run as scripts.
+
+All run in document order in one folder that holds a copy of ``examples/``, as a reader would do it.
+"""
+
+from __future__ import annotations
+
+import doctest
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+README = CHECKOUT / "README.md"
+
+LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+# Set-up and what never ends by itself; everything else is run. The make targets have to exist.
+NOT_RUN = ("cd ", "git ", "make ", "sudo ", "monitor serve")
+# What a make target does once the set-up is there.
+MAKE = {"make demo": "monitor demo --out demo-output"}
+LANGUAGES = {"console", "python", "text", "toml", "csv", "sql", "json"}
+
+
+@dataclass(frozen=True)
+class Example:
+    """One thing to run: its line in the README, its language, its text, what it shows (may be empty)."""
+
+    line: int
+    language: str
+    source: str
+    shown: str
+
+
+def fences(text: str) -> Iterator[tuple[int, str, list[str]]]:
+    """Line of the first line inside, language and lines of every fenced block."""
+    language, begin = "", 0
+    inside: list[str] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if fence := re.match(r"```(\S*)\s*$", line):
+            if begin:
+                yield begin, language, inside
+                begin = 0
+            else:
+                language, begin, inside = fence[1], number + 1, []
+        elif begin:
+            inside.append(line)
+    assert not begin, f"the block that begins at line {begin} of the README is not closed"
+
+
+def examples(text: str) -> list[Example]:
+    """Everything that the README asks to type, in order."""
+    found: list[Example] = []
+    for begin, language, lines in fences(text):
+        assert language in LANGUAGES, (
+            f"README line {begin - 1}: a block of {language!r}; known are {', '.join(sorted(LANGUAGES))}"
+        )
+        if language == "python":
+            found.append(Example(begin, language, "\n".join(lines), ""))
+        if language == "console":
+            assert lines, f"README line {begin}: an empty console block"
+            assert lines[0].startswith("$ "), f"README line {begin}: a console block begins with '$ '"
+            prompts = [i for i, line in enumerate(lines) if line.startswith("$ ")]
+            for i, following in zip(prompts, [*prompts[1:], len(lines)], strict=True):
+                shown = "\n".join(lines[i + 1 : following]).strip()
+                found.append(Example(begin + i, language, lines[i][2:].strip(), shown))
+    return found
+
+
+def reader_environment() -> dict[str, str]:
+    """A reader's shell: this environment's commands first, no colours, a line of 100 columns."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("MONITOR_", "PYTHON"))}
+    path = f"{Path(sys.executable).parent}{os.pathsep}{kept.get('PATH', '')}"
+    return kept | {"PATH": path, "COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
+
+
+def try_out(example: Example, folder: Path) -> None:
+    """Run one example in ``folder``; AssertionError when it ends or prints otherwise than the README says."""
+    source = MAKE.get(example.source, example.source)
+    if example.language == "console" and source.startswith(NOT_RUN):
+        return
+    wanted = re.search(r"# exit status (\d+)$", source)
+    command = [sys.executable, "-c", source] if example.language == "python" else ["bash", "-c", source]
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env=reader_environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        timeout=300,
+    )
+    told = f"README line {example.line}: {source}\n"
+    status = int(wanted[1]) if wanted else 0
+    assert done.returncode == status, (
+        f"{told}ended with status {done.returncode}, not {status}:\n{done.stdout}"
+    )
+    same = doctest.OutputChecker().check_output(example.shown + "\n", done.stdout, LOOSELY)
+    if example.shown and not same:
+        raise AssertionError(f"{told}shows\n{example.shown}\nbut prints\n{done.stdout}")
+
+
+def test_readme_examples_do_what_it_says(tmp_path: Path) -> None:
+    if (CHECKOUT / "examples").is_dir():
+        shutil.copytree(CHECKOUT / "examples", tmp_path / "examples")
+    found = examples(README.read_text(encoding="utf-8"))
+    assert any(example.language == "console" for example in found)
+    for example in found:
+        try_out(example, tmp_path)
+
+
+def test_readme_make_targets_exist_and_do_what_the_examples_run() -> None:
+    makefile = (CHECKOUT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z]+):", makefile, flags=re.MULTILINE))
+    typed = re.findall(r"^\$ make ([a-z]+)", README.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert sorted(set(typed) - targets) == []
+    assert all(command in makefile for command in MAKE.values())
+
+
+@pytest.mark.skipif(not (CHECKOUT / "monitor").is_dir(), reason="the README points into the checkout")
+def test_readme_pictures_and_links_lead_somewhere() -> None:
+    links = re.findall(r"\]\(([^)#\s]+)", README.read_text(encoding="utf-8"))
+    local = [link for link in links if "://" not in link and not link.startswith("mailto:")]
+    assert [link for link in local if not (CHECKOUT / link).exists()] == []
+
+
+def test_examples_are_read_with_their_lines() -> None:
+    text = "# T\n```console\n$ one\nout\n...\n$ two\n```\nprose\n```python\nx = 1\n```\n```toml\na = 1\n```\n"
+    assert examples(text) == [
+        Example(3, "console", "one", "out\n..."),
+        Example(6, "console", "two", ""),
+        Example(10, "python", "x = 1", ""),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("source", "shown"),
+    [
+        ("echo 'EC0B   1.7 µrad'; echo more", "EC0B 1.7 µrad\n..."),
+        ("echo EC0B 1.7 µrad", "EC0B ... µrad"),
+        ("echo anything", ""),
+        ("exit 1  # exit status 1", ""),
+    ],
+)
+def test_example_that_holds(tmp_path: Path, source: str, shown: str) -> None:
+    try_out(Example(1, "console", source, shown), tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("language", "source", "shown", "why"),
+    [
+        ("console", "echo EC0B 1.8 µrad", "EC0B 1.7 µrad", "shows\nEC0B 1.7 µrad\nbut prints\nEC0B 1.8 µrad"),
+        ("console", "exit 2", "", "ended with status 2, not 0"),
+        ("console", "true  # exit status 1", "", "ended with status 0, not 1"),
+        ("python", "raise SystemExit(3)", "", "ended with status 3, not 0"),
+    ],
+)
+def test_example_that_does_not_hold(tmp_path: Path, language: str, source: str, shown: str, why: str) -> None:
+    with pytest.raises(AssertionError, match=re.escape(why)):
+        try_out(Example(1, language, source, shown), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("```bash\nmonitor demo\n```\n", "a block of 'bash'"),
+        ("```console\nmonitor demo\n```\n", "a console block begins with"),
+        ("```console\n$ monitor demo\n", "is not closed"),
+    ],
+)
+def test_block_that_would_not_be_run_is_refused(text: str, why: str) -> None:
+    with pytest.raises(AssertionError, match=why):
+        examples(text)

@@ -1,0 +1,31 @@
+"""A database with three example campaigns, filled once."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from monitor.store import Database
+from monitor.workflow.campaigns import import_folders
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+CAMPAIGNS = ("five-days", "cold-cold", "hidden-reversal-x")
+
+
+@pytest.fixture(scope="session")
+def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("workflow") / "filled.duckdb"
+    with Database(path) as db:
+        import_folders(db, [EXAMPLES / name for name in CAMPAIGNS])
+    return path
+
+
+@pytest.fixture
+def db(filled: Path, tmp_path: Path) -> Iterator[Database]:
+    path = tmp_path / "own.duckdb"
+    shutil.copyfile(filled, path)
+    with Database(path) as opened:
+        yield opened

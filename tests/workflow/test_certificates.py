@@ -1,0 +1,271 @@
+"""The life of certificates: made again byte for byte, conformity by a named rule, data inside the PDF."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from datetime import UTC, date, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pypdf
+import pytest
+
+from monitor.cli import main
+from monitor.exceptions import InputError
+from monitor.readers import read_campaign
+from monitor.reporting.certificate import CertificateRecord, ConformityStatement
+from monitor.reporting.documents import from_document, to_document
+from monitor.reporting.render import certificate_pdf
+from monitor.reporting.signature import sign
+from monitor.store import Database, import_campaign, load_certificate
+from monitor.workflow.certificate_checks import digital, remake, verify
+from monitor.workflow.certificate_results import results_of
+from monitor.workflow.certificates import issue, withdraw
+from monitor.workflow.conformity import statement_of
+from monitor.workflow.uncertainty import Evaluated, evaluate
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+LABORATORY = EXAMPLES / "laboratory.toml"
+#: Run 20 of the example: EX0C is far outside, EXX inside by less than U, EA0B inside by more.
+LIMITS = {"EX0C": 20.0, "EXX": 60.0, "EA0B": 60.0}
+DAY = date(2026, 3, 12)
+
+
+@pytest.fixture(scope="module")
+def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    folder = tmp_path_factory.mktemp("campaign")
+    limited = folder / "limited"
+    shutil.copytree(EXAMPLES / "five-days", limited)
+    text = (limited / "campaign.toml").read_text(encoding="utf-8")
+    text = re.sub('campaign = ".*?"', 'campaign = "limited"', text, count=1).replace(
+        'id = "HU40-T"', 'id = "M"', 1
+    )
+    limits = "".join(f"{name} = {limit}\n" for name, limit in LIMITS.items())
+    text = text.replace("[machine.axes]", f"[machine.tolerances]\n{limits}\n[machine.axes]", 1)
+    (limited / "campaign.toml").write_text(text, encoding="utf-8")
+    with Database(folder / "c.duckdb", threads=1) as opened:
+        import_campaign(opened, read_campaign(limited))
+        import_campaign(opened, read_campaign(EXAMPLES / "five-days"))
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def found(db: Database) -> Evaluated:
+    return evaluate(db, "limited", 20, method="guf")
+
+
+@pytest.fixture(scope="module")
+def guarded(db: Database, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("out")
+    made = issue(db, "limited", 20, LABORATORY, out=out, number="G-1", issued_on=DAY, conformity="guard")
+    return Path(made["file"])
+
+
+def test_an_issued_certificate_is_made_again_byte_for_byte(
+    db: Database, guarded: Path, tmp_path: Path
+) -> None:
+    again = remake(db, "G-1", tmp_path)
+    assert again["identical"] is True
+    assert Path(again["file"]).read_bytes() == guarded.read_bytes()
+
+
+def test_a_record_comes_back_from_its_json_to_the_last_bit(db: Database, guarded: Path) -> None:
+    stored = load_certificate(db, "G-1").record
+    record = from_document(CertificateRecord, json.loads(json.dumps(dict(stored))))
+    document = to_document(record)
+    assert document == {key: value for key, value in stored.items() if key != "inputs"}
+    assert isinstance(record.conformity, ConformityStatement)
+    assert record.issued_on == DAY
+
+
+def test_the_inputs_are_stored_with_it_and_travel_inside_it(
+    db: Database, guarded: Path, found: Evaluated
+) -> None:
+    reader = pypdf.PdfReader(guarded)
+    files = {name: content[0] for name, content in reader.attachments.items()}
+    assert sorted(files) == ["certificate.dcc.xml", "certificate.json", "covariance-1.csv", "results-1.csv"]
+    whole = json.loads(files["certificate.json"])
+    stored = load_certificate(db, "G-1").record
+    assert whole["inputs"] == stored["inputs"]
+    assert {one["name"]: one["sha256"] for one in whole["inputs"]["files"]} == {
+        file.name: file.sha256 for file in found.campaign.files
+    }
+    assert whole["certificate"]["number"] == "G-1"
+
+
+def test_iso_19005_3_6_8_every_attached_file_stands_once_in_af_with_its_relationship(guarded: Path) -> None:
+    listed = pypdf.PdfReader(guarded).root_object["/AF"]
+    names = [str(one.get_object()["/UF"]) for one in listed]
+    assert sorted(names) == ["certificate.dcc.xml", "certificate.json", "covariance-1.csv", "results-1.csv"]
+    relations = {str(one.get_object()["/UF"]): one.get_object()["/AFRelationship"] for one in listed}
+    assert relations["certificate.json"] == "/Source"
+    assert relations["certificate.dcc.xml"] == "/Alternative"
+    assert relations["results-1.csv"] == relations["covariance-1.csv"] == "/Data"
+
+
+def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, found: Evaluated) -> None:
+    attached = pypdf.PdfReader(guarded).attachments
+    rows = list(csv.DictReader(io.StringIO(attached["results-1.csv"][0].decode())))
+    result = results_of(found)
+    assert [row["parameter"] for row in rows] == list(result.names)
+    assert [float(row["estimate"]) for row in rows] == result.estimate.tolist()
+    assert [float(row["standard_uncertainty"]) for row in rows] == result.u.tolist()
+    assert {row["parameter"]: float(row["tolerance"]) for row in rows if row["tolerance"]} == LIMITS
+    matrix = list(csv.reader(io.StringIO(attached["covariance-1.csv"][0].decode())))
+    assert matrix[0][2:] == list(result.names)
+    assert np.array_equal(np.array([row[2:] for row in matrix[1:]], dtype=float), result.covariance)
+
+
+def test_the_digital_certificate_of_a_stored_record_is_the_attached_one(
+    db: Database, guarded: Path, tmp_path: Path
+) -> None:
+    made = digital(db, "G-1", tmp_path)
+    assert Path(made["file"]).name == "certificate-G-1.dcc.xml"
+    attached = pypdf.PdfReader(guarded).attachments["certificate.dcc.xml"][0]
+    assert Path(made["file"]).read_bytes() == attached
+
+
+def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: Evaluated) -> None:
+    guf = found.framework
+    places = [guf.names.index(name) for name in LIMITS]
+    units = [found.units[place] for place in places]
+    y = [abs(unit.to_display(float(guf.estimate[place]))) for unit, place in zip(units, places, strict=True)]
+    expanded = [
+        unit.to_display(float(guf.expanded[place])) for unit, place in zip(units, places, strict=True)
+    ]
+    verdicts = {
+        rule: {one.name: one.verdict for one in statement_of(found, rule).verdicts}
+        for rule in ("simple", "guard", "probability")
+    }
+    for name, value, width in zip(LIMITS, y, expanded, strict=True):
+        limit = LIMITS[name]
+        assert verdicts["simple"][name] == ("pass" if value <= limit else "fail")
+        guard = verdicts["guard"][name]
+        assert (guard == "pass") == (value <= limit - width)
+        assert (guard == "fail") == (value > limit + width)
+        assert guard.endswith("pass") == (value <= limit)
+    assert verdicts["guard"]["EX0C"] == "fail"
+    assert verdicts["guard"]["EXX"] == "conditional pass"
+    assert verdicts["guard"]["EA0B"] == "pass"
+    assert verdicts["probability"]["EX0C"] == "fail"
+    for one in statement_of(found, "probability").verdicts:
+        assert (one.verdict == "pass") == (one.probability >= 0.95)
+    joint = statement_of(found, "simple").joint_probability
+    assert joint <= min(one.probability for one in statement_of(found, "simple").verdicts)
+
+
+def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(guarded: Path) -> None:
+    text = " ".join(" ".join(page.extract_text().split()) for page in pypdf.PdfReader(guarded).pages)
+    assert "Guard band w = U (ILAC-G8:09/2019, 4.2.3; ISO 14253-1:2017)" in text
+    assert "Risk: all statements 'pass' hold at once with at least the coverage probability 95 %" in text
+    assert "Joint probability that all 3 parameters lie within their tolerances" in text
+    assert "EXX ± 60.0 µm/m" in text
+    assert "conditional pass" in text
+
+
+def test_no_tolerance_no_statement(db: Database, tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"campaign five-days states no tolerance of EA0B.*\[machine\.tolerances\]"
+    ):
+        issue(db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY, conformity="simple")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_remake_says_when_the_stored_document_is_another(
+    db: Database,
+    guarded: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(
+        "monitor.workflow.certificate_checks.certificate_pdf", lambda record, inputs: b"other"
+    )
+    again = remake(db, "G-1")
+    assert again["identical"] is False
+    assert "it was issued with" in again["why"]
+    with Database(tmp_path / "empty.duckdb"):
+        pass
+    assert main(["--db", str(tmp_path / "empty.duckdb"), "certificate", "show", "--remake", "x.pdf"]) == 2
+    assert "--remake needs the number" in capsys.readouterr().err
+
+
+def test_a_signed_certificate_is_verified_check_by_check(db: Database, tmp_path: Path) -> None:
+    pytest.importorskip("pyhanko", reason="the extra [sign] is not installed")
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.asymmetric import rsa
+    from cryptography.hazmat.primitives.serialization import NoEncryption, pkcs12
+
+    key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "Made-up Laboratory")])
+    now = datetime.now(UTC)
+    certificate = (
+        x509.CertificateBuilder().subject_name(name).issuer_name(name).public_key(key.public_key()).serial_number(1)
+        .not_valid_before(now - timedelta(days=1)).not_valid_after(now + timedelta(days=9))
+        .add_extension(x509.KeyUsage(True, True, *[False] * 7), critical=True)
+        .sign(key, hashes.SHA256())
+    )  # fmt: skip
+    p12 = tmp_path / "lab.p12"
+    p12.write_bytes(pkcs12.serialize_key_and_certificates(b"lab", key, certificate, None, NoEncryption()))
+    made = issue(db, "limited", 20, LABORATORY, out=tmp_path, number="S-1", issued_on=DAY, key=p12)
+    file = Path(made["file"])
+    good = verify(db, file)
+    assert good["ok"] is True
+    assert good["checks"] == {"hash": True, "chain": True, "signature": True, "database": True}
+    assert good["signer"] == "Common Name: Made-up Laboratory"
+    assert remake(db, "S-1")["identical"] is True
+    whole = file.read_bytes()
+    altered = bytearray(whole)
+    altered[whole.index(b"stream", whole.index(b"/EmbeddedFile")) + 40] ^= 1
+    file.write_bytes(bytes(altered))
+    bad = verify(db, file)
+    assert bad["ok"] is False
+    assert bad["checks"] == {"hash": False, "chain": True, "signature": False, "database": False}
+    assert any("altered after it was signed" in fault for fault in bad["faults"])
+    # A forged copy with another good signature: the signature holds, the database does not know it.
+    forged = tmp_path / "forged.pdf"
+    record = from_document(CertificateRecord, load_certificate(db, "S-1").record)
+    forged.write_bytes(sign(certificate_pdf(record), p12, None))
+    assert verify(db, forged)["checks"] == {
+        "hash": False, "chain": True, "signature": True, "database": False
+    }  # fmt: skip
+    # What no hash says: a genuine file that was withdrawn.
+    file.write_bytes(whole)
+    withdraw(db, "S-1", "the bar was damaged")
+    late = verify(db, file)
+    assert late["checks"] == {"hash": True, "chain": True, "signature": True, "database": False}
+    assert late["ok"] is False
+
+
+def test_17025_7_8_8_3_an_amended_certificate_has_a_new_number_the_reason_and_names_the_old(
+    db: Database, tmp_path: Path
+) -> None:
+    issue(db, "limited", 20, LABORATORY, out=tmp_path, number="A-1", issued_on=DAY)
+    with pytest.raises(InputError, match="say why certificate A-1 is replaced"):
+        issue(db, "limited", 20, LABORATORY, out=tmp_path, number="A-2", issued_on=DAY, replaces="A-1")
+    with pytest.raises(InputError, match="a draft replaces nothing"):
+        issue(
+            db, "limited", 20, LABORATORY, out=tmp_path, issued_on=DAY, draft=True, replaces="A-1", reason="x"
+        )  # fmt: skip
+    made = issue(
+        db, "limited", 20, LABORATORY, out=tmp_path, number="A-2", issued_on=DAY, replaces="A-1",
+        reason="the customer's address was wrong",
+    )  # fmt: skip
+    page = " ".join(pypdf.PdfReader(made["file"]).pages[0].extract_text().split())
+    assert "It replaces certificate A-1 of 2026-03-12: the customer's address was wrong" in page
+    old = load_certificate(db, "A-1")
+    assert (old.state, old.replaced_by, old.reason) == ("amended", "A-2", "the customer's address was wrong")
+    assert verify(db, tmp_path / "certificate-A-1.pdf")["ok"] is False
+    assert verify(db, tmp_path / "certificate-A-2.pdf")["ok"] is True
+    assert remake(db, "A-2")["identical"] is True
+    with pytest.raises(InputError, match="certificate A-1 is amended; only an issued one can be replaced"):
+        issue(
+            db, "limited", 20, LABORATORY, out=tmp_path, number="A-3", issued_on=DAY, replaces="A-1", reason="x"
+        )  # fmt: skip
+    assert not (tmp_path / "certificate-A-3.pdf").exists()

@@ -1,0 +1,80 @@
+"""Numbers that must not be signed: another machine's readings, and a model that does not fit a single run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.exceptions import DataError, InputError
+from monitor.readers import read_campaign
+from monitor.records import Campaign
+from monitor.store import Database, import_campaign
+from monitor.workflow.certificates import issue
+from monitor.workflow.comparison import compare
+from monitor.workflow.models import add
+from monitor.workflow.uncertainty import evaluate
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+LABORATORY = EXAMPLES / "laboratory.toml"
+
+
+def first_runs(name: str, count: int) -> Campaign:
+    campaign = read_campaign(EXAMPLES / name)
+    kept = tuple(run for run in campaign.runs if run.run <= count)
+    return replace(campaign, runs=kept, probings=campaign.probings.rows(campaign.probings.run <= count))
+
+
+def test_swapped_columns_are_refused_by_every_step_and_get_no_certificate(tmp_path: Path) -> None:
+    campaign = first_runs("five-days", 3)
+    readings = dict(campaign.probings.readings)
+    readings["X"], readings["Y"] = readings["Y"], readings["X"]
+    swapped = replace(campaign, probings=replace(campaign.probings, readings=readings))
+    with Database(tmp_path / "x.duckdb") as db:
+        import_campaign(db, swapped)
+        with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
+            evaluate(db, "five-days", 1, method="guf")
+        with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
+            compare(db, "five-days")
+        with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
+            issue(db, "five-days", 1, LABORATORY, out=tmp_path)
+    assert list(tmp_path.glob("*.pdf")) == []
+
+
+def test_a_single_run_with_a_hidden_effect_counts_it_in_the_uncertainty(tmp_path: Path) -> None:
+    with Database(tmp_path / "x.duckdb") as db:
+        import_campaign(db, first_runs("hidden-reversal-x", 1))
+        plain = evaluate(db, "hidden-reversal-x", 1, method="guf", model_uncertainty=False)
+        counted = evaluate(db, "hidden-reversal-x", 1, method="guf")
+        add(db, "EXX:reversal", "samba", "with-reversal")
+        right = evaluate(db, "hidden-reversal-x", 1, method="guf", model="with-reversal")
+    assert "lack of fit of the model" in {line.source for line in counted.framework.budget}
+    apart = np.abs(counted.framework.estimate - right.framework.estimate)
+    assert np.max(apart / plain.framework.u) > 5.0
+    assert np.max(apart / counted.framework.u) < 3.0
+
+
+def test_a_certificate_says_how_the_model_fits(tmp_path: Path) -> None:
+    with Database(tmp_path / "x.duckdb") as db:
+        import_campaign(db, first_runs("hidden-reversal-x", 1))
+        found = issue(db, "hidden-reversal-x", 1, LABORATORY, out=tmp_path)
+    text = "".join((page.extract_text() or "") for page in _pages(Path(found["file"])))
+    assert "the model leaves 1.57" in " ".join(text.split())
+    assert "part of u" in " ".join(text.split())
+
+
+def _pages(path: Path) -> list[object]:
+    from pypdf import PdfReader
+
+    return list(PdfReader(path).pages)
+
+
+def test_a_name_in_use_is_no_name_for_a_model_with_another_parent(tmp_path: Path) -> None:
+    with Database(tmp_path / "x.duckdb") as db:
+        import_campaign(db, first_runs("five-days", 1))
+        add(db, "EXX:reversal", "samba", "mine")
+        with pytest.raises(InputError, match="there is a model mine already: add to it with --to mine"):
+            add(db, "EYY:reversal", "samba", "mine")
+        assert add(db, "EYY:reversal", "mine").effects == ("EXX:reversal", "EYY:reversal")

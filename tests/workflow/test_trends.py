@@ -1,0 +1,309 @@
+"""The long view: a drift with its forecast, changes and events that split it, little history said in words."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from monitor.cli import main
+from monitor.exceptions import InputError, NotFoundError
+from monitor.readers import read_campaign
+from monitor.store import Database, import_campaign, load_analysis, record_event
+from monitor.workflow.fleet import fleet
+from monitor.workflow.runs_statistics import stats
+from monitor.workflow.selections import select, side_by_side
+from monitor.workflow.trend_figures import headline, trend_figures
+from monitor.workflow.trends import Choice, trends
+from monitor.workflow.uncertainty import uncertainty
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+START = datetime(2024, 1, 1, 8)
+WEEKS, RUNS = 40, 4
+
+
+def add_machine(
+    db: Database,
+    machine: str,
+    values: dict[str, np.ndarray],
+    ambient: np.ndarray | None = None,
+    limit: float = 20.0,
+):
+    """Weekly campaigns of four runs: ``values`` name to (weeks, runs) in µm."""
+    weeks, runs = next(iter(values.values())).shape
+    db.execute("INSERT INTO machine VALUES (?, 'w C B X b Z Y (C1) t', TIMESTAMP '2024-01-01')", [machine])
+    first = db.next_number("campaign", "campaign_id")
+    description = json.dumps({"id": machine, "tolerances": dict.fromkeys(values, limit)})
+    number = np.repeat(np.arange(first, first + weeks), runs)
+    run = np.tile(np.arange(1, runs + 1), weeks)
+    week = np.repeat(np.arange(weeks), runs)
+    frame = pd.DataFrame({"number": number, "run": run})
+    frame["at"] = [START + timedelta(days=7 * int(w), hours=float(r)) for w, r in zip(week, run, strict=True)]
+    frame["ambient"] = np.full(len(number), 20.0) if ambient is None else ambient.ravel()
+    heads = pd.DataFrame({"number": np.arange(first, first + weeks)})
+    db.insert(
+        f"INSERT INTO campaign SELECT number, '{machine}-' || (number - {first}), '{machine}', 'samba', "
+        f"'{description}', "
+        "'{}', '{}', '', '', TIMESTAMP '2024-01-01' FROM incoming",
+        heads,
+    )
+    db.insert(
+        "INSERT INTO run SELECT number, run, run, \"at\", 0, 1, false, MAP {'ambient_degC': ambient} FROM incoming",
+        frame,
+    )
+    db.insert(
+        f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {list(values)}::VARCHAR[], [], [], "
+        f"{runs}, '', TIMESTAMP '2024-01-01' FROM incoming",
+        heads,
+    )
+    for name, matrix in values.items():
+        own = frame.assign(value=matrix.ravel() * 1e-3)
+        db.insert(
+            f"INSERT INTO parameter_value SELECT number, run, '{name}', value, 0.5e-3, 'µm', 1e-3 FROM incoming",
+            own,
+        )
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A machine with a drift, a step, nothing, and a dependence; its database."""
+    rng = np.random.default_rng(11)
+    week = np.arange(WEEKS)[:, np.newaxis]
+
+    def noise() -> np.ndarray:
+        return 0.3 * rng.normal(size=(WEEKS, 1)) + 0.5 * rng.normal(size=(WEEKS, RUNS))
+
+    ambient = 20.0 + 2.0 * rng.normal(size=(WEEKS, RUNS))
+    values = {
+        "EX0B": 5.0 + 0.2 * week + noise(),
+        "EX0C": noise() + 6.0 * (week >= 25),
+        "EY0C": noise(),
+        "EZ0B": 0.8 * (ambient - 20.0) + noise(),
+    }
+    with Database(tmp_path_factory.mktemp("trends") / "m.duckdb") as db:
+        add_machine(db, "M", values, ambient)
+        add_machine(db, "small", {"EX0B": np.array([[1.0, 1.1, 0.9]])})
+        yield db
+
+
+def test_drift_is_found_with_its_slope_and_the_date_it_crosses_the_limit(made: Database) -> None:
+    found = trends(made, "M").document["parameters"]["EX0B"]
+    per_year = 0.2 / 7 * 365.25
+    assert found["slope_interval"][0] < per_year < found["slope_interval"][1]
+    assert found["robust_interval"][0] < per_year < found["robust_interval"][1]
+    assert found["p_value"] < 1e-6
+    assert found["monotone_p"] < 1e-3
+    assert found["changes"] == []
+    # 5 + 0.2 w reaches 20 in week 75.
+    crossing = datetime.fromisoformat(found["crosses_limit_at"]).replace(tzinfo=None)
+    assert abs((crossing - START).days / 7 - 75) < 3
+    low, high = (datetime.fromisoformat(x).replace(tzinfo=None) for x in found["crosses_limit_interval"])
+    assert low < START + timedelta(weeks=75) < high
+    assert found["in_tolerance_at_next_check"] > 0.99
+    assert 150 < found["recommended_interval_days"] < 36 * 7
+    assert "prediction interval of the drift" in found["recommended_by"]
+
+
+def test_a_change_is_found_at_its_date_and_not_fitted_as_a_trend(made: Database) -> None:
+    found = trends(made, "M").document["parameters"]["EX0C"]
+    assert [change["kind"] for change in found["changes"]] == ["step"]
+    change = found["changes"][0]
+    assert change["at"].startswith((START + timedelta(weeks=25)).date().isoformat())
+    assert abs(change["size"] - 6.0) < 4 * change["u"]
+    assert change["unit"] == "µm"
+    assert found["since"] >= change["at"][:10]
+    assert abs(found["slope_per_year"]) < 4 * found["u_slope"]
+    assert found["control"]["shewhart"]["state"] == "alarm"
+    assert found["control"]["cusum"]["state"] == "alarm"
+
+
+def test_a_quiet_parameter_raises_nothing_and_a_dependence_has_its_unit(made: Database) -> None:
+    document = trends(made, "M").document
+    quiet = document["parameters"]["EY0C"]
+    assert quiet["changes"] == []
+    assert quiet["q_value"] > 0.05
+    assert quiet["control"]["shewhart"]["state"] == "in control"
+    warm = document["parameters"]["EZ0B"]["conditions"][0]
+    assert (warm["channel"], warm["unit"]) == ("ambient_degC", "µm/K")
+    assert abs(warm["coefficient"] - 0.8) < 3 * warm["u"]
+    assert warm["q_value"] < 1e-6
+    assert document["control"]["points"] == "days"
+    assert document["control"]["vector"]["t_squared"]["state"] == "alarm"
+    assert load_analysis(made, "trend", machine="M").document == document
+
+
+def test_too_little_history_is_a_sentence_for_each_item_and_no_number(made: Database) -> None:
+    found = trends(made, "small").document["parameters"]["EX0B"]
+    assert found["slope_per_year"] is None
+    assert found["crosses_limit_at"] is None
+    assert found["why"] == "1 day of history is too short for a slope a year; at least 30 are needed"
+    assert found["why_no_changes"].startswith("no search for changes: times has 3 values")
+    assert found["why_no_cycles"].startswith("no cycles: a daily one needs")
+    assert found["why_no_warm_up"].startswith("no warm-up:")
+    assert found["why_no_forecast"] == "no forecast: there is no drift to extrapolate"
+    assert found["control"]["why"].startswith("no chart: values has 3")
+
+
+def test_an_event_splits_the_history_and_is_no_finding(made: Database) -> None:
+    rng = np.random.default_rng(4)
+    add_machine(
+        made, "split", {"EX0B": rng.normal(size=(20, 2)) + 9.0 * (np.arange(20) >= 10)[:, np.newaxis]}
+    )
+    at = (START + timedelta(days=67)).replace(tzinfo=UTC)
+    assert len(trends(made, "split").document["parameters"]["EX0B"]["changes"]) == 1
+    record_event(made, "split", at, "repair", "ball screw changed")
+    document = trends(made, "split").document
+    found = document["parameters"]["EX0B"]
+    assert found["changes"] == []
+    assert found["days"] == 10
+    assert document["events"] == [
+        {"at": at.isoformat(), "kind": "repair", "description": "ball screw changed"}
+    ]
+
+
+def test_choices_and_their_refusals(made: Database) -> None:
+    since = START.replace(tzinfo=UTC) + timedelta(weeks=30)
+    one = trends(made, "M", Choice(parameter="EX0B", since=since)).document
+    assert list(one["parameters"]) == ["EX0B"]
+    assert one["runs"] == 10 * RUNS
+    with pytest.raises(NotFoundError, match="has no parameter 'EQQ'; it has EX0B, EX0C, EY0C, EZ0B"):
+        trends(made, "M", Choice(parameter="EQQ"))
+    with pytest.raises(InputError, match="--next-check 2024-01-01 lies before the last run"):
+        trends(made, "M", Choice(next_check=START.replace(tzinfo=UTC)))
+    with pytest.raises(NotFoundError, match="there is no machine 'N'"):
+        trends(made, "N")
+
+
+def test_figures_are_drawn(made: Database, tmp_path: Path) -> None:
+    files = trend_figures(trends(made, "M", Choice(parameter="EX0C")), tmp_path / "figures")
+    assert [Path(file).name for file in files] == ["trend-EX0C.svg", "trend-EX0C.png"]
+    assert all(Path(file).stat().st_size > 5000 for file in files)
+
+
+def test_fleet_ranks_what_needs_attention(made: Database) -> None:
+    found = fleet(made, top=None)
+    table = {(row["machine"], row["parameter"]): row for row in found["table"]}
+    assert found["table"][0]["rank"] == 1
+    assert table["M", "EX0B"]["attention"] == "drifts out of tolerance within a year"
+    assert table["M", "EX0B"]["rank"] <= 2
+    assert abs(table["M", "EX0B"]["slope_per_year"] - 0.2 / 7 * 365.25) < 4 * table["M", "EX0B"]["u_slope"]
+    assert table["M", "EY0C"]["attention"] == "as usual"
+    assert table["M", "EX0B"]["n"] == WEEKS * RUNS
+    assert sum(found["attention"].values()) == found["rows"] == len(found["table"])
+    assert len(fleet(made, top=2)["table"]) == 2
+
+
+@pytest.fixture(scope="module")
+def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The examples of figure 4.6 and of the reset."""
+    with Database(tmp_path_factory.mktemp("selections") / "m.duckdb") as db:
+        for name in ("hot-cold", "cold-cold", "five-days"):
+            import_campaign(db, read_campaign(EXAMPLES / name))
+        select(db, "hot-cold", "hot-cold-star", "hours >= 6")
+        yield db
+
+
+def test_los_2017_figure_4_6_without_its_first_hours_the_hot_machine_is_like_the_cold(
+    campaigns: Database,
+) -> None:
+    found = side_by_side(campaigns, ["hot-cold", "hot-cold-star", "cold-cold"])["selections"]
+    assert [one["runs"] for one in found.values()] == [44, 33, 44]
+    # The thesis states k_q = 2.9 for its eleven parameters.
+    assert all(abs(one["k_q"] - 2.9) < 0.1 for one in found.values())
+    hot, star, cold = (found[name]["expanded"] for name in ("hot-cold", "hot-cold-star", "cold-cold"))
+    for name in ("EXX", "EYY", "EZZ", "EX0C"):
+        assert hot[name] > 1.2 * star[name]
+        assert hot[name] > 1.2 * cold[name]
+    # "least impact on EC0Y".
+    assert hot["EC0Y"] < 1.3 * cold["EC0Y"]
+
+
+def test_a_selection_is_a_group_and_feeds_the_uncertainty(campaigns: Database) -> None:
+    within = stats(campaigns, "hot-cold", select="hot-cold-star")
+    assert within["groups"] == {"1": 33}
+    assert within["vector"]["manova"]["why"] == "groups names 1 group (1); 2 are needed."
+    apart = stats(campaigns, "hot-cold", by="hot-cold-star")
+    assert apart["groups"] == {"hot-cold-star": 33, "not hot-cold-star": 11}
+    assert apart["parameters"]["EYY"]["anova_q"] < 1e-4
+    assert "has 11 runs for 11 parameters" in apart["vector"]["box_m"]["why"]
+    own = uncertainty(campaigns, "hot-cold", method="guf", select="hot-cold-star", model_uncertainty=False)
+    assert own["input_covariance"].startswith("selection hot-cold-star: ")
+    whole = uncertainty(campaigns, "hot-cold", method="guf", model_uncertainty=False)
+    assert own["guf"]["u"]["EYY"] < 0.8 * whole["guf"]["u"]["EYY"]
+    with pytest.raises(InputError, match="followed another plan than hot-cold"):
+        uncertainty(campaigns, "hot-cold", method="guf", select="five-days")
+    with pytest.raises(InputError, match="--name cold-cold: a campaign has that name"):
+        select(campaigns, "hot-cold", "cold-cold", "hours > 6")
+    with pytest.raises(InputError, match="no run of campaign hot-cold meets it"):
+        select(campaigns, "hot-cold", "late", "hours > 99")
+
+
+def test_five_days_components_histogram_and_the_vector(campaigns: Database) -> None:
+    found = stats(campaigns, "five-days")
+    parts = found["parameters"]["EB0C"]["components"]
+    assert parts["between"] > 3 * parts["within"]
+    assert parts["between_interval"][0] < parts["between"] < parts["between_interval"][1]
+    assert 0.0 < found["parameters"]["EB0C"]["normality_p"] <= 1.0
+    assert found["vector"]["box_m"]["why"].startswith("group 1 has 4 runs for 13 parameters")
+    assert found["vector"]["manova"]["p_value"] < 1e-3
+    bins = found["coordinates"]["histograms"]["anova"]
+    assert sum(bins["counts"]) == found["coordinates"]["n"] == 186
+    assert bins["counts"][0] > 5 * bins["expected"]
+
+
+def test_the_reset_of_the_b_axis_is_found_by_its_date(campaigns: Database) -> None:
+    since = datetime.fromisoformat("2026-03-01T00:00:00-05:00")
+    found = trends(campaigns, "HU40-T", Choice(since=since)).document["parameters"]
+    steps = {
+        name: [change["at"][:10] for change in one["changes"]]
+        for name, one in found.items()
+        if one["changes"]
+    }
+    assert steps["EB0C"] == ["2026-03-05"]
+    assert found["EB0C"]["why"].startswith("4 days of history since the last change or event are too short")
+    assert found["EYY"]["slope_per_year"] is None
+    assert found["EYY"]["why"] == "7 days of history are too short for a slope a year; at least 30 are needed"
+    assert found["EYY"]["warm_up"] is None
+    hot = trends(campaigns, "HU40-T").document["parameters"]["EYY"]["warm_up"]
+    assert 1.0 < hot["tau_h"] < 4.0
+    assert hot["stable_interval_h"][0] < hot["stable_after_h"] < hot["stable_interval_h"][1]
+    assert set(steps) == {"EB0C"}
+
+
+def test_campaigns_of_the_same_hours_are_named_and_one_can_be_chosen(tmp_path: Path) -> None:
+    with Database(tmp_path / "same.duckdb") as db:
+        for name in ("five-days", "nothing-hidden", "hot-cold"):
+            import_campaign(db, read_campaign(EXAMPLES / name))
+        (note,) = trends(db, "HU40-T").document["notes"]
+        assert note.startswith("campaigns five-days and nothing-hidden hold runs of the same hours")
+        alone = trends(db, "HU40-T", Choice(campaigns=("five-days", "hot-cold"))).document
+        assert alone["notes"] == []
+        assert alone["campaigns"] == ["hot-cold", "five-days"]
+        with pytest.raises(NotFoundError, match="holds no campaign 'cold'; it holds"):
+            trends(db, "HU40-T", Choice(campaigns=("cold",)))
+
+
+def test_no_run_and_one_run_are_sentences_with_exit_status_0(made: Database, tmp_path: Path, capsys) -> None:
+    later = datetime(2030, 1, 1, tzinfo=UTC)
+    nothing = trends(made, "M", Choice(parameter="EX0B", since=later)).document
+    assert nothing["why"] == "machine M has no identified run since 2030-01-01"
+    assert nothing["parameters"] == {}
+    path = tmp_path / "one.duckdb"
+    with Database(path) as db:
+        add_machine(db, "single", {"EX0B": np.array([[1.0]])})
+    assert main(["--db", str(path), "trend", "single"]) == 0
+    (said,) = capsys.readouterr().out.splitlines()
+    assert said == "single: 1 run of 1 campaign, of 2024-01-01 09:00; a history begins with the second run"
+
+
+def test_a_headline_states_the_uncertainty_by_name_and_no_power_of_ten() -> None:
+    step = {"size": 12345.6, "u": 950.0, "unit": "µrad", "at": "2026-03-05T08:00:00"}
+    line = headline("EB0C", {"changes": [step]})
+    assert line == "EB0C: changed by +12350 µrad (u = 950 µrad) on 2026-03-05"
+    slope = {"changes": [], "slope_per_year": -2960.0, "u_slope": 166.0, "unit": "µm", "p_value": 0.5}
+    assert headline("EXX", slope) == "EXX: −2960 µm a year (u = 170 µm a year), no drift seen"

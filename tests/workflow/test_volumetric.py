@@ -1,0 +1,84 @@
+"""What the workflow tells the map of a machine: parameters of the run, shared effects, and how both hang together."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from monitor.discovery import fit
+from monitor.methods.model import Model
+from monitor.methods.samba import problem_of
+from monitor.methods.virtual import virtual_campaign
+from monitor.store import Database
+from monitor.workflow import models
+from monitor.workflow.campaigns import import_folders
+from monitor.workflow.simulation import simulate
+from monitor.workflow.volumetric import _of_shared, volumetric_map
+
+
+@pytest.fixture(scope="module")
+def shared():
+    """A fit of a virtual campaign with two shared effects."""
+    campaign = virtual_campaign("v", np.random.default_rng(2), effect="EBB:harmonic2", peak=5e-3)
+    return fit(problem_of(campaign, Model("m", added=("EBB:harmonic2", "EYX:poly2"))))
+
+
+def test_two_ways_covariance_with_shared_effects_is_that_of_all_unknowns_at_once(shared):
+    solution, place = shared.solution, 4
+    last = solution.last
+    runs, rows, local = last.local.shape
+    common = last.common.shape[-1]
+    # The Jacobian of all runs, dense.
+    dense = np.zeros((runs * rows, runs * local + common))
+    for run in range(runs):
+        own = slice(run * rows, (run + 1) * rows)
+        dense[own, run * local : (run + 1) * local] = last.local[run]
+        dense[own, runs * local :] = last.common[run]
+    scale = np.linalg.norm(dense, axis=0)
+    covariance = np.linalg.inv((dense / scale).T @ (dense / scale)) / scale[:, None] / scale
+    names = len(shared.problem.base_names)
+    chosen = [*(place * local + np.arange(names)), *(runs * local + np.arange(common))]
+    whole = covariance[np.ix_(chosen, chosen)]
+    alone = np.zeros_like(whole)
+    own = last.local[place]
+    unit = np.linalg.norm(own, axis=0)
+    alone[:names, :names] = (np.linalg.inv((own / unit).T @ (own / unit)) / unit[:, None] / unit)[
+        :names, :names
+    ]
+    found = SimpleNamespace(fit=shared, run=int(shared.problem.runs[place]))
+    added = _of_shared(found, list(range(names)), list(range(common))) / shared.scale**2
+    size = np.sqrt(np.diag(whole))
+    np.testing.assert_allclose(
+        (alone + added) / np.outer(size, size), whole / np.outer(size, size), atol=1e-7
+    )
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory):
+    """A database with one virtual campaign that hides an indexing error of B."""
+    folder = tmp_path_factory.mktemp("volumetric")
+    simulate(folder / "hidden", "EBB:harmonic2", 8.0, 1.0, 3)
+    with Database(folder / "map.duckdb") as db:
+        import_folders(db, [folder / "hidden"])
+        models.add(db, "EBB:harmonic2", "samba", "with-b")
+        yield db
+
+
+def test_a_shared_effect_takes_part_in_the_map(database):
+    plain, _ = volumetric_map(database, "hidden", points=3)
+    found, mapped = volumetric_map(database, "hidden", points=3, model="with-b")
+    assert "EBB:harmonic2.cos" in found["parameters"]
+    assert "EBB:harmonic2.cos" not in plain["parameters"]
+    place = found["parameters"].index("EBB:harmonic2.cos")
+    assert mapped.known.covariance[place, place] > 0.0
+    assert np.all(np.linalg.eigvalsh(mapped.known.covariance) > -1e-18)
+    # Without the effect the plain model carries lack of fit, and its map is less certain for it.
+    assert found["least_certain"]["u_um"] < plain["least_certain"]["u_um"]
+
+
+def test_strokes_of_the_machine_file_bound_the_map(database):
+    found, mapped = volumetric_map(database, "hidden", points=2)
+    assert not mapped.from_strokes
+    for name, ends in found["region"]["readings_mm"].items():
+        readings = mapped.evaluated.campaign.probings.readings[name]
+        assert ends == [readings.min(), readings.max()]

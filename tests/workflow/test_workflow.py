@@ -1,0 +1,141 @@
+"""The steps from folder to certificate as functions: what they store, refuse and leave alone."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.exceptions import InputError, NotFoundError
+from monitor.store import Database, load_campaign, load_identification
+from monitor.workflow import campaigns, comparison, keeping, models
+from monitor.workflow.figures import comparison_figures, explanation_figures
+from monitor.workflow.identification import identify
+from monitor.workflow.run_columns import run_columns
+from monitor.workflow.runs_statistics import coordinates, stats
+from monitor.workflow.uncertainty import evaluate
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def test_what_is_shown_is_what_is_stored(db: Database) -> None:
+    shown = identify(db, "five-days")
+    stored = load_identification(db, "five-days", "samba", 1)
+    factors = np.array([unit.factor for unit in stored.units])
+    for run, kept in zip(shown["runs"], stored.runs, strict=True):
+        values = [one["value"] for one in run["parameters"].values()]
+        assert values == pytest.approx(list(kept.estimate / factors), rel=1e-12)
+        u = [one["u"] for one in run["parameters"].values()]
+        assert u == pytest.approx(list(np.sqrt(np.diag(kept.covariance)) / factors), rel=1e-12)
+
+
+def test_one_run_alone_has_the_numbers_it_has_among_all(db: Database) -> None:
+    together = identify(db, "cold-cold")["runs"][6]
+    (alone,) = identify(db, "cold-cold", run=7)["runs"]
+    assert alone["run"] == together["run"] == 7
+    for name, one in together["parameters"].items():
+        assert alone["parameters"][name]["value"] == pytest.approx(one["value"], abs=1e-6 * one["u"])
+
+
+def test_statistics_from_sums_by_hand(db: Database) -> None:
+    document = stats(db, "five-days")
+    found = load_identification(db, "five-days", "samba", 1)
+    place = found.parameters.index("EB0C")
+    values = np.array([run.estimate[place] for run in found.runs]) / found.units[place].factor
+    days = np.array([run.day for run in load_campaign(db, "five-days").runs])
+    one = document["parameters"]["EB0C"]
+    assert one["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert one["u_all"] == pytest.approx(values.std(ddof=1), rel=1e-12)
+    within = sum(((values[days == day] - values[days == day].mean()) ** 2).sum() for day in range(1, 6))
+    assert one["u_pooled"] == pytest.approx(np.sqrt(within / 15), rel=1e-12)
+    for day in range(1, 6):
+        assert one["u_by_day"][str(day)] == pytest.approx(values[days == day].std(ddof=1), rel=1e-12)
+
+
+def test_columns_of_the_runs(db: Database) -> None:
+    columns = run_columns(load_campaign(db, "five-days").runs)
+    assert {"run", "day", "warm_up", "hours", "ambient_degC"} <= set(columns)
+    assert columns["hours"][0] == 0.0
+    assert (np.diff(columns["hours"]) > 0).all()
+
+
+def test_coordinates_only_where_all_runs_follow_one_plan(db: Database) -> None:
+    loaded = load_campaign(db, "five-days")
+    found = coordinates(loaded, [1, 2, 3])
+    assert found is not None
+    names, values = found
+    assert values.shape == (3, len(names)) == (3, 186)
+
+
+def test_import_of_several_folders_names_what_came_before_a_refusal(tmp_path: Path) -> None:
+    with Database(tmp_path / "x.duckdb") as own:
+        with pytest.raises(InputError, match="In the database before it was met: cold-cold"):
+            campaigns.import_folders(own, [EXAMPLES / "cold-cold", tmp_path / "nope"])
+        assert campaigns.chosen(own, None) == ["cold-cold"]
+
+
+def test_no_campaign_yet(tmp_path: Path) -> None:
+    with (
+        Database(tmp_path / "x.duckdb") as own,
+        pytest.raises(NotFoundError, match="no campaign yet; type `monitor import FOLDER`"),
+    ):
+        campaigns.chosen(own, None)
+
+
+def test_a_base_effect_is_not_added(db: Database) -> None:
+    with pytest.raises(InputError, match="EXX:poly1 is free in every run already, whatever the model"):
+        models.add(db, "EXX:poly1", "samba")
+    assert [one["model"] for one in models.list_(db)["models"]] == ["samba"]
+
+
+def test_history_is_that_of_the_campaign_last_looked_at(db: Database) -> None:
+    made = models.add(db, "EXX:reversal", "samba", "m")
+    with pytest.raises(NotFoundError, match="model m has not been compared with a campaign yet"):
+        comparison.latest_campaign(db, made)
+    identify(db, "cold-cold")
+    assert comparison.latest_campaign(db, made) == "cold-cold"
+    comparison.compare(db, "hidden-reversal-x")
+    assert comparison.latest_campaign(db, made) == "hidden-reversal-x"
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63])
+def test_seeds_that_cannot_be_stored(db: Database, seed: int) -> None:
+    with pytest.raises(InputError, match="a seed is a whole number from 0"):
+        evaluate(db, "five-days", seed=seed)
+
+
+def test_inputs_come_from_the_repeated_runs_where_there_are_enough(db: Database) -> None:
+    assert evaluate(db, "five-days", method="guf").input_covariance.startswith(
+        "repeated runs, pooled by day, 15"
+    )
+    assert evaluate(db, "cold-cold", method="guf").input_covariance.startswith(
+        "repeated runs, pooled by day, 43"
+    )
+
+
+def test_events_need_words_and_a_machine(db: Database) -> None:
+    at = datetime.fromisoformat("2026-03-05T07:00:00-05:00")
+    with pytest.raises(InputError, match="say in words what happened"):
+        keeping.record(db, "HU40-T", at, "note", " ")
+    with pytest.raises(NotFoundError, match="there is no machine 'NOPE'; there are HU40-T"):
+        keeping.events(db, "NOPE")
+    assert keeping.events(db)["events"] == []
+
+
+def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: Path) -> None:
+    document, fitted = comparison.compare(db, "hidden-reversal-x")
+    files = comparison_figures(document, fitted, tmp_path / "figures ü")
+    names = {Path(file).name for file in files}
+    assert {"where-it-fails.svg", "where-it-fails.png", "residual-vectors.png"} <= names
+    found, explanation = comparison.explain_campaign(db, "hidden-reversal-x")
+    files += explanation_figures(found, explanation, tmp_path / "figures ü")
+    assert "missing-effects.svg" in {Path(file).name for file in files}
+    for file in files:
+        assert Path(file).stat().st_size > 1000
+    one = found["missing"][0]
+    # Beside the bar stands the size, short enough to be whole; the words are in the title.
+    text = (tmp_path / "figures ü" / "missing-effects.svg").read_text(encoding="utf-8")
+    assert one["effect"] in text
+    assert f"± {one['u']:.2g}" in text
