@@ -30,6 +30,7 @@ from monitor.store.identifications import (
     save_identification,
 )
 from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
+from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
 from monitor.store.verification import Verification, verify_audit
@@ -44,9 +45,11 @@ __all__ = [
     "StoredCertificate",
     "StoredIdentification",
     "StoredModel",
+    "StoredRefusal",
     "StoredRun",
     "StoredSelection",
     "Verification",
+    "clear_refusals",
     "described_machines",
     "export_tables",
     "find_certificate",
@@ -74,6 +77,8 @@ __all__ = [
     "mark_certificate",
     "model_history",
     "record_event",
+    "record_refusal",
+    "refusals",
     "restore",
     "save_analysis",
     "save_certificate",

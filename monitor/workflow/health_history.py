@@ -7,12 +7,14 @@ from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.records import Array
 from monitor.statistics import Change as Found
-from monitor.statistics import find_changes, forecast, trend
+from monitor.statistics import forecast, trend
 from monitor.store import Database, StoredModel
+from monitor.workflow.change_search import search_changes
 from monitor.workflow.weeks import Week
 
 DAY = 86400.0
@@ -56,6 +58,18 @@ class Series:
     values: Array
     u: Array
     warm_up: Array
+
+    @property
+    def days(self) -> npt.NDArray[np.str_]:
+        """The calendar days of the runs (n,), by the shop's clock."""
+        return np.array([f"{at:%Y-%m-%d}" for at in self.times], dtype=np.str_)
+
+    def part(self, chosen: npt.NDArray[np.bool_]) -> Series:
+        """The chosen runs."""
+        times = tuple(at for at, kept in zip(self.times, chosen, strict=True) if kept)
+        return Series(
+            self.name, self.unit, times, self.t[chosen], self.values[chosen], self.u[chosen], self.warm_up[chosen]
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -188,30 +202,16 @@ def series_of(db: Database, machine: str, model: StoredModel, runs: list[PastRun
 def changes_of(series: dict[str, Series], events: list[Event], origin: datetime) -> dict[str, list[Found]]:
     """Changes of every parameter, runs that were warming up left out; the false-alarm probability is shared.
 
-    Parameters that were found in the same runs are searched together. The index of a change is not that of
-    the series but its ``at`` and ``interval`` are times in days since ``origin``.
+    Times of a change (``at``, ``interval``) are in days since ``origin``; its index is not that of the series.
     """
-    groups: dict[bytes, list[Series]] = {}
-    for one in series.values():
-        steady = one.warm_up == 0
-        if steady.sum() >= FEWEST_RUNS:
-            groups.setdefault(one.t[steady].tobytes(), []).append(one)
-    share = FALSE_ALARM / max(len(groups), 1)
-    split = sorted((event.at - origin).total_seconds() / DAY for event in events)
-    found: dict[str, list[Found]] = {}
-    rng = np.random.default_rng(SEED)
-    for group in groups.values():
-        steady = group[0].warm_up == 0
-        times = group[0].t[steady]
-        pieces = len({0, *np.searchsorted(times, split).tolist()})
-        trials = max(1999, int(2 * len(group) * pieces / share))
-        history = find_changes(
-            {one.name: one.values[steady] for one in group}, times,
-            rng=rng, events=split, false_alarm=share, trials=trials,
-        )  # fmt: skip
-        for change in history.changes:
-            found.setdefault(change.parameter, []).append(change)
-    return found
+    steady = [one.part(one.warm_up == 0) for one in series.values()]
+    searched = search_changes(
+        [one for one in steady if len(one.t) >= FEWEST_RUNS],
+        [(event.at - origin).total_seconds() / DAY for event in events],
+        false_alarm=FALSE_ALARM,
+        seed=SEED,
+    )
+    return {name: list(found.changes) for name, (found, _) in searched.items() if found and found.changes}
 
 
 def drift_of(one: Series, since: float, now: float, tolerance: float | None) -> DriftFound | None:

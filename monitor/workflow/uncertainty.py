@@ -20,6 +20,9 @@ from monitor.effects.catalogue import catalogue
 from monitor.exceptions import DataError, InputError
 from monitor.methods import method_named
 from monitor.methods.identification import Refusal
+from monitor.methods.problem import ChainProblem
+from monitor.methods.results import refusals
+from monitor.methods.touch import TouchProblem
 from monitor.records import Array, Campaign
 from monitor.store import Database, StoredModel, load_campaign, save_analysis
 from monitor.uncertainty import (
@@ -77,16 +80,23 @@ class Evaluated:
     causes: tuple[tuple[str, float], ...] = ()
 
 
+def _touch(problem: ChainProblem) -> TouchProblem:
+    if not isinstance(problem, TouchProblem):
+        raise DataError("the uncertainty by both routes is known for campaigns that touch balls only, so far")
+    return problem
+
+
 def _reading_inputs(
     db: Database, found: Fit, campaign: Campaign, one: RunProblem, model: StoredModel, select: str | None
 ) -> tuple[Inputs, str]:
     """Inputs of the readings of a run, and in words where their covariance is from: all runs, or a stored selection."""
+    problem = _touch(found.problem)
     count = one.probings * len(one.linear)
     names, units = one.input_names[:count], ("mm",) * count
     days = {run.run: run.day for run in campaign.runs}
     labels = np.array([days[int(run)] for run in found.problem.runs])
     if select is not None:
-        values, labels = selected_readings(db, select, campaign.name, model, found.problem)
+        values, labels = selected_readings(db, select, campaign.name, model, problem)
         if len(labels) - 1 < FEWEST_DEGREES_OF_FREEDOM:
             raise DataError(
                 f"--select {select}: {len(labels)} runs leave {len(labels) - 1} degrees of freedom for a covariance; "
@@ -94,7 +104,7 @@ def _reading_inputs(
             )
     else:
         try:
-            values = repeated_readings(found.problem)
+            values = repeated_readings(problem)
         except DataError:
             values = np.zeros((0, count))
     runs = len(labels)
@@ -183,7 +193,7 @@ def evaluate(
     found = fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
     number = int(found.problem.runs[-1]) if run is None else run
     # The uncertainty of shared effects and time constants is not propagated into a run's own parameters.
-    fixed, coefficients = found.problem.resolved(found.solution.common)
+    fixed, coefficients = _touch(found.problem).resolved(found.solution.common)
     one = run_problem(fixed, number, coefficients)
     readings, words = _reading_inputs(db, found, loaded, one, stored, select)
     bar = _bar_inputs(one)
@@ -227,7 +237,8 @@ def evaluate(
             finite_dof=False,
         )
         validation = validate(plain, mcm, digits=digits)
-    refused = method_named(loaded.method).refusals(found.problem, found.solution.null_space[place], number)
+    advice = method_named(loaded.method).advice
+    refused = refusals(found.problem, found.solution.null_space[place], number, advice)
     return Evaluated(loaded, stored, found, number, framework, units, refused, words, mcm, validation, causes)
 
 
