@@ -76,7 +76,7 @@ def _shape(effect: ChainEffect) -> str:
         power = {1: "in proportion to", 2: "with the square of", 3: "with the cube of"}
         return f", growing {power.get(shape.order, f'with power {shape.order} of')} its position"
     if isinstance(shape, Harmonic):
-        times = {1: "once", 2: "twice", 3: "three times"}
+        times: dict[float, str] = {1: "once", 2: "twice", 3: "three times"}
         return f", repeating {times.get(shape.order, f'{shape.order:g} times')} a turn"
     if isinstance(shape, Cyclic):
         return f", repeating every {shape.pitch:g} mm"
@@ -229,7 +229,7 @@ def _harmonic(effect: ChainEffect, shape: Harmonic, own: bool) -> tuple[str, str
             ROBOTS,
         )
     if own:
-        source = {
+        source: dict[float, str] = {
             1: "eccentric encoder disc or worm wheel",
             2: "oval or doubly misaligned worm wheel or encoder",
         }

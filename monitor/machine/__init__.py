@@ -2,7 +2,7 @@
 
 from monitor.machine.chain import Evaluation, evaluate
 from monitor.machine.gravity import gravity_in_joint_frames, torques_in_joint_frames
-from monitor.machine.inverse import touching_positions
+from monitor.machine.inverse import refuse_untouchable, touching_positions
 from monitor.machine.terms import COMPONENTS, LOCATION, MOTION, Term, parse_term
 from monitor.machine.topology import Chain, Joint, chain_of_axes, parse_topology
 
@@ -19,6 +19,7 @@ __all__ = [
     "gravity_in_joint_frames",
     "parse_term",
     "parse_topology",
+    "refuse_untouchable",
     "torques_in_joint_frames",
     "touching_positions",
 ]
