@@ -131,7 +131,7 @@ def _normals(campaign: Campaign) -> Array:
             f"run {campaign.probings.run[row]}, sequence {campaign.probings.sequence[row]}: a normal is a vector of "
             f"length 1, not {normal[row].tolist()}"
         )
-    return normal / length[:, None]
+    return np.asarray(normal / length[:, None])
 
 
 def _references(context: Context, tips: Array, ball: npt.NDArray[np.bool_]) -> Array:

@@ -10,8 +10,8 @@ from typing import Any
 
 from monitor.effects import parse_effect
 from monitor.effects.words import describe
-from monitor.exceptions import InputError, NotFoundError
-from monitor.machine import parse_topology
+from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.machine import Chain, parse_topology
 from monitor.methods import METHODS
 from monitor.methods.base_effects import base_effects
 from monitor.methods.model import Model
@@ -83,12 +83,17 @@ def list_(db: Database) -> Document:
 def show(db: Database, name: str) -> Document:
     """A model, its added effects in words, and its base effects on every machine that is there."""
     stored = resolve(db, name)
+    method = _method_of(db, stored)
     machines = list_machines(db)
     base: dict[str, list[str]] = {}
     words: dict[str, str] = {}
     for machine, topology in zip(machines["machine"], machines["topology"], strict=True):
         chain = parse_topology(str(topology))
-        base[str(machine)] = list(base_effects(chain))
+        try:
+            base[str(machine)] = list(_base_of(method, chain))
+        except DataError:
+            # A method that this machine cannot be calibrated by has no base on it.
+            continue
         for text in stored.effects:
             try:
                 words.setdefault(text, describe(parse_effect(text, chain)).meaning)
@@ -104,7 +109,7 @@ def add(db: Database, effect: str, to: str, as_: str | None = None, note: str = 
     """
     parent = resolve(db, to)
     text = _known(db, effect)
-    if _is_base(db, text):
+    if _is_base(db, text, _method_of(db, parent)):
         raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
     if text in parent.effects:
         raise InputError(
@@ -135,10 +140,28 @@ def _name(as_: str | None, parent: StoredModel) -> str:
     return as_
 
 
-def _is_base(db: Database, effect: str) -> bool:
-    """Whether an effect is a base effect on every machine."""
-    topologies = dict.fromkeys(str(topology) for topology in list_machines(db)["topology"])
-    return all(effect in base_effects(parse_topology(topology)) for topology in topologies)
+def _method_of(db: Database, stored: StoredModel) -> str:
+    """The method that a model descends from."""
+    while stored.parent is not None:
+        stored = load_model(db, *stored.parent)
+    return stored.name if stored.name in METHODS else next(iter(METHODS))
+
+
+def _base_of(method: str, chain: Chain) -> tuple[str, ...]:
+    """The effects that are free in every run of a method; a method that names none has the complete model's."""
+    found: tuple[str, ...] = getattr(METHODS[method], "base_effects", base_effects)(chain)
+    return found
+
+
+def _is_base(db: Database, effect: str, method: str) -> bool:
+    """Whether an effect is a base effect of a method on every machine that it can calibrate."""
+    found = []
+    for topology in dict.fromkeys(str(topology) for topology in list_machines(db)["topology"]):
+        try:
+            found.append(effect in _base_of(method, parse_topology(topology)))
+        except DataError:
+            continue
+    return bool(found) and all(found)
 
 
 def _known(db: Database, effect: str) -> str:
