@@ -11,11 +11,11 @@ from typing import Any
 from monitor.effects import parse_effect
 from monitor.effects.words import describe
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.machine import Chain, parse_topology
+from monitor.machine import Chain
 from monitor.methods import METHODS
 from monitor.methods.base_effects import base_effects
-from monitor.methods.model import Model
-from monitor.store import Database, StoredModel, list_machines, list_models, load_model, save_model
+from monitor.methods.model import Model, chain_of
+from monitor.store import Database, StoredModel, described_machines, list_models, load_model, save_model
 
 Document = dict[str, Any]
 
@@ -84,13 +84,12 @@ def show(db: Database, name: str) -> Document:
     """A model, its added effects in words, and its base effects on every machine that is there."""
     stored = resolve(db, name)
     method = _method_of(db, stored)
-    machines = list_machines(db)
     base: dict[str, list[str]] = {}
     words: dict[str, str] = {}
-    for machine, topology in zip(machines["machine"], machines["topology"], strict=True):
-        chain = parse_topology(str(topology))
+    for machine in described_machines(db):
+        chain = chain_of(machine)
         try:
-            base[str(machine)] = list(_base_of(method, chain))
+            base[machine.id] = list(_base_of(method, chain))
         except DataError:
             # A method that this machine cannot be calibrated by has no base on it.
             continue
@@ -156,23 +155,28 @@ def _base_of(method: str, chain: Chain) -> tuple[str, ...]:
 def _is_base(db: Database, effect: str, method: str) -> bool:
     """Whether an effect is a base effect of a method on every machine that it can calibrate."""
     found = []
-    for topology in dict.fromkeys(str(topology) for topology in list_machines(db)["topology"]):
+    for chain in _chains(db):
         try:
-            found.append(effect in _base_of(method, parse_topology(topology)))
+            found.append(effect in _base_of(method, chain))
         except DataError:
             continue
     return bool(found) and all(found)
 
 
+def _chains(db: Database) -> tuple[Chain, ...]:
+    """The different chains of the machines that are there."""
+    return tuple(dict.fromkeys(chain_of(machine) for machine in described_machines(db)))
+
+
 def _known(db: Database, effect: str) -> str:
     """The effect in its own words, if any machine has it."""
-    topologies = [str(topology) for topology in list_machines(db)["topology"]]
-    if not topologies:
+    chains = _chains(db)
+    if not chains:
         raise NotFoundError("there is no machine yet that could have an effect; import a campaign first")
     fault: InputError | None = None
-    for topology in dict.fromkeys(topologies):
+    for chain in chains:
         try:
-            return parse_effect(effect, parse_topology(topology)).text
+            return parse_effect(effect, chain).text
         except InputError as error:
             fault = fault or error
     assert fault is not None
