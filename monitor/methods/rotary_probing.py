@@ -227,10 +227,4 @@ def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification
     that the machine or the data do not have.
     """
     problem = problem_of(campaign, model)
-    found = identification(campaign, model, problem, solve_problem(problem), advice)
-    # What is left of a touch, as the vector along the normal that it is.
-    runs = [
-        replace(run, residuals=run.residuals * problem.normal[problem.context.run == run.run])
-        for run in found.runs
-    ]
-    return replace(found, runs=tuple(runs))
+    return identification(campaign, model, problem, solve_problem(problem), advice)
