@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -111,7 +112,7 @@ def rows_are_sorted(problem: CurveProblem) -> bool:
     nested = 0
     for labels in problem.inputs.groups.values():
         both = [f"{block} {label}" for block, label in zip(blocks, labels, strict=True)]
-        changes = 1 + sum(one != other for one, other in zip(both, both[1:], strict=False))
+        changes = 1 + sum(one != other for one, other in pairwise(both))
         if changes == len(set(both)) and len(set(both)) > len(np.unique(blocks)):
             blocks = np.unique(both, return_inverse=True)[1]
             nested += 1
@@ -141,7 +142,10 @@ class Scene:
         return self.candidates([effect], [tries], [family])[0]
 
     def candidates(
-        self, effects: Sequence[CurveEffect], tries: Sequence[int], families: Sequence[str | None] | None = None
+        self,
+        effects: Sequence[CurveEffect],
+        tries: Sequence[int],
+        families: Sequence[str | None] | None = None,
     ) -> list[Candidate]:
         """Several candidates at once, the model taken out of their columns."""
         raw = [self.columns(effect) for effect in effects]
@@ -218,7 +222,9 @@ def see(scene: Scene) -> Visible:
         elif effect.order and len(np.unique(problem.inputs.numbers[effect.column])) <= effect.order:
             refused.append((effect.text, f"{effect.column} takes too few values"))
         elif effect.shape == "group" and not _groups_say_something(problem, effect):
-            refused.append((effect.text, f"{effect.column} has one label, or a label of its own in nearly every row"))
+            refused.append(
+                (effect.text, f"{effect.column} has one label, or a label of its own in nearly every row")
+            )
         else:
             candidates.append(scene.candidate(effect))
     return Visible(
@@ -257,7 +263,9 @@ def separable(problem: CurveProblem) -> Callable[[Sequence[Candidate], Candidate
             return True
         rate, least = 1.0 / effect.value, APART / spans[effect.column]
         others = [effect_of(other) for other in chosen]
-        taken = [(other.column, 1.0 / other.value) for other in others if other.shape == "sin" and other.value]
+        taken = [
+            (other.column, 1.0 / other.value) for other in others if other.shape == "sin" and other.value
+        ]
         return all(
             abs(other - rate) >= least for column, other in (*known, *taken) if column == effect.column
         )
@@ -287,7 +295,11 @@ def at_best(scene: Scene, visible: Visible, chosen: Sequence[Candidate], place: 
     rate = 1.0 / effect.value
     x = scene.fit.problem.inputs.numbers[effect.column]
     width = 1.0 / (3.0 * float(np.ptp(x))) if effect.shape == "sin" else 0.35 * abs(rate)
-    low, high = (rate - width, rate + width) if effect.shape != "sin" else (max(rate - width, 0.3 * rate), rate + width)
+    low, high = (
+        (rate - width, rate + width)
+        if effect.shape != "sin"
+        else (max(rate - width, 0.3 * rate), rate + width)
+    )
     best = optimize.minimize_scalar(
         badness, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * width, "maxiter": 40}
     )

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy import linalg
 
 from monitor.discovery.curve_candidates import (
     Scene,
@@ -28,10 +29,10 @@ from monitor.discovery.evidence import Evidence, Pool, orthonormal, weigh, witho
 from monitor.discovery.held_out import held_out_rms
 from monitor.discovery.scan import Finding, ScanResult, scan
 from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Visible
-from monitor.effects.curve import CurveEffect
+from monitor.effects.curve import CurveEffect, coefficient_names
 from monitor.effects.curve_words import calendar_period, describe_curve
 from monitor.effects.words import Words
-from monitor.methods.curve import CurveFit, CurveProblem, fit
+from monitor.methods.curve import CurveFit, CurveProblem, fit, inverse_normal
 from monitor.records import Array
 from monitor.statistics.noise import WHITE, Assessed, Noise, assess, p_value_against_noise, p_value_in_noise
 
@@ -165,9 +166,7 @@ class _Acceptance:
         if p * self.families <= self.rate:
             return True
         fitted, rows = self.scene.fit, self.scene.fit.problem.order
-        x = np.column_stack(
-            [fitted.design, *(self.scene.columns(effect_of(one)) for one in others)]
-        )[rows]
+        x = np.column_stack([fitted.design, *(self.scene.columns(effect_of(one)) for one in others)])[rows]
         y = fitted.problem.curve.measured[rows]
         together, price = [found], 1.0
         while True:
@@ -273,9 +272,7 @@ class _Views:
         return _Round(scene, visible, result, acceptance, under)
 
 
-def _standing(
-    acceptance: _Acceptance, findings: Sequence[Finding]
-) -> tuple[Finding, ...]:
+def _standing(acceptance: _Acceptance, findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """Findings that still stand in correlated noise with all the others in the model: the weakest is asked first."""
     kept = list(findings)
     while kept:
@@ -333,9 +330,7 @@ def _noise_of(fitted: CurveFit) -> Assessed:
     return assess(fitted.problem.curve.measured[rows], fitted.design[rows])
 
 
-def _exhausted(
-    views: _Views, suspect: tuple[Outlier, ...], most: int
-) -> tuple[_Round, tuple[Outlier, ...]]:
+def _exhausted(views: _Views, suspect: tuple[Outlier, ...], most: int) -> tuple[_Round, tuple[Outlier, ...]]:
     """One effect after the other, until nothing stands: readings that look like outliers are judged under the most
     convincing effects before weaker ones are looked for."""
     now = views.look(suspect, 0)
@@ -427,8 +422,6 @@ def _missing(
 
 
 def _own_names(fitted: CurveFit, effect: CurveEffect) -> tuple[str, ...]:
-    from monitor.effects.curve import coefficient_names
-
     return coefficient_names(effect, fitted.problem.inputs)
 
 
@@ -446,10 +439,6 @@ def inflation(fitted: CurveFit, noise: Assessed, at: int) -> float:
 
 
 def _covariance(fitted: CurveFit, noise: Assessed) -> Array:
-    from scipy import linalg
-
-    from monitor.methods.curve import inverse_normal
-
     x = fitted.design[fitted.problem.order]
     inverse = inverse_normal(x)
     variance = fitted.deviation**2

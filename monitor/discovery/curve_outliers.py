@@ -48,7 +48,9 @@ def outliers(fit: CurveFit) -> tuple[Outlier, ...]:
         left, spread, freedom, checked = _residual(y[rows] - modelled[rows], x[rows])
         if freedom < FEWEST_LEFT or spread <= 0.0:
             break
-        studentised = np.where(checked > 1e-6, np.abs(left) / np.sqrt(np.maximum(checked, 1e-6)), 0.0) / spread
+        studentised = (
+            np.where(checked > 1e-6, np.abs(left) / np.sqrt(np.maximum(checked, 1e-6)), 0.0) / spread
+        )
         worst = int(studentised.argmax())
         r = float(studentised[worst])
         # The externally studentised residual is Student's t with one degree of freedom less.

@@ -148,9 +148,7 @@ def _merge(
         families = {one.family for one in chosen}
         stack, dof = _stack(visible, others), visible.degrees_of_freedom
         found = [
-            one
-            for one in _weighed(visible, pool, others, allowed)
-            if one.candidate.family not in families
+            one for one in _weighed(visible, pool, others, allowed) if one.candidate.family not in families
         ]
         more = _stack(visible, [*others, chosen[first]])
         pair = weigh([chosen[first]], visible.residual, stack, dof)[0].score

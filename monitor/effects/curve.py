@@ -3,7 +3,7 @@
 | written | what |
 | --- | --- |
 | ``load_N`` or ``load_N:poly1`` | in proportion to an input |
-| ``load_N:poly2`` ... ``poly9`` | a power of it; the lower powers that the model lacks come along, so that the origin of the input does not matter |
+| ``load_N:poly2`` ... ``poly9`` | a power of it; lower powers that the model lacks come along: no origin matters |
 | ``date:drift`` | in proportion to the time, or to ``sequence``, the number of the row |
 | ``month:sin12`` | a cosine and a sine of exactly this period |
 | ``month:sin~44.3`` | the same with a period that is found from the data, near this value; ``month:sin`` searches it |
@@ -112,7 +112,9 @@ def parse_curve_effect(text: str, inputs: Inputs | None = None) -> CurveEffect:
         raise EffectError(f"'{text}' is no effect of a curve; write for example {EXAMPLES}")
     column, shape = found["column"], found["shape"]
     if inputs is not None and column not in inputs.numbers and column not in inputs.groups:
-        raise EffectError(f"'{text}' names the column {column}, which is no input; there are {inputs.names()}")
+        raise EffectError(
+            f"'{text}' names the column {column}, which is no input; there are {inputs.names()}"
+        )
     grouped = inputs is not None and column in inputs.groups
     if shape is None:
         shape = "group" if grouped else "poly1"
@@ -125,7 +127,9 @@ def parse_curve_effect(text: str, inputs: Inputs | None = None) -> CurveEffect:
     assert bare is not None
     value = None if found["value"] is None else float(found["value"])
     if value is None and found["free"]:
-        raise EffectError(f"'{text}': after ~ comes the {SEARCHED[bare[0]]} to begin from, for example {bare[0]}~12")
+        raise EffectError(
+            f"'{text}': after ~ comes the {SEARCHED[bare[0]]} to begin from, for example {bare[0]}~12"
+        )
     if value is not None and (not np.isfinite(value) or (bare[0] != "step" and value == 0.0)):
         raise EffectError(f"'{text}': the {SEARCHED[bare[0]]} must be a finite number other than 0")
     if bare[0] == "sin" and value is not None and value < 0.0:
@@ -197,7 +201,9 @@ def parse_base(text: str, response: str, inputs: Inputs) -> tuple[bool, tuple[Cu
     if not tilde or not right.strip():
         raise EffectError(f"'{text}' is no model; write the response, ~, and its terms, such as {example}")
     if left.strip() != response:
-        raise EffectError(f"'{text}' begins with '{left.strip()}'; the response is {response}: write {example}")
+        raise EffectError(
+            f"'{text}' begins with '{left.strip()}'; the response is {response}: write {example}"
+        )
     constant, effects = True, []
     for term in _terms(right):
         if term in ("0", "1"):
@@ -221,7 +227,12 @@ def _terms(text: str) -> list[str]:
     for place, sign in enumerate(text):
         depth += (sign == "(") - (sign == ")")
         exponent = re.search(r"[\d.][eE]$", text[start:place]) is not None
-        if sign == "+" and depth == 0 and not exponent and not re.search(r"(sin|exp|step)~?$", text[start:place]):
+        if (
+            sign == "+"
+            and depth == 0
+            and not exponent
+            and not re.search(r"(sin|exp|step)~?$", text[start:place])
+        ):
             found.append(text[start:place].strip())
             start = place + 1
     return [*found, text[start:].strip()]

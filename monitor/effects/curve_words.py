@@ -64,9 +64,13 @@ def describe_curve(effect: CurveEffect, response: str, unit: str = "", *, clock:
         period = known[0] if known else f"{effect.value:.4g} {unit or ('rows' if time else '')}".strip()
         if effect.value is None:
             period = "a period that is searched"
-        cause = "something that comes back regularly: a rotating part, a controller, the mains, tides or weather"
+        cause = (
+            "something that comes back regularly: a rotating part, a controller, the mains, tides or weather"
+        )
         if not time:
-            cause = "interpolation error of a scale or converter, or an eccentric part: it repeats with the input"
+            cause = (
+                "interpolation error of a scale or converter, or an eccentric part: it repeats with the input"
+            )
         return Words(
             f"{response} goes up and down {where}, repeating every {period.removeprefix('a ')}"
             if known and known[0].startswith("a ")
@@ -98,7 +102,9 @@ def describe_curve(effect: CurveEffect, response: str, unit: str = "", *, clock:
             DRIFT if time else CALIBRATION,
         )  # fmt: skip
     if effect.shape == "formula":
-        return Words(f"{response} follows {effect.column}", "what the user knows of it", "as the user sees fit", FIT)
+        return Words(
+            f"{response} follows {effect.column}", "what the user knows of it", "as the user sees fit", FIT
+        )
     power = {1: "in proportion to", 2: "with the square of", 3: "with the cube of"}
     if time:
         what = "drifts steadily" if effect.order == 1 else f"drifts at a changing rate (power {effect.order})"

@@ -223,10 +223,14 @@ def fit(problem: CurveProblem) -> CurveFit:
         else:
             u_values.append(float("nan"))
     member = np.abs(null).max(axis=0, initial=0.0) > MEMBER_SHARE
-    refused = ()
+    refused: tuple[Refusal, ...] = ()
     if member.any():
         group = tuple(name for name, one in zip(names, member, strict=True) if one)
-        refused = (Refusal(group, f"with these rows {' and '.join(group)} cannot be told apart; vary them separately"),)
+        refused = (
+            Refusal(
+                group, f"with these rows {' and '.join(group)} cannot be told apart; vary them separately"
+            ),
+        )
     size = len(names)
     return CurveFit(
         problem, names, units, np.where(member, np.nan, estimate),

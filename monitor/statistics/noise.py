@@ -33,7 +33,7 @@ _SETTLED = 1e-8
 
 @dataclass(frozen=True)
 class Noise:
-    """A process: correlation ``slow`` of its slow part from row to row, and the ``independent`` share of its variance."""
+    """A process: correlation ``slow`` of its slow part from row to row, ``independent`` share of its variance."""
 
     slow: float = 0.0
     independent: float = 0.0
@@ -63,7 +63,7 @@ class Noise:
 
     def correlations(self, count: int) -> Array:
         """Correlation (count,) of rows 0, 1, 2 ... apart."""
-        found: Array = (1.0 - self.independent) * self.slow ** np.arange(count)
+        found = np.asarray((1.0 - self.independent) * self.slow ** np.arange(count), dtype=np.float64)
         found[0] = 1.0
         return found
 

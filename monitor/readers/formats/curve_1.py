@@ -51,7 +51,9 @@ def recognises(folder: Path) -> bool:
         if (folder / DATA).is_file() and not (folder / "probings.csv").exists():
             return True
         try:
-            return re.search(rb'(?m)^\s*method\s*=\s*["\']curve["\']', (folder / TOML).read_bytes()) is not None
+            return (
+                re.search(rb'(?m)^\s*method\s*=\s*["\']curve["\']', (folder / TOML).read_bytes()) is not None
+            )
         except OSError:
             return False
 
@@ -139,7 +141,9 @@ def _told(top: Table) -> _Told | None:
         groups=_names(table, "groups"),
         inputs=_names(table, "inputs"),
         units=given,
-        uncertainty=table.number("standard_uncertainty", positive=True, unit="the response's unit", example="0.001"),
+        uncertainty=table.number(
+            "standard_uncertainty", positive=True, unit="the response's unit", example="0.001"
+        ),
     )
     table.finish()
     return found
@@ -150,7 +154,9 @@ def _names(table: Table, key: str) -> tuple[str, ...]:
     if value is None:
         return ()
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-        table.fault(key, f'{quoted(value)} is not a list of columns; write for example {key} = ["probe", "operator"]')
+        table.fault(
+            key, f'{quoted(value)} is not a list of columns; write for example {key} = ["probe", "operator"]'
+        )
         return ()
     return tuple(value)
 
@@ -160,7 +166,10 @@ def _check_names(table: CsvTable, faults: Faults) -> None:
         if not NAME.fullmatch(name) or name in RESERVED:
             told = "is a word of the language" if name in RESERVED else "is not a name that a model can use"
             faults.add(
-                DATA, 1, name, f"the column name {quoted(name)} {told}; write letters, digits and _, such as load_N"
+                DATA,
+                1,
+                name,
+                f"the column name {quoted(name)} {told}; write letters, digits and _, such as load_N",
             )
 
 
@@ -178,7 +187,9 @@ def _check_told(top: Table, told: _Told, table: CsvTable) -> bool:
             sound = False
     both = set(told.groups) & set(told.inputs)
     for name in sorted(both):
-        section.fault("groups", f"{quoted(name)} is among the inputs too; a column holds either numbers or labels")
+        section.fault(
+            "groups", f"{quoted(name)} is among the inputs too; a column holds either numbers or labels"
+        )
         sound = False
     for key in ("groups", "inputs"):
         if told.response in getattr(told, key):
@@ -187,7 +198,9 @@ def _check_told(top: Table, told: _Told, table: CsvTable) -> bool:
     return sound
 
 
-Columns = tuple[dict[str, Array], dict[str, np.ndarray[tuple[int], np.dtype[np.str_]]], dict[str, str], str | None]
+Columns = tuple[
+    dict[str, Array], dict[str, np.ndarray[tuple[int], np.dtype[np.str_]]], dict[str, str], str | None
+]
 
 
 def _columns(table: CsvTable, told: _Told, faults: Faults) -> Columns:
@@ -201,7 +214,9 @@ def _columns(table: CsvTable, told: _Told, faults: Faults) -> Columns:
         if days is not None:
             columns[name], units[name] = days, DATE_UNIT
             dated.append(name)
-        elif name in told.groups or (name not in (*told.inputs, told.response, told.time) and _are_labels(cells)):
+        elif name in told.groups or (
+            name not in (*told.inputs, told.response, told.time) and _are_labels(cells)
+        ):
             _refuse_empty(table, name, cells, faults)
             labels[name] = np.array(cells, dtype=np.str_)
         else:
@@ -212,11 +227,15 @@ def _columns(table: CsvTable, told: _Told, faults: Faults) -> Columns:
     clocks = [name for name in columns if name != told.response and units[name] in CLOCKS]
     time = told.time or (dated[0] if dated else clocks[0] if len(clocks) == 1 else None)
     if told.time is not None and told.time not in columns:
-        faults.add(DATA, 1, told.time, "the column of the time holds neither numbers nor dates such as 1980-02-05")
+        faults.add(
+            DATA, 1, told.time, "the column of the time holds neither numbers nor dates such as 1980-02-05"
+        )
     if not len(faults) and told.response is not None:
         for name, values in columns.items():
             if name == told.response and np.ptp(values) == 0.0:
-                faults.add(DATA, None, name, "the response is the same in every row: there is nothing to explain")
+                faults.add(
+                    DATA, None, name, "the response is the same in every row: there is nothing to explain"
+                )
     return columns, labels, units, time
 
 
