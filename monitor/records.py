@@ -255,3 +255,47 @@ class Campaign:
     runs: tuple[Run, ...]
     probings: Probings
     files: tuple[SourceFile, ...] = ()
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What a curve belongs to: a load cell, a resistor, a thermometer."""
+
+    id: str
+    manufacturer: str | None = None
+    model: str | None = None
+    serial_number: str | None = None
+    location: str | None = None
+
+
+@dataclass(frozen=True)
+class CurveCampaign:
+    """One response measured at many values of its inputs, row by row in file order (n rows).
+
+    ``columns`` are the numbers (n,) by name, the response among them, each in the unit of ``units`` ("" where
+    nothing says one); a column of dates holds days since its first. ``groups`` are labels (n,) by name. ``base``
+    is the one-line model; ``time`` the column that says when a row was measured, None where the order of the
+    rows is all there is; ``lines`` (n,) the line of each row in the file. ``standard_uncertainty`` is that of one
+    response as stated, in its unit.
+    """
+
+    name: str
+    method: str
+    instrument: Instrument
+    response: str
+    base: str
+    columns: Mapping[str, Array]
+    groups: Mapping[str, npt.NDArray[np.str_]]
+    units: Mapping[str, str]
+    time: str | None
+    lines: npt.NDArray[np.int64]
+    standard_uncertainty: float | None = None
+    files: tuple[SourceFile, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def measured(self) -> Array:
+        """The response (n,)."""
+        return self.columns[self.response]

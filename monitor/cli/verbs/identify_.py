@@ -5,11 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
-from monitor.cli import output
+from monitor.cli import curve_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow import campaigns
+from monitor.store import is_curve
+from monitor.workflow import campaigns, curves
 from monitor.workflow.identification import identify
 from monitor.workflow.stepwise import steps
 
@@ -39,7 +40,10 @@ def run(options: Namespace) -> int:
         return _stepwise(options)
     with opened(options) as db, output.working("identifying"), db.transaction():
         names = campaigns.chosen(db, options.campaign)
-        found = [identify(db, name, options.model, options.number) for name in names]
+        found = [
+            (curves.identify if is_curve(db, name) else identify)(db, name, options.model, options.number)
+            for name in names
+        ]
     if options.json:
         output.document(found[0] if options.campaign is not None else {"identifications": found})
         return 0
@@ -86,6 +90,9 @@ def _stepwise(options: Namespace) -> int:
 
 def show(found: dict[str, Any]) -> None:
     """The parameters of the runs, newest last, and what was refused."""
+    if found["method"] == "curve":
+        curve_output.coefficients(found)
+        return
     runs = found["runs"][-SHOWN_RUNS:]
     names = list(dict.fromkeys(name for one in runs for name in one["parameters"]))
     rows = []
