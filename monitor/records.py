@@ -80,12 +80,37 @@ class ScaleBar:
 
 
 @dataclass(frozen=True)
+class KnownError:
+    """An error that was measured by other means: ``EXX(110)``, its value and standard uncertainty in mm."""
+
+    parameter: str
+    value: float
+    standard_uncertainty: float
+    certificate: str
+
+
+@dataclass(frozen=True)
+class SelfCalibration:
+    """How the errors of a self-calibration are tabulated, and what fixes the frame that no reading fixes.
+
+    ``nodes`` maps a linear axis to the readings in mm at which its errors are unknowns. ``conditions`` are the
+    boundary conditions, each a parameter that is zero by choice (``EYX(0)``) or a word of the method; empty
+    means the method's own. ``length`` is the one error that has to be known, for the unit of length.
+    """
+
+    nodes: Mapping[str, tuple[float, ...]]
+    length: KnownError
+    conditions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Artefact:
-    """The balls, and the scale bar where the method needs one."""
+    """The balls, the scale bar where the method needs one, the tables and conditions of a self-calibration."""
 
     id: str
     balls: tuple[Ball, ...]
     scale_bar: ScaleBar | None = None
+    self_calibration: SelfCalibration | None = None
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from monitor.effects.artefact import BallMoved, Expansion
 from monitor.effects.drivers import Channel, EachRun, Gravity, RunTime, WarmUp
 from monitor.effects.effect import ArtefactEffect, ChainEffect
-from monitor.effects.shapes import Const, Cyclic, FormulaShape, Harmonic, Poly, Reversal, Table
+from monitor.effects.shapes import Const, Cyclic, FormulaShape, Harmonic, Nodes, Poly, Reversal, Table
 from monitor.machine import LOCATION
 
 # The standards that define the terms and their tests.
@@ -69,7 +69,7 @@ def _shape(effect: ChainEffect) -> str:
         return f", repeating every {shape.pitch:g} mm"
     if isinstance(shape, Reversal):
         return f", jumping when {name} reverses"
-    if isinstance(shape, Table):
+    if isinstance(shape, (Table, Nodes)):
         return ", of free form along its travel"
     if isinstance(shape, FormulaShape):
         return f", following {shape.text}"

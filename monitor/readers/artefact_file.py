@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.faults import one_of, quoted
+from monitor.readers.self_calibration_file import read_self_calibration
 from monitor.readers.toml_table import Table
 from monitor.records import Artefact, Ball, Probe, ScaleBar
 from monitor.units import MICROMETRE
@@ -58,10 +59,11 @@ def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:
             balls[ball.id] = ball
     ids = None if len(table.faults) > before else list(balls)
     bar = _scale_bar(table, ids)
+    calibration = read_self_calibration(table)
     table.finish()
     if len(table.faults) > before:
         return None, ids
-    return Artefact(identity or "", tuple(balls.values()), bar), ids
+    return Artefact(identity or "", tuple(balls.values()), bar, calibration), ids
 
 
 def _ball(table: Table) -> Ball | None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from monitor.readers.axes import axes_of
 from monitor.readers.decimals import decimal_in
-from monitor.records import Artefact, Campaign, Machine, Probe
+from monitor.records import Artefact, Campaign, Machine, Probe, ScaleBar, SelfCalibration
 from monitor.units import MICROMETRE
 
 
@@ -63,7 +63,11 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
         yield from ("", "[[artefact.balls]]", f"id = {_text(ball.id)}")
         yield f"nominal_mm = {_numbers(ball.nominal)}"
         yield f"diameter_mm = {float(ball.diameter)!r}"
-    bar = artefact.scale_bar
+    yield from _scale_bar(artefact.scale_bar)
+    yield from _self_calibration(artefact.self_calibration)
+
+
+def _scale_bar(bar: ScaleBar | None) -> Iterator[str]:
     if bar is None:
         return
     yield from ("", "[artefact.scale_bar]", f"balls = [{_text(bar.balls[0])}, {_text(bar.balls[1])}]")
@@ -74,6 +78,21 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
         yield f"expansion_coefficient_per_K = {float(bar.expansion_coefficient)!r}"
     if bar.reference_temperature is not None:
         yield f"reference_temperature_degC = {float(bar.reference_temperature)!r}"
+
+
+def _self_calibration(made: SelfCalibration | None) -> Iterator[str]:
+    if made is None:
+        return
+    yield from ("", "[artefact.self_calibration]")
+    if made.conditions:
+        yield f"conditions = [{', '.join(map(_text, made.conditions))}]"
+    yield from ("", "[artefact.self_calibration.nodes_mm]")
+    yield from (f"{_text(axis)} = {_numbers(places)}" for axis, places in made.nodes.items())
+    length = made.length
+    yield from ("", "[artefact.self_calibration.length]", f"parameter = {_text(length.parameter)}")
+    yield f"error_um = {decimal_in(MICROMETRE)(length.value)}"
+    yield f"standard_uncertainty_um = {decimal_in(MICROMETRE)(length.standard_uncertainty)}"
+    yield f"certificate = {_text(length.certificate)}"
 
 
 def _numbers(values: tuple[float, ...]) -> str:

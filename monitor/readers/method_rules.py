@@ -42,12 +42,14 @@ def no_check(plan: Plan) -> Iterable[Fault]:
 class MethodRules:
     """The rules of one method.
 
-    ``needs_scale_bar`` and ``targets_are_balls`` say what the artefact must hold, ``suffixes`` the units that
-    a recorded column may end in, ``plain_columns`` the columns without a unit; ``check`` judges the plan.
+    ``needs_scale_bar``, ``needs_self_calibration`` and ``targets_are_balls`` say what the artefact must hold,
+    ``suffixes`` the units that a recorded column may end in, ``plain_columns`` the columns without a unit;
+    ``check`` judges the plan.
     """
 
     name: str
     needs_scale_bar: bool = False
+    needs_self_calibration: bool = False
     targets_are_balls: bool = False
     suffixes: tuple[str, ...] = tuple(COLUMN_UNITS)
     plain_columns: tuple[str, ...] = ()

@@ -6,7 +6,16 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from monitor.records import Artefact, AxisSettings, Ball, Machine, Probe, ScaleBar
+from monitor.records import (
+    Artefact,
+    AxisSettings,
+    Ball,
+    KnownError,
+    Machine,
+    Probe,
+    ScaleBar,
+    SelfCalibration,
+)
 
 
 def machine_json(machine: Machine) -> str:
@@ -48,7 +57,11 @@ def probe_record(text: str) -> Probe:
 
 def artefact_json(artefact: Artefact) -> str:
     """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C."""
-    return _text(asdict(artefact))
+    data = asdict(artefact)
+    # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
+    if artefact.self_calibration is None:
+        del data["self_calibration"]
+    return _text(data)
 
 
 def artefact_record(text: str) -> Artefact:
@@ -57,8 +70,18 @@ def artefact_record(text: str) -> Artefact:
     balls = tuple(Ball(**{**ball, "nominal": _tuple(ball["nominal"])}) for ball in data["balls"])
     bar = data["scale_bar"]
     return Artefact(
-        data["id"], balls, None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])})
+        data["id"],
+        balls,
+        None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])}),
+        _self_calibration(data.get("self_calibration")),
     )
+
+
+def _self_calibration(data: dict[str, Any] | None) -> SelfCalibration | None:
+    if data is None:
+        return None
+    nodes = {axis: tuple(places) for axis, places in data["nodes"].items()}
+    return SelfCalibration(nodes, KnownError(**data["length"]), tuple(data["conditions"]))
 
 
 def _text(data: dict[str, Any]) -> str:

@@ -4,4 +4,8 @@ from __future__ import annotations
 
 from monitor.readers.method_rules import MethodRules
 
-RULES = MethodRules("free-form", plain_columns=("normal_x", "normal_y", "normal_z"))
+RULES = MethodRules(
+    "free-form",
+    needs_self_calibration=True,
+    plain_columns=("normal_x", "normal_y", "normal_z"),
+)
