@@ -18,8 +18,10 @@ import numpy as np
 
 from monitor.effects import context_of, parse_effect
 from monitor.effects.artefact import normals_of
+from monitor.effects.effect import ChainBasis
+from monitor.effects.shapes import nodes_text
 from monitor.exceptions import DataError
-from monitor.machine import MOTION, Evaluation, parse_term
+from monitor.machine import Evaluation, Term, parse_term
 from monitor.methods.free_form_axes import (
     WORKPIECE_CONDITIONS,
     Plane,
@@ -53,13 +55,12 @@ class FreeFormProblem(ChainProblem):
     """Probings along a normal. A run's own unknown is the error that was measured by other means, ``length``.
 
     ``held`` are the parameters that are zero by choice, ``on_shape`` the conditions that fix the frame in the
-    workpiece; ``hat`` (n,) is the part of the known error that acts at every probing.
+    workpiece. ``known`` (R,) is the value of ``length`` in mm, one a run.
     """
 
     plane: Plane
     length: KnownError
-    hat: Array
-    length_term: str
+    known: Array
     held: tuple[str, ...]
     on_shape: tuple[str, ...]
     nodes: dict[str, tuple[float, ...]]
@@ -73,7 +74,18 @@ class FreeFormProblem(ChainProblem):
     @property
     def own_start(self) -> Array:
         """The known error at its value (R, 1)."""
-        return np.full((len(self.runs), 1), self.length.value)
+        return self.known[:, None].copy()
+
+    @cached_property
+    def _length_effect(self) -> tuple[Term, Array]:
+        """Which error is the known one, and the part of it (n,) that acts at every probing."""
+        symbol, _, rest = self.length.parameter.partition("(")
+        chain = self.context.chain
+        nodes = self.nodes[chain.joints[parse_term(symbol, chain).joint].name]
+        only = nodes_text(nodes, [place for place in nodes if at("", place) != f"({rest}"])
+        basis = parse_effect(f"{symbol}:{only}", chain).basis(self.context)
+        assert isinstance(basis, ChainBasis)
+        return basis.term, basis.columns[:, 0]
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -108,21 +120,21 @@ class FreeFormProblem(ChainProblem):
     def state(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
         """Errors (n, J, 2, 6), points (n, 3) and tips (n, 3); the known error joins those of its axis."""
         errors, target, tip = super().state(local, common)
-        term = parse_term(self.length_term, self.context.chain)
-        errors[:, term.joint, MOTION, term.component] += self.own_of(local)[self._run, 0] * self.hat
+        term, hat = self._length_effect
+        errors[:, term.joint, term.stage, term.component] += self.own_of(local)[self._run, 0] * hat
         return errors, target, tip
 
     def by_own(self, own: Array, seen: Evaluation) -> Array:
         """Derivatives (n, 3, 1) by the known error."""
         assert seen.by_error is not None
-        term = parse_term(self.length_term, self.context.chain)
-        found: Array = (seen.by_error[:, :, term.joint, MOTION, term.component] * self.hat[:, None])[..., None]
+        term, hat = self._length_effect
+        found: Array = (seen.by_error[:, :, term.joint, term.stage, term.component] * hat[:, None])[..., None]
         return found
 
     def extras(self, own: Array) -> tuple[Array, Array]:
         """The known error less its value, in its standard uncertainty."""
         u = self.length.standard_uncertainty
-        return (own - self.length.value) / u, np.full((len(self.runs), 1, 1), 1.0 / u)
+        return (own - self.known[:, None]) / u, np.full((len(self.runs), 1, 1), 1.0 / u)
 
     @cached_property
     def _shape_rows(self) -> Array:
@@ -201,19 +213,21 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> FreeFormProb
     if length.parameter in held:
         raise DataError(f"{length.parameter} is both a condition and the known length; take it out of conditions")
     texts = model.base or base_texts(plane, calibration, angles, {*held, length.parameter})
-    term, _, place = length.parameter.partition("(")
-    context = context_of(campaign, chain)
+    symbol = length.parameter.partition("(")[0]
+    if symbol not in plane.axis_terms:
+        raise DataError(
+            f"[artefact.self_calibration.length] parameter: {length.parameter} gives no unit of length; name the error "
+            f"of a linear axis, such as {at(plane.term(plane.u, plane.u), nodes[plane.u.name][-1])}"
+        )
     whole = Model(model.name, texts, model.added)
-    hats = parse_effect(f"{term}:table({','.join(f'{one:.9g}' for one in places[term])})", chain).basis(context)
     return FreeFormProblem(
-        context=context,
+        context=context_of(campaign, chain),
         base=whole.base_of(chain),
         added=whole.added_to(chain),
         sigma=np.full((len(campaign.probings), 1), campaign.probe.standard_uncertainty),
         plane=plane,
         length=length,
-        hat=hats.columns[:, [f"{one:.9g})" for one in places[term]].index(place)],
-        length_term=term,
+        known=np.full(len(np.unique(campaign.probings.run)), length.value),
         held=held,
         on_shape=on_shape,
         nodes=nodes,

@@ -100,7 +100,7 @@ def plane_of(chain: Chain) -> Plane:
 def _direction(joint: Joint) -> int:
     if 1.0 not in joint.direction:
         raise DataError(f"free-form needs axes along X, Y or Z; {joint.name} stands across them")
-    return joint.direction.index(1.0)
+    return joint.main
 
 
 def at(symbol: str, place: float) -> str:

@@ -8,7 +8,7 @@ its unit. Only this room imports duckdb.
 from monitor.store.analyses import StoredAnalysis, list_analyses, load_analysis, save_analysis
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, load_campaign
-from monitor.store.catalogue import list_campaigns, list_machines, list_runs
+from monitor.store.catalogue import described_machines, list_campaigns, list_machines, list_runs
 from monitor.store.certificates import (
     StoredCertificate,
     find_certificate,
@@ -50,6 +50,7 @@ __all__ = [
     "StoredSelection",
     "Verification",
     "clear_refusals",
+    "described_machines",
     "export_tables",
     "find_certificate",
     "find_selection",

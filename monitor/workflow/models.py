@@ -11,11 +11,11 @@ from typing import Any
 from monitor.effects import parse_effect
 from monitor.effects.words import describe
 from monitor.exceptions import InputError, NotFoundError
-from monitor.machine import parse_topology
+from monitor.machine import Chain
 from monitor.methods import METHODS
 from monitor.methods.base_effects import base_effects
-from monitor.methods.model import Model
-from monitor.store import Database, StoredModel, list_machines, list_models, load_model, save_model
+from monitor.methods.model import Model, chain_of
+from monitor.store import Database, StoredModel, described_machines, list_models, load_model, save_model
 
 Document = dict[str, Any]
 
@@ -83,12 +83,11 @@ def list_(db: Database) -> Document:
 def show(db: Database, name: str) -> Document:
     """A model, its added effects in words, and its base effects on every machine that is there."""
     stored = resolve(db, name)
-    machines = list_machines(db)
     base: dict[str, list[str]] = {}
     words: dict[str, str] = {}
-    for machine, topology in zip(machines["machine"], machines["topology"], strict=True):
-        chain = parse_topology(str(topology))
-        base[str(machine)] = list(base_effects(chain))
+    for machine in described_machines(db):
+        chain = chain_of(machine)
+        base[machine.id] = list(base_effects(chain))
         for text in stored.effects:
             try:
                 words.setdefault(text, describe(parse_effect(text, chain)).meaning)
@@ -137,19 +136,23 @@ def _name(as_: str | None, parent: StoredModel) -> str:
 
 def _is_base(db: Database, effect: str) -> bool:
     """Whether an effect is a base effect on every machine."""
-    topologies = dict.fromkeys(str(topology) for topology in list_machines(db)["topology"])
-    return all(effect in base_effects(parse_topology(topology)) for topology in topologies)
+    return all(effect in base_effects(chain) for chain in _chains(db))
+
+
+def _chains(db: Database) -> tuple[Chain, ...]:
+    """The different chains of the machines that are there."""
+    return tuple(dict.fromkeys(chain_of(machine) for machine in described_machines(db)))
 
 
 def _known(db: Database, effect: str) -> str:
     """The effect in its own words, if any machine has it."""
-    topologies = [str(topology) for topology in list_machines(db)["topology"]]
-    if not topologies:
+    chains = _chains(db)
+    if not chains:
         raise NotFoundError("there is no machine yet that could have an effect; import a campaign first")
     fault: InputError | None = None
-    for topology in dict.fromkeys(topologies):
+    for chain in chains:
         try:
-            return parse_effect(effect, parse_topology(topology)).text
+            return parse_effect(effect, chain).text
         except InputError as error:
             fault = fault or error
     assert fault is not None
