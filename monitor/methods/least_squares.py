@@ -119,8 +119,10 @@ def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, comm
     """
     now = linearise(local, common)
     cost = float(np.sum(now.residual**2))
+    space, spanned = eliminate(now.local), now.local
     for iteration in range(1, MOST_ITERATIONS + 1):
-        space = eliminate(now.local)
+        if now.local is not spanned:
+            space, spanned = eliminate(now.local), now.local
         whole = np.concatenate([now.common, now.residual[..., None]], axis=-1)
         left = project_out(space.basis, whole)
         step_common, covariance, free = _common_step(left[..., :-1], now.common, left[..., -1])

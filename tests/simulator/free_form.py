@@ -53,7 +53,7 @@ def _round(centre: tuple[float, float], radius: float, count: int, first: float)
 
 
 def cross_pocket(
-    arm: float = 100.0, spheres: Sequence[tuple[float, float]] = ((70.0, 70.0), (-70.0, -70.0))
+    arm: float = 100.0, spheres: Sequence[tuple[float, float]] = ((66.0, 66.0), (-66.0, -66.0))
 ) -> Layout:
     """Case study 1: a cross-shaped pocket 36 mm wide, 76 points, two spheres of 25.4 mm with 8 points each.
 
