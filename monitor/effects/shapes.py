@@ -192,7 +192,9 @@ class Nodes:
 def parse_places(text: str) -> tuple[tuple[float, bool], ...]:
     """The nodes of ``-110,0!,110``; EffectError where they are no numbers in rising order."""
     try:
-        places = tuple((float(word.strip().removesuffix("!")), word.strip()[-1] == "!") for word in text.split(","))
+        places = tuple(
+            (float(word.strip().removesuffix("!")), word.strip()[-1] == "!") for word in text.split(",")
+        )
     except (ValueError, IndexError):
         places = ()
     readings = [place for place, _ in places]
@@ -246,6 +248,6 @@ def parse_shape(text: str) -> Shape:
             return made
     raise EffectError(
         f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic99, cyclic20mm (any "
-        "pitch), reversal, table (or table9 for nine nodes, up to table99; table(-100,0,100) for nodes of your own) and "
-        "formula(...)"
+        "pitch), reversal, table (or table9 for nine nodes, up to table99; table(-100,0,100) for your own nodes) "
+        "and formula(...)"
     )

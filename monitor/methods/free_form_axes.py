@@ -120,21 +120,27 @@ def all_conditions(plane: Plane, nodes: dict[str, tuple[float, ...]], first_angl
         plane.term(plane.v, plane.u): f"the origin in {second} along {u}",
         plane.term(plane.u, plane.v): f"the origin in {first} along {v}",
         plane.term(plane.v, plane.v): f"where {v} counts its positioning error from",
-        plane.term(None, plane.carrier): f"the direction that {plane.carried.name} has where {plane.carrier.name} "
-        "stands at its origin",
+        plane.term(
+            None, plane.carrier
+        ): f"the direction that {plane.carried.name} has where {plane.carrier.name} stands at its origin",
     }
     found = {
-        at(symbol, min(nodes[axis.name], key=abs)): words[symbol]
-        for symbol, axis in plane.axis_terms.items()
+        at(symbol, min(nodes[axis.name], key=abs)): words[symbol] for symbol, axis in plane.axis_terms.items()
     }
     shift_u, shift_v, turn = plane.table_terms
     found |= {
         at(shift_u, first_angle): f"the origin in {first}: the axis of {table} at its first angle",
         at(shift_v, first_angle): f"the origin in {second}: the axis of {table} at its first angle",
         at(turn, first_angle): f"the angle of the workpiece on {table} at its first angle",
-        at(plane.term(plane.v, plane.u), nodes[u][-1]): f"the direction of {u}: a straight line through both conditions",
-        at(plane.term(plane.u, plane.v), nodes[v][-1]): f"the direction of {v}: a straight line through both conditions",
-        at(plane.term(plane.u, plane.u), nodes[u][-1]): "the unit of length, which must be measured by other means",
+        at(
+            plane.term(plane.v, plane.u), nodes[u][-1]
+        ): f"the direction of {u}: a straight line through both conditions",
+        at(
+            plane.term(plane.u, plane.v), nodes[v][-1]
+        ): f"the direction of {v}: a straight line through both conditions",
+        at(
+            plane.term(plane.u, plane.u), nodes[u][-1]
+        ): "the unit of length, which must be measured by other means",
     }
     return found
 

@@ -12,7 +12,7 @@ from monitor.records import Array
 from monitor.units import DEGREE
 
 if TYPE_CHECKING:
-    from monitor.methods.free_form import FreeFormProblem
+    from monitor.methods.free_form_problem import FreeFormProblem
 
 #: An angle of the table this close to a multiple of 90 degrees swaps the tables of the linear axes, in degrees.
 QUARTER_DEG = 1.0
@@ -34,9 +34,7 @@ def missing_conditions(problem: FreeFormProblem) -> dict[str, str]:
     One on the workpiece stands for one on the table's first angle: shifts for the shifts, the turn for the turn.
     """
     known = all_conditions(problem.plane, problem.nodes, problem.first_angle)
-    shift_u, shift_v, turn = (
-        f"{symbol}({problem.first_angle:.9g})" for symbol in problem.plane.table_terms
-    )
+    shift_u, shift_v, turn = (f"{symbol}({problem.first_angle:.9g})" for symbol in problem.plane.table_terms)
     instead = dict(zip(WORKPIECE_CONDITIONS, (shift_u, shift_v, turn), strict=True))
     there = {*problem.held, problem.length.parameter, *(instead[one] for one in problem.on_shape)}
     return {name: words for name, words in known.items() if name not in there}
@@ -54,7 +52,7 @@ def reason_of(problem: FreeFormProblem, parameters: tuple[str, ...], run: int) -
     rows = problem.context.run == run
     unseen = _unseen(problem, parameters, rows)
     if unseen:
-        return f": no point was probed where {unseen} acts; probe nearer to the ends of the table, or leave the node out"
+        return f": no point was probed where {unseen} acts; probe nearer to the ends, or leave the node out"
     table = problem.context.chain.index(problem.plane.table.name)
     degrees = np.unique(np.round(problem.context.positions[rows, table] / DEGREE.factor, 6))
     name = problem.plane.table.name

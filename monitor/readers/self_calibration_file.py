@@ -43,7 +43,9 @@ def _nodes(table: Table) -> dict[str, tuple[float, ...]] | None:
 def _places(table: Table, axis: str) -> tuple[float, ...] | None:
     value = table.raw(axis, required=True, example=NODES)
     if not isinstance(value, list) or not 2 <= len(value) <= MOST_NODES:
-        table.fault(axis, f"{quoted(value)} is not a list of 2 to {MOST_NODES} readings in mm, such as {NODES}")
+        table.fault(
+            axis, f"{quoted(value)} is not a list of 2 to {MOST_NODES} readings in mm, such as {NODES}"
+        )
         return None
     places = table.numbers(axis, len(value), largest=FARTHEST_MM, unit="mm", example=NODES)
     if places is None:
@@ -79,7 +81,9 @@ def _length(table: Table) -> KnownError | None:
     uncertainty = inner.number(
         "standard_uncertainty_um", required=True, positive=True, largest=largest, unit="um", example="0.5"
     )
-    certificate = inner.text("certificate", required=True, example='"gauge block 100 mm, certificate 2026-03"')
+    certificate = inner.text(
+        "certificate", required=True, example='"gauge block 100 mm, certificate 2026-03"'
+    )
     inner.finish()
     if parameter is None or error is None or uncertainty is None or certificate is None:
         return None

@@ -46,7 +46,9 @@ class Layout:
         )
 
 
-def _round(centre: tuple[float, float], radius: float, count: int, first: float) -> tuple[np.ndarray, np.ndarray]:
+def _round(
+    centre: tuple[float, float], radius: float, count: int, first: float
+) -> tuple[np.ndarray, np.ndarray]:
     angle = first + 2 * np.pi * np.arange(count) / count
     out = np.column_stack([np.cos(angle), np.sin(angle)])
     return np.array(centre) + radius * out, out
@@ -128,7 +130,9 @@ class Truth:
     location: Mapping[str, float] = field(default_factory=dict)
 
 
-def draw_truth(layout: Layout, angles: Sequence[float], rng: np.random.Generator, scale: float = 1.0) -> Truth:
+def draw_truth(
+    layout: Layout, angles: Sequence[float], rng: np.random.Generator, scale: float = 1.0
+) -> Truth:
     """An ordinary machine and workpiece: some micrometres everywhere, smooth from node to node."""
     nodes = np.array(layout.grid)
     size = len(nodes)
@@ -216,7 +220,7 @@ def design_matrix(layout: Layout, angles: Sequence[float]) -> tuple[np.ndarray, 
         for name, point, normal in zip(layout.names, layout.points, layout.normals, strict=True):
             (x, y), (nx, ny) = turn @ point, turn @ normal
             row = np.zeros(len(names))
-            for k, node in enumerate(nodes):
+            for node in nodes:
                 at_x, at_y = max(0.0, 1 - abs(x - node) / step), max(0.0, 1 - abs(y - node) / step)
                 row[column[f"EXX({node:g})"]] = -nx * at_x
                 row[column[f"EYX({node:g})"]] = -ny * at_x
@@ -245,7 +249,11 @@ def write_folder(
     """A campaign folder of format 1, one run after the other, 75 minutes apart."""
     folder.mkdir(parents=True, exist_ok=True)
     nodes = "[" + ", ".join(f"{node:g}.0" for node in layout.grid) + "]"
-    chosen = "" if not conditions else f"conditions = [{', '.join(repr(c) for c in conditions)}]\n".replace("'", '"')
+    chosen = (
+        ""
+        if not conditions
+        else f"conditions = [{', '.join(repr(c) for c in conditions)}]\n".replace("'", '"')
+    )
     (folder / "campaign.toml").write_text(
         f'format = 1\ncampaign = "{name}"\nmethod = "free-form"\n\n'
         f'[machine]\nid = "V1"\ntopology = "{topology}"\n\n'

@@ -107,7 +107,7 @@ def _artefact_fits(top: Table, artefact: Artefact | None, rules: MethodRules | N
         top.fault("artefact", told)
         return False
     if rules.needs_self_calibration and artefact.self_calibration is None:
-        told = f"the table [artefact.self_calibration] is missing; the method {rules.name} needs the nodes of its tables"
+        told = f"the table [artefact.self_calibration] is missing; the method {rules.name} needs its nodes"
         top.fault("artefact", told)
         return False
     ends = () if bar is None else bar.balls
