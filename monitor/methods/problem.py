@@ -65,6 +65,13 @@ class ChainProblem(ABC):
         """What the readings tell (n, d, ...) of vectors or their derivatives (n, 3, ...): all three components."""
         return rows
 
+    def as_vectors(self, rows: Array) -> Array:
+        """Residuals (n, d) as vectors (n, 3) mm in the frame of the last work axis: the shortest that tell the same."""
+        if self.components == ("x", "y", "z"):
+            return rows
+        seen = self.observe(np.tile(np.eye(3), (len(self.context), 1, 1)))
+        return np.asarray(np.einsum("nik,nk->ni", np.linalg.pinv(seen), rows))
+
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the d numbers of a row."""

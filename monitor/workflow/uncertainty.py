@@ -8,6 +8,7 @@ stated standard uncertainty, uncorrelated.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,7 @@ from monitor.uncertainty.coverage import ellipsoid_factor, rectangle_factor
 from monitor.uncertainty.run_problem import RunProblem, repeated_readings, run_problem
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
 from monitor.units import Unit
+from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.models import as_model, label, resolve
 from monitor.workflow.selections import selected_readings
 from monitor.workflow.spreading import trials_of
@@ -174,10 +176,12 @@ def evaluate(
     workers: int | None = None,
     cluster: str | None = None,
     select: str | None = None,
+    before: datetime | None = None,
 ) -> Evaluated:
     """Evaluate the uncertainty of one run (the last by default). Raises InputError, DataError, NotFoundError.
 
     ``select`` names a stored selection, or a campaign of the same plan: its runs give the covariance of the readings.
+    Runs that began at or after ``before`` (local time without a zone) take no part.
     The trials go to ``workers`` processes or the Dask scheduler at the address ``cluster``, else to threads.
     """
     if method not in ("guf", "mcm", "both"):
@@ -188,7 +192,7 @@ def evaluate(
         raise InputError(f"--seed {seed}: a seed is a whole number from 0 to 9223372036854775807")
     if not 0.0 < p < 1.0:
         raise InputError(f"-p {p}: a coverage probability lies between 0 and 1")
-    loaded = load_campaign(db, campaign)
+    loaded = runs_before(load_campaign(db, campaign), before)
     stored = resolve(db, model, loaded.method)
     found = fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
     number = int(found.problem.runs[-1]) if run is None else run
@@ -356,7 +360,11 @@ def _scaled(one: Any, found: Evaluated, value: float) -> float:
 
 
 def uncertainty(db: Database, campaign: str, run: int | None = None, **options: Any) -> Document:
-    """Evaluate, store and return the document. ``options`` are those of ``evaluate``."""
+    """Evaluate, store and return the document. ``options`` are those of ``evaluate``.
+
+    With ``before`` it is stored as ``partial uncertainty``: it is not the result of the whole campaign.
+    """
+    before = options.get("before")
     found = evaluate(db, campaign, run, **options)
     result = document(found)
     # How long it took is no part of what is stored: the same result has the same document.
@@ -366,8 +374,8 @@ def uncertainty(db: Database, campaign: str, run: int | None = None, **options: 
         else result
     )
     save_analysis(
-        db, "uncertainty", kept, method=options.get("method", "both"), campaign=campaign, run=found.run,
-        model=found.model.name, model_version=found.model.version,
+        db, kind_of("uncertainty", before), kept, method=method_of(options.get("method", "both"), before),
+        campaign=campaign, run=found.run, model=found.model.name, model_version=found.model.version,
         seed=None if found.monte_carlo is None else found.monte_carlo.seed,
     )  # fmt: skip
     return result
