@@ -245,8 +245,10 @@ def write_folder(
     conditions: Sequence[str] = (),
     topology: str = "w C A b Y X Z (C1) t",
     noise_um: float = PROBING_U_UM,
+    machine: str = "V1",
+    runs_a_day: int = 2,
 ) -> Path:
-    """A campaign folder of format 1, one run after the other, 75 minutes apart."""
+    """A campaign folder of format 1, two runs a day, three hours apart."""
     folder.mkdir(parents=True, exist_ok=True)
     nodes = "[" + ", ".join(f"{node:g}.0" for node in layout.grid) + "]"
     chosen = (
@@ -256,7 +258,7 @@ def write_folder(
     )
     (folder / "campaign.toml").write_text(
         f'format = 1\ncampaign = "{name}"\nmethod = "free-form"\n\n'
-        f'[machine]\nid = "V1"\ntopology = "{topology}"\n\n'
+        f'[machine]\nid = "{machine}"\ntopology = "{topology}"\n\n'
         f'[probe]\nid = "probe-1"\nmodel = "touch-trigger probe"\nstandard_uncertainty_um = {noise_um or 1.0}\n\n'
         f'[artefact]\nid = "{layout.name}"\n\n[artefact.self_calibration]\n{chosen}\n'
         f"[artefact.self_calibration.nodes_mm]\nX = {nodes}\nY = {nodes}\n\n"
@@ -268,8 +270,8 @@ def write_folder(
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["run", "started_at", "day", "warm_up", "ambient_degC"])
         for k in range(len(runs)):
-            day, place = divmod(k, 4)
-            minutes = 8 * 60 + 75 * place
+            day, place = divmod(k, runs_a_day)
+            minutes = 8 * 60 + 180 * place
             out.writerow([k + 1, f"2026-04-{6 + day:02d}T{minutes // 60:02d}:{minutes % 60:02d}:00+09:00",
                           day + 1, "false", f"{21.0 + 0.1 * place:.1f}"])  # fmt: skip
     axes = [a for a in read_topology(topology).axes if a.name not in ("X", "Y", "C")]
@@ -285,3 +287,17 @@ def write_folder(
                      *(f"{v:.6f}" for v in layout.points[point]), *(f"{v:.9f}" for v in layout.normals[point])]
                 )  # fmt: skip
     return folder
+
+
+def write_examples(folder: Path) -> None:
+    """The two campaigns of the project's examples: both case studies of the paper, on machines of our own."""
+    for name, layout, angles, topology, machine, runs, seed in (
+        ("free-form-pocket", cross_pocket(), CASE_1_ANGLES, "w C B b Y X Z (C1) t", "V300-T", 4, 1),
+        ("free-form-pins", pin_ring(), CASE_2_ANGLES, "w C A b Y X Z (C1) t", "V800-T", 2, 2),
+    ):
+        rng = np.random.default_rng(seed)
+        truth = draw_truth(layout, angles, rng)
+        told = [probe(layout, angles, truth, rng, topology=topology) for _ in range(runs)]
+        # The direct measurement of the length has its own error of half a micrometre.
+        length_um = round(truth.length * 1e3 + rng.normal(0.0, 0.5), 2)
+        write_folder(folder / name, name, layout, told, length_um, (), topology, machine=machine)
