@@ -289,6 +289,19 @@ def write_folder(
     return folder
 
 
+def by_name(layout: Layout, angles: Sequence[float], truth: Truth) -> dict[str, float]:
+    """The truth by the names of a campaign's parameters."""
+    found = {
+        f"{symbol}({node:g})": float(value)
+        for symbol, values in truth.tables.items()
+        for node, value in zip(layout.grid, values, strict=True)
+    }
+    found["EC0X"] = truth.squareness
+    for row, symbol in enumerate(("EX0C", "EY0C", "ECC")):
+        found |= {f"{symbol}({a:g})": float(v) for a, v in zip(angles, truth.table[row], strict=True)}
+    return found | {f"shape({n})": float(v) for n, v in zip(layout.names, truth.shape, strict=True)}
+
+
 def write_examples(folder: Path) -> None:
     """The two campaigns of the project's examples: both case studies of the paper, on machines of our own."""
     for name, layout, angles, topology, machine, runs, seed in (
