@@ -26,7 +26,8 @@ class Context:
     ``positions`` (n, J) physical displacements in mm and rad; ``run`` (n,) the run's number; ``sequence`` (n,);
     ``time`` (n,) s since the run began; ``day_time`` (n,) s since the first run of the day began; ``run_time``
     (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
-    the frame of the last work axis; ``columns`` recorded columns by their names in the file, in its units.
+    the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
+    the file, in its units.
     """
 
     chain: Chain

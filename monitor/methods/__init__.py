@@ -9,9 +9,9 @@ from __future__ import annotations
 from types import ModuleType
 
 from monitor.exceptions import DataError
-from monitor.methods import free_form, samba
+from monitor.methods import free_form, rotary_probing, samba
 
-METHODS: dict[str, ModuleType] = {module.NAME: module for module in (samba, free_form)}
+METHODS: dict[str, ModuleType] = {module.NAME: module for module in (samba, rotary_probing, free_form)}
 
 
 def method_named(name: str) -> ModuleType:
