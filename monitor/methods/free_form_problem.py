@@ -170,7 +170,8 @@ class FreeFormProblem(ChainProblem):
         _, by_extra = self.extras(self.own_start)
         before = ((0, 0), (0, 0), (len(self.base_names), 0))
         return np.concatenate(
-            [self.padded(self._rows / self.sigma[..., None]), np.pad(by_extra, before), self._shape_rows], axis=1
+            [self.padded(self._rows / self.sigma[..., None]), np.pad(by_extra, before), self._shape_rows],
+            axis=1,
         )
 
     def vectors(self, local: Array, common: Array) -> Array:

@@ -11,7 +11,6 @@ from scipy import stats
 
 from monitor.exceptions import DataError
 from monitor.methods import free_form
-from monitor.methods.problem import ChainProblem
 from monitor.readers import read_campaign
 
 
@@ -83,9 +82,9 @@ def test_eq_15_rows_are_those_of_the_chain(sim, made):
             continue
         its = name.replace("EXC", "EX0C").replace("EYC", "EY0C").replace("G(", "shape(")
         if its in ours:
-            # The folder has six decimals: 1e-6 of a shift, and that times a lever of 110 mm.
+            # A coordinate of the folder is good to 0.5e-6 mm: of a hat of 22 mm with a lever of 110 mm 5e-6, twice.
             lever = 110.0 if name[1] == "C" else 1.0
-            np.testing.assert_allclose(ours[its], paper, atol=2e-6 * lever, err_msg=name)
+            np.testing.assert_allclose(ours[its], paper, atol=5e-6 * lever, err_msg=name)
     held = {name for name in names if name.replace("EXC", "EX0C").replace("EYC", "EY0C") in problem.held}
     assert len(held) == 10
 
@@ -94,19 +93,15 @@ def test_derivatives_agree_with_differences(sim, made):
     """The derivatives at the nominal points against central differences of the exact vectors there."""
     _, campaign = made(sim.cross_pocket(), sim.CASE_1_ANGLES, noise_um=0.0)
     problem = free_form.problem_of(campaign).nominal
-    analytic = problem.linearise(problem.start, problem.common_start).local[0]
+    analytic = problem.linearise(problem.start, problem.common_start).local[0, :368]
     step = 1e-6
-    for place in range(0, len(problem.local_names), 7):
+    for place in range(0, len(problem.base_names), 7):
         ahead, behind = problem.start.copy(), problem.start.copy()
         ahead[0, place] += step
         behind[0, place] -= step
-        numeric = (
-            ChainProblem.linearise(problem, ahead, problem.common_start).residual[0]
-            - ChainProblem.linearise(problem, behind, problem.common_start).residual[0]
-        ) / (2 * step)
-        np.testing.assert_allclose(
-            analytic[: len(numeric), place], numeric, atol=2e-5 * np.abs(numeric).max()
-        )
+        exact = [problem.evaluated(local, problem.common_start).residual for local in (ahead, behind)]
+        numeric = problem.observe((exact[0] - exact[1]) / (2 * step))[:, 0] / problem.sigma[:, 0]
+        np.testing.assert_allclose(analytic[:, place], numeric, atol=2e-5 * np.abs(numeric).max())
 
 
 @pytest.mark.parametrize(
