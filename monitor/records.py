@@ -154,12 +154,22 @@ class SelfCalibration:
 
 
 @dataclass(frozen=True)
+class Reflector:
+    """A reflector that a tracker looks at: on the tool, or ``fixed`` beside the machine."""
+
+    id: str
+    fixed: bool = False
+
+
+@dataclass(frozen=True)
 class Artefact:
-    """The balls, the scale bar where the method needs one, the tables and conditions of a self-calibration."""
+    """The balls; the scale bar where the method needs one; the reflectors where the file lists them; the tables and
+    conditions of a self-calibration."""
 
     id: str
     balls: tuple[Ball, ...]
     scale_bar: ScaleBar | None = None
+    reflectors: tuple[Reflector, ...] = ()
     self_calibration: SelfCalibration | None = None
 
 

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from monitor.effects.context import Context
+from monitor.effects.tracker import TrackerShift, TrackerTurn
 from monitor.exceptions import EffectError
 from monitor.records import Array
 from monitor.units import METRE, MICROMETRE, Unit
@@ -147,6 +148,10 @@ def parse_artefact(body: str) -> ArtefactChange:
         return StemGravity()
     if body == "shape":
         return WorkpieceShape()
+    if body == "tracker:shift":
+        return TrackerShift()
+    if body == "tracker:turn":
+        return TrackerTurn()
     match = re.fullmatch(
         r"ball:(?P<ball>[^:]+):moved\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<seq>\d+)\s*\)", body
     )
@@ -158,5 +163,5 @@ def parse_artefact(body: str) -> ArtefactChange:
         )
     raise EffectError(
         f"there is no effect '{body}' of the artefact; there are ball:2:moved(run 7, sequence 23), "
-        "artefact:expansion@ambient_degC, stem:gravity and shape"
+        "artefact:expansion@ambient_degC, stem:gravity, shape, tracker:shift@run_time and tracker:turn@run_time"
     )

@@ -62,6 +62,31 @@ class Context:
         return signs
 
     @cached_property
+    def moves(self) -> Array:
+        """The move (n, J) in mm and rad by which every axis came to its pose; rows at one pose share it.
+
+        Zero at the first pose of a run: nobody recorded where the axes were before.
+        """
+        moves = np.zeros_like(self.positions)
+        for run in np.unique(self.run):
+            rows = np.flatnonzero(self.run == run)
+            steps = np.diff(self.positions[rows], axis=0)
+            last = np.zeros(self.positions.shape[1])
+            for row, step in zip(rows[1:], steps, strict=True):
+                last = step if np.any(step) else last
+                moves[row] = last
+        return moves
+
+    @cached_property
+    def run_order(self) -> Array:
+        """From 0 at a run's first row to 1 at its last, by their order (n,)."""
+        order = np.zeros(len(self))
+        for run in np.unique(self.run):
+            rows = np.flatnonzero(self.run == run)
+            order[rows] = np.arange(len(rows)) / max(len(rows) - 1, 1)
+        return order
+
+    @cached_property
     def gravity(self) -> Array:
         """Unit vectors (n, J, 3) of gravity in the frame of every axis."""
         return gravity_in_joint_frames(self.chain, self.positions)

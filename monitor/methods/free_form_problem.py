@@ -176,7 +176,7 @@ class FreeFormProblem(ChainProblem):
 
     def vectors(self, local: Array, common: Array) -> Array:
         """Residuals (n, 1) in mm: what was read, and what the errors do to it at the nominal points (Eq. 14)."""
-        found = self._as_read + np.einsum("nip,np->ni", self._rows, local[self._run])
+        found: Array = self._as_read + np.einsum("nip,np->ni", self._rows, local[self._run])
         seen, place = self._at_nominal, 0
         assert seen.by_error is not None
         for added in self.shared:

@@ -14,6 +14,7 @@ from monitor.records import (
     KnownError,
     Machine,
     Probe,
+    Reflector,
     ScaleBar,
     SelfCalibration,
 )
@@ -77,6 +78,8 @@ def artefact_json(artefact: Artefact) -> str:
     # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
     if artefact.self_calibration is None:
         del data["self_calibration"]
+    if not artefact.reflectors:
+        del data["reflectors"]
     return _text(data)
 
 
@@ -89,6 +92,7 @@ def artefact_record(text: str) -> Artefact:
         data["id"],
         balls,
         None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])}),
+        tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
         _self_calibration(data.get("self_calibration")),
     )
 
