@@ -7,8 +7,17 @@ from collections.abc import Iterator
 
 from monitor.readers.axes import axes_of_machine
 from monitor.readers.decimals import decimal_in
-from monitor.records import Artefact, Campaign, ChainAxis, Machine, Probe, ScaleBar, SelfCalibration
-from monitor.units import MICROMETRE
+from monitor.records import (
+    Artefact,
+    Campaign,
+    ChainAxis,
+    LShape,
+    Machine,
+    Probe,
+    ScaleBar,
+    SelfCalibration,
+)
+from monitor.units import MICROMETRE, MICRORADIAN
 
 
 def campaign_toml(campaign: Campaign) -> str:
@@ -88,6 +97,7 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
         if reflector.fixed:
             yield "fixed = true"
     yield from _scale_bar(artefact.scale_bar)
+    yield from _l_shape(artefact.l_shape)
     yield from _self_calibration(artefact.self_calibration)
 
 
@@ -117,6 +127,23 @@ def _self_calibration(made: SelfCalibration | None) -> Iterator[str]:
     yield f"error_um = {decimal_in(MICROMETRE)(length.value)}"
     yield f"standard_uncertainty_um = {decimal_in(MICROMETRE)(length.standard_uncertainty)}"
     yield f"certificate = {_text(length.certificate)}"
+
+
+def _l_shape(piece: LShape | None) -> Iterator[str]:
+    if piece is None:
+        return
+    length, angle = decimal_in(MICROMETRE), decimal_in(MICRORADIAN)
+    yield from ("", "[artefact.l_shape]", f"focal_length_mm = {float(piece.focal_length)!r}")
+    yield f"paraboloid_mm = {float(piece.paraboloid)!r}"
+    yield f"place_standard_uncertainty_um = {length(piece.place_uncertainty)}"
+    yield f"tilt_standard_uncertainty_urad = {angle(piece.tilt_uncertainty)}"
+    for module in piece.modules:
+        yield from ("", "[[artefact.l_shape.modules]]", f"id = {_text(module.id)}")
+        yield f"centre_mm = {_numbers(module.centre)}"
+        yield f"tilt_urad = [{', '.join(map(angle, module.tilt))}]"
+    for placement in piece.placements:
+        yield from ("", "[[artefact.l_shape.placements]]", f"plane = {_text(placement.plane)}")
+        yield f"corner_mm = {_numbers(placement.corner)}"
 
 
 def _numbers(values: tuple[float, ...]) -> str:

@@ -12,7 +12,10 @@ from monitor.records import (
     Ball,
     ChainAxis,
     KnownError,
+    LShape,
     Machine,
+    Module,
+    Placement,
     Probe,
     Reflector,
     ScaleBar,
@@ -80,6 +83,8 @@ def artefact_json(artefact: Artefact) -> str:
         del data["self_calibration"]
     if not artefact.reflectors:
         del data["reflectors"]
+    if artefact.l_shape is None:
+        del data["l_shape"]
     return _text(data)
 
 
@@ -93,7 +98,8 @@ def artefact_record(text: str) -> Artefact:
         balls,
         None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])}),
         tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
-        _self_calibration(data.get("self_calibration")),
+        l_shape=_l_shape(data.get("l_shape")),
+        self_calibration=_self_calibration(data.get("self_calibration")),
     )
 
 
@@ -102,6 +108,14 @@ def _self_calibration(data: dict[str, Any] | None) -> SelfCalibration | None:
         return None
     nodes = {axis: tuple(places) for axis, places in data["nodes"].items()}
     return SelfCalibration(nodes, KnownError(**data["length"]), tuple(data["conditions"]))
+
+
+def _l_shape(data: dict[str, Any] | None) -> LShape | None:
+    if data is None:
+        return None
+    modules = tuple(Module(one["id"], _tuple(one["centre"]), _tuple(one["tilt"])) for one in data["modules"])
+    placements = tuple(Placement(one["plane"], _tuple(one["corner"])) for one in data["placements"])
+    return LShape(**{**data, "modules": modules, "placements": placements})
 
 
 def _text(data: dict[str, Any]) -> str:
