@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 from monitor.reporting.health import (
@@ -18,12 +17,11 @@ from monitor.reporting.health import (
     VolumetricMap,
     fleet_row,
 )
-from monitor.reporting.health_words import in_words
+from monitor.reporting.health_pictures import PrintedPictures, printed_pictures
+from monitor.reporting.health_refusals import PrintedRefusal, printed_refusal
+from monitor.reporting.health_words import day, in_words, micrometres, p_in_words, percent, plain
 from monitor.reporting.numbers import (
-    decimal_of,
     round_result,
-    round_to_place,
-    round_uncertainty,
     written,
 )
 from monitor.reporting.sparkline import sparkline
@@ -96,6 +94,8 @@ class PrintedMachine:
     map: tuple[tuple[str, str], ...]
     blind: str
     refused: tuple[tuple[str, str], ...]
+    imports: tuple[PrintedRefusal, ...]
+    pictures: PrintedPictures
 
 
 def fleet_context(fleet: Fleet) -> dict[str, Any]:
@@ -106,13 +106,14 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         "made_at": f"{fleet.made_at:%Y-%m-%d %H:%M}",
         "made_iso": fleet.made_at.isoformat() + "Z",
         "software": fleet.software,
-        "risk": _probability(fleet.risk),
+        "risk": percent(fleet.risk),
         "lines": [_line(row) for row in fleet.rows],
         "legend": [
             (SIGNS[state], state, words)
             for state, words in STATES.items()
             if state in {row.state for row in fleet.rows}
         ],
+        "imports": [printed_refusal(one) for one in fleet.refused_imports],
         "alarms": sum(row.state in ALARMS for row in fleet.rows),
         "measured": sum(row.state != "not measured" for row in fleet.rows),
     }
@@ -138,7 +139,7 @@ def _page(health: MachineHealth) -> PrintedMachine:
         conditions=tuple(
             (
                 one.name,
-                f"{_plain(one.lowest)} to {_plain(one.highest)}, mean {_plain(one.mean)} {one.unit}".strip(),
+                f"{plain(one.lowest)} to {plain(one.highest)}, mean {plain(one.mean)} {one.unit}".strip(),
             )
             for one in health.conditions
         ),
@@ -146,6 +147,8 @@ def _page(health: MachineHealth) -> PrintedMachine:
         map=_map(health.map),
         blind=", ".join(blind[:_BLIND_SHOWN]) + more if blind else "",
         refused=health.quality.refused,
+        imports=tuple(printed_refusal(one) for one in health.quality.refused_imports),
+        pictures=printed_pictures(health.model),
     )
 
 
@@ -158,8 +161,8 @@ def _line(row: FleetRow) -> FleetLine:
         state=row.state,
         alarm=row.state in ALARMS,
         changed=row.changed,
-        since="" if row.since is None else _day(row.since),
-        out="" if row.probability_out is None else _probability(row.probability_out),
+        since="" if row.since is None else day(row.since),
+        out="" if row.probability_out is None else percent(row.probability_out),
         next_check=row.next_check,
     )
 
@@ -178,8 +181,8 @@ def _parameter(one: ParameterHealth) -> ParameterLine:
         description=one.description,
         estimate=written(rounded.estimate),
         expanded=written(rounded.uncertainty),
-        tolerance="" if one.tolerance is None else "± " + _plain(one.tolerance),
-        out="" if one.probability_out is None else _probability(one.probability_out),
+        tolerance="" if one.tolerance is None else "± " + plain(one.tolerance),
+        out="" if one.probability_out is None else percent(one.probability_out),
         beyond=one.tolerance is not None and abs(one.estimate) > one.tolerance,
         drift=drift,
         unit=one.unit,
@@ -192,11 +195,11 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
     if model is None:
         return ()
     lines = [("model", model.model), ("compared with", model.runs), ("verdict", model.verdict)]
-    lines.append(("what it leaves", f"{_um(model.rms_um)} (root mean square of all coordinates)"))
+    lines.append(("what it leaves", f"{micrometres(model.rms_um)} (root mean square of all coordinates)"))
     if model.repeatability_um is not None:
-        lines.append(("repeatability", _um(model.repeatability_um)))
+        lines.append(("repeatability", micrometres(model.repeatability_um)))
     if model.lack_of_fit_p is not None and model.lack_of_fit_f is not None:
-        lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {_p_value(model.lack_of_fit_p)}"))
+        lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {p_in_words(model.lack_of_fit_p)}"))
     return tuple(lines)
 
 
@@ -206,7 +209,7 @@ def _map(found: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
     worst = round_result(found.worst_um, found.expanded_um)
     lines = [
         ("worst", f"{written(worst.estimate)} µm (U = {written(worst.uncertainty)} µm) at {found.worst_at}"),
-        ("root mean square", f"{_plain(float(f'{found.rms_um:.3g}'))} µm over {found.region}"),
+        ("root mean square", f"{plain(float(f'{found.rms_um:.3g}'))} µm over {found.region}"),
     ]
     by = sorted(found.by_pose, key=lambda one: -one.worst_um)[:_POSES_SHOWN]
     if by:
@@ -217,35 +220,9 @@ def _map(found: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
 
 def _span(change: Change) -> str:
     if change.after is None or change.after == change.at:
-        return _day(change.at)
-    return f"{_day(change.after)} to {_day(change.at)}"
+        return day(change.at)
+    return f"{day(change.after)} to {day(change.at)}"
 
 
 def _sentence(change: Change) -> str:
-    return change.what if change.p_value is None else f"{change.what} (p {_p_value(change.p_value)})"
-
-
-def _day(moment: datetime) -> str:
-    return f"{moment:%Y-%m-%d}"
-
-
-def _p_value(p: float) -> str:
-    return "< 0.0001" if p < 1e-4 else f"= {p:.2g}"
-
-
-def _probability(p: float) -> str:
-    """A probability in percent; what is nearly sure is not printed as sure."""
-    if p < 0.001:
-        return "< 0.1 %"
-    if p > 0.999:
-        return "> 99.9 %"
-    percent = round_uncertainty(100.0 * p) if p < 0.1 else round_to_place(100.0 * p, decimal_of(1.0))
-    return f"{written(percent)}\N{NO-BREAK SPACE}%"
-
-
-def _um(value: float) -> str:
-    return f"{value:.2f}\N{NO-BREAK SPACE}µm"
-
-
-def _plain(value: float) -> str:
-    return written(decimal_of(float(f"{value:.4g}")))
+    return change.what if change.p_value is None else f"{change.what} (p {p_in_words(change.p_value)})"
