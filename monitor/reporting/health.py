@@ -49,13 +49,14 @@ class History:
 
 @dataclass(frozen=True)
 class Drift:
-    """A drift per year with its standard uncertainty; when the limit is reached (None: no sign of it).
+    """A drift per year, its standard uncertainty and 95 % interval; when the limit is reached (None: no sign of it).
 
     ``crosses_between`` are the ends of the interval of that time, None where open.
     """
 
     per_year: float
     u_per_year: float
+    between: tuple[float, float]
     p_value: float
     crosses_at: date | None
     crosses_between: tuple[date | None, date | None]

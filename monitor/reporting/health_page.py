@@ -38,12 +38,12 @@ SIGNS = {
     "no change seen": "✓",
 }
 #: Blind spots named on the page; the rest are counted (all stand in the JSON).
-_BLIND_SHOWN = 8
+_BLIND_SHOWN = 4
 #: Changes and events named on the page, the latest first.
 _CHANGES_SHOWN = 12
 #: Poses of the rotary axes named for the volumetric error, the worst first.
-_POSES_SHOWN = 4
-#: A drift is printed below this probability of seeing it where there is none.
+_POSES_SHOWN = 3
+#: A drift is set in bold below this probability of seeing it where there is none.
 _DRIFT_P = 0.001
 
 
@@ -75,6 +75,7 @@ class ParameterLine:
     out: str
     beyond: bool
     drift: str
+    drifts: bool
     unit: str
     picture: str
 
@@ -87,6 +88,7 @@ class PrintedMachine:
     head: FleetLine
     meaning: str
     lines: tuple[ParameterLine, ...]
+    no_trend: str
     changes: tuple[tuple[str, str, bool], ...]
     more_changes: int
     conditions: tuple[tuple[str, str], ...]
@@ -134,6 +136,11 @@ def _page(health: MachineHealth) -> PrintedMachine:
         head=_line(fleet_row(health)),
         meaning=STATES[health.state],
         lines=tuple(_parameter(one) for one in health.parameters),
+        no_trend=(
+            ""
+            if any(one.drift for one in health.parameters)
+            else "No trend a year: the history is too short for one."
+        ),
         changes=tuple((_span(one), _sentence(one), one.this_week) for one in shown),
         more_changes=len(health.changes) - len(shown),
         conditions=tuple(
@@ -170,12 +177,7 @@ def _line(row: FleetRow) -> FleetLine:
 def _parameter(one: ParameterHealth) -> ParameterLine:
     rounded = round_result(one.estimate, one.expanded)
     factor = one.expanded / one.u
-    drift = ""
-    if one.drift is not None and one.drift.p_value < _DRIFT_P:
-        slope, u = in_words(one.drift.per_year, one.drift.u_per_year)
-        drift = f"{slope} {one.unit} a year (u = {u} {one.unit} a year)"
-        if one.drift.crosses_at is not None:
-            drift += f", reaches the tolerance about {one.drift.crosses_at}"
+    drift = _drift(one)
     return ParameterLine(
         name=one.name,
         description=one.description,
@@ -185,9 +187,26 @@ def _parameter(one: ParameterHealth) -> ParameterLine:
         out="" if one.probability_out is None else percent(one.probability_out),
         beyond=one.tolerance is not None and abs(one.estimate) > one.tolerance,
         drift=drift,
+        drifts=one.drift is not None and one.drift.p_value < _DRIFT_P,
         unit=one.unit,
         picture=sparkline(one, factor),
     )
+
+
+def _drift(one: ParameterHealth) -> str:
+    """The drift a year with its interval, and when the tolerance is reached where there is a sign of it."""
+    if one.drift is None:
+        return ""
+    u = one.drift.u_per_year
+    slope, low, high = (
+        in_words(value, u, sign=True)[0] for value in (one.drift.per_year, *one.drift.between)
+    )
+    words = f"trend {slope} {one.unit} a year ({low} to {high})"
+    if one.drift.crosses_at is not None:
+        first, last = one.drift.crosses_between
+        ends = f", between {first or 'now'} and {last or 'never'}" if first or last else ""
+        words += f"; reaches the tolerance about {one.drift.crosses_at}{ends}"
+    return words
 
 
 def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
@@ -195,7 +214,7 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
     if model is None:
         return ()
     lines = [("model", model.model), ("compared with", model.runs), ("verdict", model.verdict)]
-    lines.append(("what it leaves", f"{micrometres(model.rms_um)} (root mean square of all coordinates)"))
+    lines.append(("what it leaves", f"{micrometres(model.rms_um)} rms of all coordinates"))
     if model.repeatability_um is not None:
         lines.append(("repeatability", micrometres(model.repeatability_um)))
     if model.lack_of_fit_p is not None and model.lack_of_fit_f is not None:
@@ -214,7 +233,7 @@ def _map(found: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
     by = sorted(found.by_pose, key=lambda one: -one.worst_um)[:_POSES_SHOWN]
     if by:
         words = "; ".join(f"{one.pose}: {one.worst_um:.1f} µm ({one.rms_um:.1f} µm)" for one in by)
-        lines.append(("largest (rms) by pose", words))
+        lines.append(("by pose", f"at most (rms) {words}"))
     return tuple(lines)
 
 
@@ -225,4 +244,8 @@ def _span(change: Change) -> str:
 
 
 def _sentence(change: Change) -> str:
-    return change.what if change.p_value is None else f"{change.what} (p {p_in_words(change.p_value)})"
+    return (
+        change.what
+        if change.p_value is None
+        else f"{change.what} (p\N{NO-BREAK SPACE}{p_in_words(change.p_value)})"
+    )

@@ -55,7 +55,7 @@ def where_it_fails(found: ResidualMap) -> str:
     """Residual vectors, magnified, seen along Z, Y and X; the largest tenth thick and in the accent colour."""
     place, size = np.array(found.place_mm), np.array(found.residual_um)
     view = view_of(place, size)
-    on = Drawing(WIDTH_MM, 65.0, "Mean residual vectors over the workspace, seen along Z, Y and X")
+    on = Drawing(WIDTH_MM, 63.0, "Mean residual vectors over the workspace, seen along Z, Y and X")
     side, gap = 465.0, 112.0
     for place_of, (across, up) in enumerate(((0, 1), (0, 2), (1, 2))):
         panel = Panel(
@@ -80,7 +80,7 @@ def where_it_fails(found: ResidualMap) -> str:
             on.line(x, y, x + length, y, INK, 7)
             on.text(x, y - 9, f"{view.key:g} µm", bold=True)
     on.text(
-        0.0, 64.0 * SCALE - 4,
+        0.0, 62.4 * SCALE,
         f"Mean of the runs at every pose of the plan, {_thousands(view.magnify)} times enlarged; bar: {view.key:g} µm; "
         "thick: the largest tenth.",
         colour=MID,
@@ -94,10 +94,10 @@ def against_driver(found: ResidualAgainst) -> str:
     known = [one for one in found.groups if one.after_um is not None]
     x = np.array([*found.at, *(one.at for one in found.groups)])
     edge = 0.05 * float(np.ptp(x)) or 1.0
-    # The scale is that of the means; of the points nine in ten are seen.
+    # The scale is that of the means; points far from them are left out of the picture.
     y = np.concatenate(
         [
-            np.quantile(found.before_um, [0.05, 0.95]) if found.before_um else [],
+            np.quantile(found.before_um, [0.15, 0.85]) if found.before_um else [],
             [one.before_um + sign * 1.3 * one.u_before_um for one in found.groups for sign in (-1, 1)],
             [one.after_um for one in known if one.after_um is not None],
             [0.0],
@@ -144,7 +144,7 @@ def error_steps(found: ModelHealth) -> str:
     row = 92.0
     on = Drawing(RIGHT_MM, (64.0 + row * len(steps) + 62.0) / SCALE, "The error, model by model")
     most = max([one.rms_um for one in steps] + [one.heldout_um or 0.0 for one in steps] + [found.stated_um])
-    panel = Panel(6.0, 40.0, RIGHT_MM * SCALE - 120.0, row * len(steps), (0.0, 1.04 * most), (0.0, 1.0))
+    panel = Panel(6.0, 40.0, RIGHT_MM * SCALE - 190.0, row * len(steps), (0.0, 1.04 * most), (0.0, 1.0))
     for place, one in enumerate(steps):
         top = panel.top + place * row
         on.text(panel.left, top + 26, _fitting(one.what, RIGHT_MM * SCALE - 12.0), bold=not one.proposed)
@@ -154,19 +154,20 @@ def error_steps(found: ModelHealth) -> str:
             f"M{panel.left:g} {y:.1f}H{end:.1f}V{y + 34:.1f}H{panel.left:g}Z",
             fill="white" if one.proposed else BLUE, stroke=BLUE, width=3,
         )  # fmt: skip
-        held = end
+        held, values = end, f"{one.rms_um:.2f}"
         if one.heldout_um is not None:
             held = panel.x(one.heldout_um)
             on.path(_circle(held, y + 17, _SIGN), fill="white", stroke=ORANGE, width=4)
-        on.text(max(end, held, panel.x(found.stated_um)) + 14, y + 26, f"{one.rms_um:.2f} µm")
+            values += f" ({one.heldout_um:.2f})"
+        on.text(max(end, held, panel.x(found.stated_um)) + 14, y + 26, values)
     bottom = panel.top + panel.height
     at = panel.x(found.stated_um)
     on.line(at, panel.top - 6, at, bottom + 6, INK, 3, "10 6")
     on.text(min(at, 400.0), panel.top - 14, f"probe's statement {found.stated_um:.2g} µm", anchor="middle")
     on.path(f"M{panel.left:g} {bottom + 16:.1f}h22v14h-22Z", fill=BLUE)
-    on.text(panel.left + 30, bottom + 32, "fitted runs")
-    on.path(_circle(panel.left + 205, bottom + 23, _SIGN), fill="white", stroke=ORANGE, width=4)
-    on.text(panel.left + 222, bottom + 32, "held-out runs")
+    on.text(panel.left + 30, bottom + 32, "fitted runs, µm")
+    on.path(_circle(panel.left + 250, bottom + 23, _SIGN), fill="white", stroke=ORANGE, width=4)
+    on.text(panel.left + 268, bottom + 32, "(held-out runs)")
     if any(one.proposed for one in steps):
         on.text(panel.left, bottom + 32 + 1.25 * LETTER, "empty bar: if it is added", colour=MID)
     return on.svg()

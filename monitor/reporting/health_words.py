@@ -28,7 +28,7 @@ def day(moment: datetime) -> str:
 
 def p_in_words(p: float) -> str:
     """A p-value with the sign of the relation before it."""
-    return "< 0.0001" if p < 1e-4 else f"= {p:.2g}"
+    return "<\N{NO-BREAK SPACE}0.0001" if p < 1e-4 else f"=\N{NO-BREAK SPACE}{p:.2g}"
 
 
 def percent(p: float) -> str:

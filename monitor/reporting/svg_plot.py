@@ -93,7 +93,7 @@ class Panel:
             at = self.x(value)
             on.line(at, bottom, at, bottom + 8, MID, 2)
             on.text(at, bottom + 12 + LETTER, words, anchor="middle")
-        for value in nice_ticks(*self.up, ticks):
+        for value in nice_ticks(*self.up, ticks + 1):
             at = self.y(value)
             on.line(self.left, at, self.left + self.width, at, PALE, 1.5)
             on.line(self.left - 8, at, self.left, at, MID, 2)

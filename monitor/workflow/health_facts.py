@@ -74,6 +74,7 @@ def _drift(found: DriftFound, origin: datetime) -> Drift:
     return Drift(
         found.slope,
         found.u_slope,
+        found.between,
         found.p_value,
         day(found.crosses),
         (day(found.crosses_between[0]), day(found.crosses_between[1])),

@@ -24,13 +24,14 @@ from monitor.workflow.health_history import (
     past_events,
     past_runs,
 )
-from monitor.workflow.health_map import stored_map
+from monitor.workflow.health_map import map_told
 from monitor.workflow.health_model import model_of
 from monitor.workflow.health_refusals import refused_of
 from monitor.workflow.health_results import (
     explanation_of,
     history_of,
     identified,
+    map_of,
     tolerances_of,
     uncertainty_of,
 )
@@ -75,6 +76,7 @@ def machine_health(
     identified(db, here, model, remarks)
     evaluated = uncertainty_of(db, last, model, span, remarks)
     explained = explanation_of(db, last.campaign, method, model, span, remarks)
+    mapped = None if evaluated is None else map_of(db, last, model, span, remarks)
     series = series_of(db, machine, model, runs)
     origin = runs[0].at
     changes = changes_of(series, events, origin)
@@ -101,12 +103,12 @@ def machine_health(
         machine, description, location, state,
         changed=changed_in_words(noted, explained, quality),
         since=since_when(state, parameters, noted, span.first), probability_out=judged.any,
-        next_check=next_check(state, drifts, limits, last.at),
+        next_check=next_check(state, drifts, limits, last.at, week),
         run=f"run {last.run} of campaign {last.campaign}, {last.at:%Y-%m-%d %H:%M}",
         basis="" if evaluated is None else evaluated["input_covariance"], factor=factor_in_words(evaluated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=conditions_of(here),
         model=model_of(explained, history_of(db, last.campaign, model, span, remarks), span), quality=quality,
-        map=stored_map(db, last.campaign, [run.run for run in here if run.campaign == last.campaign], model),
+        map=map_told(mapped),
     )  # fmt: skip
 
 

@@ -82,7 +82,6 @@ def _steps(explained: Document, history: list[Document]) -> Iterator[ErrorStep]:
 def _runs_in_words(campaign: str, span: Span) -> str:
     first, last = f"{span.first:%Y-%m-%d}", f"{span.last:%Y-%m-%d}"
     days = first if first == last else f"{first} to {last}"
-    runs = "the one run" if span.count == 1 else f"all {span.count} runs"
-    if not span.later:
-        return f"{runs} of campaign {campaign}, {days}"
-    return f"{runs} of campaign {campaign} until the end of the week, {days}; {span.later} later left out"
+    if span.later:
+        return f"{span.count} of {span.count + span.later} runs of {campaign}, {days}; the others began after the week"
+    return f"{'the one run' if span.count == 1 else f'all {span.count} runs'} of {campaign}, {days}"

@@ -18,6 +18,7 @@ from monitor.workflow.health_history import PastRun, Span
 from monitor.workflow.identification import identify
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty import uncertainty
+from monitor.workflow.volumetric import volumetric_map
 
 Document = dict[str, Any]
 #: The probability that every expanded uncertainty of the report is stated with.
@@ -90,6 +91,25 @@ def explanation_of(
     return kept(
         lambda: explain_campaign(db, campaign, label(model), before=span.before)[0],
         "model and measurement could not be compared",
+        remarks,
+    )
+
+
+def map_of(
+    db: Database, last: PastRun, model: StoredModel, span: Span, remarks: list[str]
+) -> Document | None:
+    """The volumetric error of a run over the strokes, from the runs of ``span``; None, with a remark, without one."""
+    known = _stored(
+        db, "volumetric map", span.before, METHOD, campaign=last.campaign, run=last.run, model=model.name,
+        model_version=model.version,
+    )  # fmt: skip
+    if known is not None:
+        return known
+    return kept(
+        lambda: volumetric_map(
+            db, last.campaign, last.run, model=label(model), p=COVERAGE, before=span.before
+        )[0],
+        "the volumetric error could not be mapped",
         remarks,
     )
 

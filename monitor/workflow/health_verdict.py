@@ -11,6 +11,7 @@ import numpy as np
 from monitor.reporting.health import ALARMS, Change, DataQuality, ParameterHealth, RefusedImport, State
 from monitor.uncertainty.conformity import conformity
 from monitor.workflow.health_series import DriftFound
+from monitor.workflow.weeks import Week
 
 Document = dict[str, Any]
 
@@ -95,8 +96,9 @@ def state_of(
 
 
 def next_check(
-    state: State, drifts: dict[str, DriftFound | None], limits: dict[str, float], last: datetime
+    state: State, drifts: dict[str, DriftFound | None], limits: dict[str, float], last: datetime, week: Week
 ) -> str:
+    """When to measure again, and why: the machine is likely to be in tolerance until then."""
     known = {
         name: one.good_for for name, one in drifts.items() if one is not None and one.good_for is not None
     }
@@ -110,6 +112,10 @@ def next_check(
     found = drifts[name]
     assert found is not None
     day = (last + timedelta(days=known[name])).date()
+    if known[name] >= found.horizon and day <= week.last:
+        return f"next week: {found.horizon:.0f} days of history allow no longer forecast"
+    if day <= week.last:
+        return f"now: {name} stayed in tolerance with 95 % until {day} only"
     if known[name] >= found.horizon:
         return f"by {day}: in tolerance as far ahead as the history is long"
     return f"by {day}: {name} stays in tolerance with 95 % until then"
