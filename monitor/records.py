@@ -130,12 +130,21 @@ class ScaleBar:
 
 
 @dataclass(frozen=True)
+class Reflector:
+    """A reflector that a tracker looks at: on the tool, or ``fixed`` beside the machine."""
+
+    id: str
+    fixed: bool = False
+
+
+@dataclass(frozen=True)
 class Artefact:
-    """The balls, and the scale bar where the method needs one."""
+    """The balls, and the scale bar where the method needs one; the reflectors where the file lists them."""
 
     id: str
     balls: tuple[Ball, ...]
     scale_bar: ScaleBar | None = None
+    reflectors: tuple[Reflector, ...] = ()
 
 
 @dataclass(frozen=True)

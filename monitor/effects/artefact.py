@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from monitor.effects.context import Context
+from monitor.effects.tracker import TrackerShift, TrackerTurn
 from monitor.exceptions import EffectError
 from monitor.records import Array
 from monitor.units import METRE, MICROMETRE, Unit
@@ -112,6 +113,10 @@ def parse_artefact(body: str) -> ArtefactChange:
         return Expansion()
     if body == "stem:gravity":
         return StemGravity()
+    if body == "tracker:shift":
+        return TrackerShift()
+    if body == "tracker:turn":
+        return TrackerTurn()
     match = re.fullmatch(
         r"ball:(?P<ball>[^:]+):moved\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<seq>\d+)\s*\)", body
     )
@@ -123,5 +128,5 @@ def parse_artefact(body: str) -> ArtefactChange:
         )
     raise EffectError(
         f"there is no effect '{body}' of the artefact; there are ball:2:moved(run 7, sequence 23), "
-        "artefact:expansion@ambient_degC and stem:gravity"
+        "artefact:expansion@ambient_degC, stem:gravity, tracker:shift@run_time and tracker:turn@run_time"
     )

@@ -26,7 +26,8 @@ class Context:
     ``positions`` (n, J) physical displacements in mm and rad; ``run`` (n,) the run's number; ``sequence`` (n,);
     ``time`` (n,) s since the run began; ``day_time`` (n,) s since the first run of the day began; ``run_time``
     (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
-    the frame of the last work axis; ``columns`` recorded columns by their names in the file, in its units.
+    the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
+    the file, in its units.
     """
 
     chain: Chain
@@ -61,6 +62,31 @@ class Context:
         return signs
 
     @cached_property
+    def moves(self) -> Array:
+        """The move (n, J) in mm and rad by which every axis came to its pose; rows at one pose share it.
+
+        Zero at the first pose of a run: nobody recorded where the axes were before.
+        """
+        moves = np.zeros_like(self.positions)
+        for run in np.unique(self.run):
+            rows = np.flatnonzero(self.run == run)
+            steps = np.diff(self.positions[rows], axis=0)
+            last = np.zeros(self.positions.shape[1])
+            for row, step in zip(rows[1:], steps, strict=True):
+                last = step if np.any(step) else last
+                moves[row] = last
+        return moves
+
+    @cached_property
+    def run_order(self) -> Array:
+        """From 0 at a run's first row to 1 at its last, by their order (n,)."""
+        order = np.zeros(len(self))
+        for run in np.unique(self.run):
+            rows = np.flatnonzero(self.run == run)
+            order[rows] = np.arange(len(rows)) / max(len(rows) - 1, 1)
+        return order
+
+    @cached_property
     def gravity(self) -> Array:
         """Unit vectors (n, J, 3) of gravity in the frame of every axis."""
         return gravity_in_joint_frames(self.chain, self.positions)
@@ -93,6 +119,7 @@ def context_of(campaign: Campaign, chain: Chain) -> Context:
         start, end = probings.time[rows].min(), probings.time[rows].max()
         run_time[rows] = (probings.time[rows] - start) / (end - start) if end > start else 0.0
     nominal = {ball.id: ball.nominal for ball in campaign.artefact.balls}
+    unknown = (np.nan, np.nan, np.nan)
     columns: dict[str, Array] = dict(probings.channels)
     for name in sorted({name for run in campaign.runs for name in run.conditions}):
         if name not in columns:
@@ -111,6 +138,6 @@ def context_of(campaign: Campaign, chain: Chain) -> Context:
         day_time=probings.time + np.array([since[int(run)] for run in probings.run]),
         run_time=run_time,
         target=probings.target,
-        nominal=np.array([nominal[target] for target in probings.target], dtype=float),
+        nominal=np.array([nominal.get(str(target), unknown) for target in probings.target]),
         columns=columns,
     )

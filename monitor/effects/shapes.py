@@ -77,16 +77,16 @@ class Poly:
 
 @dataclass(frozen=True)
 class Harmonic:
-    """A cosine and a sine of a whole number of periods a turn."""
+    """A cosine and a sine of a number of periods a turn; a gear has as many as its ratio, whole or not."""
 
-    order: int
-    pattern: ClassVar[str] = r"harmonic(?P<order>[1-9]\d?)"
+    order: float
+    pattern: ClassVar[str] = r"harmonic(?P<order>[1-9]\d{0,3}(?:\.\d+)?)"
     labels: ClassVar[tuple[str, ...]] = (".cos", ".sin")
 
     def columns(self, context: Context, joint: int) -> Array:
         if not context.chain.joints[joint].turns:
             name = context.chain.joints[joint].name
-            raise EffectError(f"harmonic{self.order} belongs to a rotary axis; for {name} write cyclic20mm")
+            raise EffectError(f"harmonic{self.order:g} belongs to a rotary axis; for {name} write cyclic20mm")
         angle = self.order * context.positions[:, joint]
         return np.column_stack([np.cos(angle), np.sin(angle)])
 
@@ -124,6 +124,34 @@ class Reversal:
 
     def columns(self, context: Context, joint: int) -> Array:
         return context.travel[:, joint, None]
+
+    def unit(self, base: Unit, joint: Joint) -> Unit:
+        return base
+
+
+@dataclass(frozen=True)
+class Lag:
+    """In proportion to the last move: a reading taken before the axis has settled, or a reading that trails."""
+
+    pattern: ClassVar[str] = r"lag"
+    labels: ClassVar[tuple[str, ...]] = ("",)
+
+    def columns(self, context: Context, joint: int) -> Array:
+        return context.moves[:, joint, None]
+
+    def unit(self, base: Unit, joint: Joint) -> Unit:
+        return base.per(RADIAN if joint.turns else METRE)
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """In proportion to the torque of weights further out, which its driver gives."""
+
+    pattern: ClassVar[str] = r"compliance"
+    labels: ClassVar[tuple[str, ...]] = ("",)
+
+    def columns(self, context: Context, joint: int) -> Array:
+        return np.ones((len(context), 1))
 
     def unit(self, base: Unit, joint: Joint) -> Unit:
         return base
@@ -173,10 +201,14 @@ class FormulaShape:
         return base
 
 
-BUILT_IN: tuple[type, ...] = (Const, Poly, Harmonic, Cyclic, Reversal, Table, FormulaShape)
+BUILT_IN: tuple[type, ...] = (Const, Poly, Harmonic, Cyclic, Reversal, Lag, Compliance, Table, FormulaShape)
 
 # How the groups of a built-in pattern are read; those of a plug-in arrive as text.
-READ: dict[str, Callable[[str], Any]] = {"order": int, "nodes": int, "pitch": float}
+READ: dict[str, Callable[[str], Any]] = {
+    "order": lambda text: float(text) if "." in text else int(text),
+    "nodes": int,
+    "pitch": float,
+}
 
 
 def parse_shape(text: str) -> Shape:
@@ -191,6 +223,6 @@ def parse_shape(text: str) -> Shape:
                 made = shape(**given)
             return made
     raise EffectError(
-        f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic99, cyclic20mm (any "
-        "pitch), reversal, table (or table9 for nine nodes, up to table99) and formula(...)"
+        f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic9999, cyclic20mm (any "
+        "pitch), reversal, lag, compliance, table (or table9 for nine nodes, up to table99) and formula(...)"
     )

@@ -61,9 +61,11 @@ def identification(
     """The geometric errors of every run, with the covariance of the stated uncertainties."""
     count = len(problem.base_names)
     vectors = problem.vectors(solution.local, solution.common)
+    spatial = problem.as_vectors(vectors)
     runs = []
     for place, run in enumerate(problem.runs):
-        residuals = vectors[problem.context.run == run]
+        own = problem.context.run == run
+        residuals = vectors[own]
         free = solution.local_free[place, :count]
         both = free[:, None] & free
         weighted = solution.last.residual[place]
@@ -76,7 +78,7 @@ def identification(
                     zip(problem.local_names[count:], map(float, solution.local[place, count:]), strict=True)
                 ),
                 refused=refusals(problem, solution.null_space[place], int(run), advice),
-                residuals=residuals,
+                residuals=spatial[own],
                 rms=float(np.sqrt(np.mean(residuals**2))),
                 chi_square=float(weighted @ weighted),
                 degrees_of_freedom=residuals.size + len(problem.extra_names) - int(solution.rank[place]),

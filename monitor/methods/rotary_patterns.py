@@ -28,7 +28,8 @@ SYMBOLS = {
     "dx_AY": "EX0A",
     "dy_AY": "EY0A",
     "dz_AY": "EZ0A",
-    "alpha_AY": "EA0A",
+    # The zero of A. A turn about A before and behind the axis do the same; our convention names the second.
+    "alpha_AY": "EA0C",
     "beta_AY": "EB0A",
     "gamma_AY": "EC0A",
     "dy_CA": "EY0C",
@@ -149,7 +150,9 @@ def closed_forms(touches: Touches) -> Array:
     angles = sum(seen.pair("4", (pose, pose), (Y, Y)).angle() for pose in (V, VII))
 
     # (6) and (9) together, with the signs of the places: z2 - z1 = (y2 - y1) alpha - (x2 - x1) (beta_AY + beta_CA).
-    lever = np.array([[1.0, -1.0], [1.0, -1.0]]) * np.array([np.diff(p.means, axis=0)[0, [Y, X]] for p in (p1, p2c)])
+    lever = np.array([[1.0, -1.0], [1.0, -1.0]]) * np.array(
+        [np.diff(p.means, axis=0)[0, [Y, X]] for p in (p1, p2c)]
+    )
     alpha, beta = np.linalg.solve(lever, [p.mean[1] - p.mean[0] for p in (p1, p2c)])
     # (7) and (8)
     dx = sum(p2a.mean) / 2.0 - p2a.means[:, Z].mean() * beta

@@ -83,6 +83,10 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
         yield from ("", "[[artefact.balls]]", f"id = {_text(ball.id)}")
         yield f"nominal_mm = {_numbers(ball.nominal)}"
         yield f"diameter_mm = {float(ball.diameter)!r}"
+    for reflector in artefact.reflectors:
+        yield from ("", "[[artefact.reflectors]]", f"id = {_text(reflector.id)}")
+        if reflector.fixed:
+            yield "fixed = true"
     bar = artefact.scale_bar
     if bar is None:
         return

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from monitor.records import Artefact, AxisSettings, Ball, ChainAxis, Machine, Probe, ScaleBar
+from monitor.records import Artefact, AxisSettings, Ball, ChainAxis, Machine, Probe, Reflector, ScaleBar
 
 
 def machine_json(machine: Machine) -> str:
@@ -63,7 +63,10 @@ def probe_record(text: str) -> Probe:
 
 def artefact_json(artefact: Artefact) -> str:
     """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C."""
-    return _text(asdict(artefact))
+    data = asdict(artefact)
+    if not artefact.reflectors:
+        del data["reflectors"]
+    return _text(data)
 
 
 def artefact_record(text: str) -> Artefact:
@@ -72,7 +75,10 @@ def artefact_record(text: str) -> Artefact:
     balls = tuple(Ball(**{**ball, "nominal": _tuple(ball["nominal"])}) for ball in data["balls"])
     bar = data["scale_bar"]
     return Artefact(
-        data["id"], balls, None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])})
+        data["id"],
+        balls,
+        None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])}),
+        tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from monitor.effects import parse_effect
 from monitor.effects.words import describe
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods import METHODS
 from monitor.methods.base_effects import base_effects
@@ -83,11 +83,16 @@ def list_(db: Database) -> Document:
 def show(db: Database, name: str) -> Document:
     """A model, its added effects in words, and its base effects on every machine that is there."""
     stored = resolve(db, name)
+    method = _method_of(db, stored)
     base: dict[str, list[str]] = {}
     words: dict[str, str] = {}
     for machine in described_machines(db):
         chain = chain_of(machine)
-        base[machine.id] = list(base_effects(chain))
+        try:
+            base[machine.id] = list(_base_of(method, chain))
+        except DataError:
+            # A method that this machine cannot be calibrated by has no base on it.
+            continue
         for text in stored.effects:
             try:
                 words.setdefault(text, describe(parse_effect(text, chain)).meaning)
@@ -103,7 +108,7 @@ def add(db: Database, effect: str, to: str, as_: str | None = None, note: str = 
     """
     parent = resolve(db, to)
     text = _known(db, effect)
-    if _is_base(db, text):
+    if _is_base(db, text, _method_of(db, parent)):
         raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
     if text in parent.effects:
         raise InputError(
@@ -134,9 +139,28 @@ def _name(as_: str | None, parent: StoredModel) -> str:
     return as_
 
 
-def _is_base(db: Database, effect: str) -> bool:
-    """Whether an effect is a base effect on every machine."""
-    return all(effect in base_effects(chain) for chain in _chains(db))
+def _method_of(db: Database, stored: StoredModel) -> str:
+    """The method that a model descends from."""
+    while stored.parent is not None:
+        stored = load_model(db, *stored.parent)
+    return stored.name if stored.name in METHODS else next(iter(METHODS))
+
+
+def _base_of(method: str, chain: Chain) -> tuple[str, ...]:
+    """The effects that are free in every run of a method; a method that names none has the complete model's."""
+    found: tuple[str, ...] = getattr(METHODS[method], "base_effects", base_effects)(chain)
+    return found
+
+
+def _is_base(db: Database, effect: str, method: str) -> bool:
+    """Whether an effect is a base effect of a method on every machine that it can calibrate."""
+    found = []
+    for chain in _chains(db):
+        try:
+            found.append(effect in _base_of(method, chain))
+        except DataError:
+            continue
+    return bool(found) and all(found)
 
 
 def _chains(db: Database) -> tuple[Chain, ...]:

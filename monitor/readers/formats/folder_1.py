@@ -55,7 +55,7 @@ def read(folder: Path) -> Campaign:
             table,
             None if top is None else part.axes,
             {} if top is None else part.strokes,
-            balls if rules is not None and rules.targets_are_balls else None,
+            _targets(rules, balls, artefact),
             None if runs is None or _has_lost_a_run(runs_table, runs) else runs.lines,
             rules,
             faults,
@@ -77,6 +77,17 @@ def read(folder: Path) -> Campaign:
     assert runs is not None
     assert probings is not None
     return Campaign(name, method, part.machine, probe, artefact, runs.runs, probings.probings, tuple(files))
+
+
+def _targets(
+    rules: MethodRules | None, balls: list[str] | None, artefact: Artefact | None
+) -> list[str] | None:
+    """The names that a target may have; None where they are free or not known."""
+    if rules is not None and rules.targets_are_balls:
+        return balls
+    if rules is not None and rules.targets_are_reflectors and artefact is not None and artefact.reflectors:
+        return [reflector.id for reflector in artefact.reflectors]
+    return None
 
 
 def _refuse_other_format(top: Table) -> None:
