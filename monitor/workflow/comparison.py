@@ -15,8 +15,9 @@ from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import method_named
 from monitor.methods.shared_effects import shared_parameters
 from monitor.records import Campaign
-from monitor.store import Database, StoredModel, load_campaign, model_history, save_analysis
+from monitor.store import Database, StoredModel, is_curve, load_campaign, model_history, save_analysis
 from monitor.units import DEGREE, MICROMETRE, Unit
+from monitor.workflow import curves
 from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.models import as_model, label, resolve
 
@@ -261,6 +262,8 @@ def history(db: Database, model: str, campaign: str | None = None) -> list[Docum
     """The error falling: every version from the base on, fitted to one campaign."""
     stored = resolve(db, model)
     name = campaign or latest_campaign(db, stored)
+    if is_curve(db, name):
+        return curves.history(db, stored, name)
     loaded = load_campaign(db, name)
     steps = []
     for version in model_history(db, stored.name, stored.version):

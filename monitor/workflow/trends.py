@@ -20,6 +20,7 @@ from monitor.store import (
     save_analysis,
     unidentified_campaigns,
 )
+from monitor.workflow.agreement import Moment, agreement, evaluated
 from monitor.workflow.change_search import search_changes
 from monitor.workflow.identification import identify
 from monitor.workflow.models import resolve
@@ -125,6 +126,9 @@ def _parameter(
     begins = piece_begins(steady, found, events)
     slope, line = drift(steady, begins)
     channels = {name: values[own] for name, values in history.conditions.items()}
+    # The method is a condition like any other: 1 for the runs of each but the first.
+    for method in list(dict.fromkeys(history.method[own].tolist()))[1:]:
+        channels[f"method {method}"] = (history.method[own] == method).astype(np.float64)
     coefficients, why_conditions = conditions(series, channels, begins)
     waves, why_cycles = cycles(steady, begins)
     warmth, why_warm = warming(
@@ -188,6 +192,15 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         "since": None if choice.since is None else choice.since.isoformat(),
         "runs": len(history.run),
         "campaigns": list(dict.fromkeys(history.campaign.tolist())),
+        "methods": list(dict.fromkeys(history.method.tolist())),
+        "agreement": agreement(
+            history,
+            [
+                Moment(at.timestamp(), one["kind"], one["description"])
+                for at, one in zip(moments, known, strict=True)
+            ],
+            evaluated(db, list(dict.fromkeys(history.campaign.tolist()))),
+        ),
         "events": known,
         "notes": same_hours(history),
         "false_alarm": FALSE_ALARM,

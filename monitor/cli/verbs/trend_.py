@@ -16,6 +16,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
+from monitor.workflow import agreement
 from monitor.workflow.trends import Choice, trends
 
 EXAMPLE = "monitor trend HU40-T --since 2025-01-01 --figures figures"
@@ -103,6 +104,8 @@ def _three(value: float) -> str:
 def _tables(found: dict[str, Any]) -> None:
     for note in found["notes"]:
         output.say(f"note: {note}")
+    for pair in found["agreement"]:
+        output.say(agreement.sentence(pair))
     if found["why"] is not None:
         output.say(found["why"])
         return
