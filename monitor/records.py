@@ -138,6 +138,46 @@ class Reflector:
 
 
 @dataclass(frozen=True)
+class Module:
+    """A module of an L-shaped piece: calibrated ``centre`` (2,) mm and ``tilt`` (2,) rad along the arms."""
+
+    id: str
+    centre: tuple[float, float]
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How the piece lies: its arms along the two axes of ``plane``; ``corner`` (3,) mm are the readings of X, Y and Z
+    with which the sensor stands over the first module."""
+
+    plane: str
+    corner: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LShape:
+    """An L-shaped standard piece and the optics that it is scanned with.
+
+    ``focal_length`` of the autocollimator and ``paraboloid``, the radius of curvature at the vertex of the modules'
+    paraboloids, in mm; standard uncertainties of the modules' calibration in mm and rad. The module whose centre is
+    nearest to the piece's origin is the ``reference`` to which the others were calibrated.
+    """
+
+    focal_length: float
+    paraboloid: float
+    place_uncertainty: float
+    tilt_uncertainty: float
+    modules: tuple[Module, ...]
+    placements: tuple[Placement, ...]
+
+    @property
+    def reference(self) -> int:
+        """Place of the reference module."""
+        return min(range(len(self.modules)), key=lambda place: sum(c**2 for c in self.modules[place].centre))
+
+
+@dataclass(frozen=True)
 class Artefact:
     """The balls, and the scale bar where the method needs one; the reflectors where the file lists them."""
 
@@ -145,6 +185,7 @@ class Artefact:
     balls: tuple[Ball, ...]
     scale_bar: ScaleBar | None = None
     reflectors: tuple[Reflector, ...] = ()
+    l_shape: LShape | None = None
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,9 @@ COMMON_RANK_TOLERANCE = 1e-3
 # Steps are measured in standard deviations of the whitened residuals; a hundred-millionth is far below any
 # digit that is printed.
 STEP_TOLERANCE = 1e-8
+# Where a stated uncertainty is a billionth of the readings, rounding alone is a larger step than that. Steps below a
+# hundred-thousandth that have stopped shrinking are rounding.
+ROUNDING = 1e-5
 MOST_ITERATIONS = 50
 MOST_HALVINGS = 12
 # A member of a null vector is named where its share exceeds this part of the largest.
@@ -119,6 +122,7 @@ def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, comm
     """
     now = linearise(local, common)
     cost = float(np.sum(now.residual**2))
+    before = np.inf
     for iteration in range(1, MOST_ITERATIONS + 1):
         space = eliminate(now.local)
         whole = np.concatenate([now.common, now.residual[..., None]], axis=-1)
@@ -137,8 +141,9 @@ def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, comm
             factor /= 2.0
         local, common = local + factor * step_local, common + factor * step_common
         now, cost = trial, trial_cost
-        if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)):
+        if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
             return _solution(local, common, now, covariance, free, iteration)
+        before = size
     raise DataError(
         f"the identification did not converge in {MOST_ITERATIONS} steps: the readings contradict the machine file; "
         "check the axis signs, the topology and the order of the targets"

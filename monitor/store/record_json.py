@@ -6,7 +6,19 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from monitor.records import Artefact, AxisSettings, Ball, ChainAxis, Machine, Probe, Reflector, ScaleBar
+from monitor.records import (
+    Artefact,
+    AxisSettings,
+    Ball,
+    ChainAxis,
+    LShape,
+    Machine,
+    Module,
+    Placement,
+    Probe,
+    Reflector,
+    ScaleBar,
+)
 
 
 def machine_json(machine: Machine) -> str:
@@ -66,6 +78,8 @@ def artefact_json(artefact: Artefact) -> str:
     data = asdict(artefact)
     if not artefact.reflectors:
         del data["reflectors"]
+    if artefact.l_shape is None:
+        del data["l_shape"]
     return _text(data)
 
 
@@ -79,7 +93,16 @@ def artefact_record(text: str) -> Artefact:
         balls,
         None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])}),
         tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
+        l_shape=_l_shape(data.get("l_shape")),
     )
+
+
+def _l_shape(data: dict[str, Any] | None) -> LShape | None:
+    if data is None:
+        return None
+    modules = tuple(Module(one["id"], _tuple(one["centre"]), _tuple(one["tilt"])) for one in data["modules"])
+    placements = tuple(Placement(one["plane"], _tuple(one["corner"])) for one in data["placements"])
+    return LShape(**{**data, "modules": modules, "placements": placements})
 
 
 def _text(data: dict[str, Any]) -> str:
