@@ -79,8 +79,8 @@ def planned(loaded: Campaign, stored: StoredModel, most_balls: int) -> Planned:
     problem = method_named(loaded.method).problem_of(loaded, as_model(stored))
     if not isinstance(problem, TouchProblem):
         raise DataError(
-            f"plan weighs where balls are touched, and campaign {loaded.name} was measured by {loaded.method}; what its "
-            "plan cannot tell apart, identify names with what to do"
+            f"plan weighs where balls are touched, and campaign {loaded.name} was measured by {loaded.method}; what"
+            " its plan cannot tell apart, identify names with what to do"
         )
     problem = _with_found_tip(problem)
     first = problem.context.run == problem.runs[0]
