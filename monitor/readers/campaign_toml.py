@@ -7,7 +7,16 @@ from collections.abc import Iterator
 
 from monitor.readers.axes import axes_of_machine
 from monitor.readers.decimals import decimal_in
-from monitor.records import Artefact, Campaign, ChainAxis, LShape, Machine, Probe, ScaleBar
+from monitor.records import (
+    Artefact,
+    Campaign,
+    ChainAxis,
+    LShape,
+    Machine,
+    Probe,
+    ScaleBar,
+    SelfCalibration,
+)
 from monitor.units import MICROMETRE, MICRORADIAN
 
 
@@ -89,6 +98,7 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
             yield "fixed = true"
     yield from _scale_bar(artefact.scale_bar)
     yield from _l_shape(artefact.l_shape)
+    yield from _self_calibration(artefact.self_calibration)
 
 
 def _scale_bar(bar: ScaleBar | None) -> Iterator[str]:
@@ -102,6 +112,21 @@ def _scale_bar(bar: ScaleBar | None) -> Iterator[str]:
         yield f"expansion_coefficient_per_K = {float(bar.expansion_coefficient)!r}"
     if bar.reference_temperature is not None:
         yield f"reference_temperature_degC = {float(bar.reference_temperature)!r}"
+
+
+def _self_calibration(made: SelfCalibration | None) -> Iterator[str]:
+    if made is None:
+        return
+    yield from ("", "[artefact.self_calibration]")
+    if made.conditions:
+        yield f"conditions = [{', '.join(map(_text, made.conditions))}]"
+    yield from ("", "[artefact.self_calibration.nodes_mm]")
+    yield from (f"{_text(axis)} = {_numbers(places)}" for axis, places in made.nodes.items())
+    length = made.length
+    yield from ("", "[artefact.self_calibration.length]", f"parameter = {_text(length.parameter)}")
+    yield f"error_um = {decimal_in(MICROMETRE)(length.value)}"
+    yield f"standard_uncertainty_um = {decimal_in(MICROMETRE)(length.standard_uncertainty)}"
+    yield f"certificate = {_text(length.certificate)}"
 
 
 def _l_shape(piece: LShape | None) -> Iterator[str]:

@@ -11,6 +11,7 @@ from monitor.records import (
     AxisSettings,
     Ball,
     ChainAxis,
+    KnownError,
     LShape,
     Machine,
     Module,
@@ -18,6 +19,7 @@ from monitor.records import (
     Probe,
     Reflector,
     ScaleBar,
+    SelfCalibration,
 )
 
 
@@ -76,6 +78,9 @@ def probe_record(text: str) -> Probe:
 def artefact_json(artefact: Artefact) -> str:
     """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C."""
     data = asdict(artefact)
+    # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
+    if artefact.self_calibration is None:
+        del data["self_calibration"]
     if not artefact.reflectors:
         del data["reflectors"]
     if artefact.l_shape is None:
@@ -94,7 +99,15 @@ def artefact_record(text: str) -> Artefact:
         None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])}),
         tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
         l_shape=_l_shape(data.get("l_shape")),
+        self_calibration=_self_calibration(data.get("self_calibration")),
     )
+
+
+def _self_calibration(data: dict[str, Any] | None) -> SelfCalibration | None:
+    if data is None:
+        return None
+    nodes = {axis: tuple(places) for axis, places in data["nodes"].items()}
+    return SelfCalibration(nodes, KnownError(**data["length"]), tuple(data["conditions"]))
 
 
 def _l_shape(data: dict[str, Any] | None) -> LShape | None:

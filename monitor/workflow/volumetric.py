@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from monitor.records import Array, Campaign
 from monitor.store import Database, save_analysis
 from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
 from monitor.units import DEGREE, MICROMETRE
+from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty import Evaluated, evaluate
 
@@ -149,15 +151,19 @@ def volumetric_map(
     points: int = POINTS,
     absolute: bool = False,
     model_uncertainty: bool = True,
+    before: datetime | None = None,
 ) -> tuple[Document, Mapped]:
     """Map the volumetric error of one run (the last by default) over the strokes; the document is stored.
 
     The grid of ``points`` along every linear axis is laid at every rotary pose of the plan. The workpiece's zero
-    is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``.
+    is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``. Runs that began at or after
+    ``before`` (local time without a zone) take no part; the document is then stored as ``partial volumetric map``.
     """
     if not 2 <= points <= 41:
         raise InputError(f"--points {points}: choose 2 to 41 points along each axis")
-    found = evaluate(db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty)
+    found = evaluate(
+        db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty, before=before
+    )
     known, left_out = geometric_errors(found)
     if not known.names:
         raise DataError(
@@ -170,8 +176,8 @@ def volumetric_map(
     mapped = Mapped(found, known, ranges, from_strokes, poses, points, error, left_out)
     document = _document(mapped, p)
     save_analysis(
-        db, "volumetric map", document, method="guf", campaign=campaign, run=found.run,
-        model=found.model.name, model_version=found.model.version,
+        db, kind_of("volumetric map", before), document, method=method_of("guf", before), campaign=campaign,
+        run=found.run, model=found.model.name, model_version=found.model.version,
     )  # fmt: skip
     return document, mapped
 
