@@ -129,7 +129,8 @@ def candidates_of(campaign: Campaign, model: Model, angles: Sequence[float]) -> 
         probings.channels,
     )
     problem = problem_of(
-        replace(campaign, runs=(replace(campaign.runs[0], run=1),), probings=planned), replace(model, added=())
+        replace(campaign, runs=(replace(campaign.runs[0], run=1),), probings=planned),
+        replace(model, added=()),
     )
     design = problem.linearise(problem.start, problem.common_start).local[0]
     positions = problem.nominal.context.positions
@@ -140,7 +141,7 @@ def candidates_of(campaign: Campaign, model: Model, angles: Sequence[float]) -> 
         nodes = problem.nodes[joint.name]
         # A nominal place that is typed to a micrometre may pass the last node by as much.
         inside &= (reading >= nodes[0] - 1e-3) & (reading <= nodes[-1] + 1e-3)
-    own: dict[float, tuple[int, ...]] = {one: () for one in every}
+    own: dict[float, tuple[int, ...]] = dict.fromkeys(every, ())
     for symbol in problem.plane.table_terms:
         for one in every:
             name = f"{symbol}({one:.9g})"

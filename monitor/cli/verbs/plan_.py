@@ -23,7 +23,12 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--balls", type=int, metavar="N", help="the best N balls (1 to 24; places for more are proposed)"
     )
-    parser.add_argument("--poses", type=int, metavar="N", help="the best N indexations (free-form: the next N angles of the table)")
+    parser.add_argument(
+        "--poses",
+        type=int,
+        metavar="N",
+        help="the best N indexations (free-form: the next N angles of the table)",
+    )
     parser.add_argument(
         "--wanted", action="append", default=[], metavar="PARAMETER=U",
         help="a standard uncertainty in display units; the quickest plan that reaches all; may be repeated",

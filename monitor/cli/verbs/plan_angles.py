@@ -16,7 +16,9 @@ def tables(found: dict[str, Any]) -> None:
     groups = dict.fromkeys(name.partition("(")[0] for name in present["parameters"])
     for group in groups:
         now, then = _largest(present, group), _largest(proposed, group)
-        unit = next(one["unit"] for name, one in present["parameters"].items() if name.partition("(")[0] == group)
+        unit = next(
+            one["unit"] for name, one in present["parameters"].items() if name.partition("(")[0] == group
+        )
         rows.append([group, unit, now, then])
     stated = found["stated_uncertainty_um"]
     output.table(
