@@ -116,7 +116,7 @@ def _of_shared(found: Evaluated, local: list[int], shared: list[int]) -> Array:
     return added
 
 
-def _ranges(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, float]], bool]:
+def ranges_of(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, float]], bool]:
     """Readings of the linear axes: the strokes of the machine file if it has all, else what was visited."""
     linear = [joint.name for joint in chain.joints if not joint.turns]
     strokes = {name: campaign.machine.axes[name].stroke for name in linear if name in campaign.machine.axes}
@@ -132,7 +132,7 @@ def _ranges(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, fl
     return visited | given, False
 
 
-def _poses(chain: Chain, positions: Array) -> Array:
+def poses_of(chain: Chain, positions: Array) -> Array:
     """The rotary poses of the plan (P, J), all at zero first; the spindle at zero."""
     turned = np.array([joint.kind == "rotary" for joint in chain.joints])
     poses = np.unique(np.round(np.where(turned, positions, 0.0), 9), axis=0) + 0.0
@@ -169,8 +169,8 @@ def volumetric_map(
         raise DataError(
             f"run {found.run} of campaign {campaign} determines no geometric error; there is nothing to map"
         )
-    ranges, from_strokes = _ranges(found.campaign, known.chain)
-    poses = _poses(known.chain, known.context.positions)
+    ranges, from_strokes = ranges_of(found.campaign, known.chain)
+    poses = poses_of(known.chain, known.context.positions)
     datum = None if absolute else middle(known.chain, ranges)
     error = volumetric_error(known, grid(known.chain, ranges, points, poses), datum)
     mapped = Mapped(found, known, ranges, from_strokes, poses, points, error, left_out)
