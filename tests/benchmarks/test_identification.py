@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from monitor.methods import free_form, samba
+from monitor.methods import free_form, rotary_probing, samba
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 
@@ -49,3 +49,10 @@ def test_free_form_92_points_at_8_angles(benchmark: Any, tmp_path: Path) -> None
     found = benchmark(free_form.identify, read_campaign(tmp_path))
     assert len(found.runs[0].residuals) == 736
     assert found.runs[0].refused == ()
+
+
+def test_rotary_probing_of_154_touches(benchmark: Any) -> None:
+    """Less than a second is asked for, for one run; here there are four."""
+    campaign = read_campaign(EXAMPLES / "tilting-table")
+    found = benchmark(rotary_probing.identify, campaign)
+    assert all(np.isfinite(run.estimate).all() for run in found.runs)
