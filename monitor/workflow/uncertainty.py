@@ -83,6 +83,10 @@ class Evaluated:
     causes: tuple[tuple[str, float], ...] = ()
 
 
+# A covariance of 4 000 readings takes 128 MB and some copies; 10 000 trials of 1 000 readings some ten minutes.
+MOST_READINGS, MOST_READINGS_MCM = 4000, 1200
+
+
 def _reading_inputs(
     db: Database, found: Fit, campaign: Campaign, one: OneRun, model: StoredModel, select: str | None
 ) -> tuple[Inputs, str]:
@@ -191,6 +195,7 @@ def evaluate(
     # The uncertainty of shared effects and time constants is not propagated into a run's own parameters.
     fixed, coefficients = found.problem.resolved(found.solution.common)
     one = run_problem(fixed, number, coefficients)
+    _refuse_too_many(len(one.reading_names), method)
     readings, words = _reading_inputs(db, found, loaded, one, stored, select)
     calibrated = _calibrated_inputs(one)
     inputs = joined(readings, calibrated) if calibrated is not None else readings
@@ -242,6 +247,20 @@ def evaluate(
     advice = method_named(loaded.method).advice
     refused = refusals(found.problem, found.solution.null_space[place], number, advice)
     return Evaluated(loaded, stored, found, number, framework, units, refused, words, mcm, validation, causes)
+
+
+def _refuse_too_many(readings: int, method: str) -> None:
+    """DataError where a run has so many readings that the evaluation would take hours or more memory than there is."""
+    if readings > MOST_READINGS:
+        raise DataError(
+            f"a run of {readings} readings has a covariance of {readings} rows, which is not built here (up to "
+            f"{MOST_READINGS}); `monitor identify` gives the standard uncertainties from the stated one, to first order"
+        )
+    if method != "guf" and readings > MOST_READINGS_MCM:
+        raise DataError(
+            f"a Monte Carlo of {readings} readings would take hours (up to {MOST_READINGS_MCM} are done here); write "
+            "--method guf: errors of 1 mrad leave products of 1 µrad, so that first order is as good"
+        )
 
 
 def _with_linear_axes(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from monitor.methods import samba
+from monitor.methods import rotary_probing, samba
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 
@@ -27,3 +27,10 @@ def test_twenty_runs_with_three_effects_in_common(benchmark: Any) -> None:
     model = Model("grown", added=("EYX:poly2", "EXX:reversal", "EZC1:const@warmup45min"))
     found = benchmark(samba.identify, campaign, model)
     assert np.isfinite(found.added_estimate).all()
+
+
+def test_rotary_probing_of_154_touches(benchmark: Any) -> None:
+    """Less than a second is asked for, for one run; here there are four."""
+    campaign = read_campaign(EXAMPLES / "tilting-table")
+    found = benchmark(rotary_probing.identify, campaign)
+    assert all(np.isfinite(run.estimate).all() for run in found.runs)
