@@ -5,7 +5,13 @@ argument. People who query with SQL start from the views ``v_*``; every table an
 its unit. Only this room imports duckdb.
 """
 
-from monitor.store.analyses import StoredAnalysis, list_analyses, load_analysis, save_analysis
+from monitor.store.analyses import (
+    StoredAnalysis,
+    list_analyses,
+    load_analysis,
+    save_analysis,
+    stored_analyses,
+)
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, load_campaign
 from monitor.store.catalogue import list_campaigns, list_machines, list_runs
@@ -80,6 +86,7 @@ __all__ = [
     "save_model",
     "save_selection",
     "snapshot",
+    "stored_analyses",
     "take_backup",
     "unidentified_campaigns",
     "verify_audit",

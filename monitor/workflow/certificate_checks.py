@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from pathlib import Path
 from typing import Any
 
 from monitor import __version__
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.certificate import CertificateRecord
 from monitor.reporting.dcc import dcc_xml
 from monitor.reporting.documents import from_document
 from monitor.reporting.render import certificate_pdf
-from monitor.reporting.signature import SignatureFinding, check_signature
+from monitor.reporting.signature import SignatureFinding, check_signature, is_signed
 from monitor.store import (
     Database,
+    StoredCertificate,
     find_certificate,
     list_certificates,
     load_certificate,
@@ -23,6 +25,8 @@ from monitor.store import (
 from monitor.workflow.certificate_files import path_of, write_file
 
 Document = dict[str, Any]
+#: The identifier that a certificate's file bears, its number (ISO 32000-2:2020, 14.4).
+_IDENTIFIER = re.compile(rb"/ID ?\[ ?\(([^()\\]*)\)")
 
 
 def summary(db: Database, number: str) -> Document:
@@ -56,7 +60,7 @@ def remake(db: Database, number: str, path: Path | None = None) -> Document:
     stored = load_certificate(db, number)
     record = from_document(CertificateRecord, stored.record)
     pdf = certificate_pdf(record, inputs=stored.record.get("inputs"))
-    signed = _is_signed(stored.pdf)
+    signed = is_signed(stored.pdf)
     same = stored.pdf.startswith(pdf) if signed else stored.pdf == pdf
     found = {**summary(db, number), "identical": same, "signed": signed, "file": None}
     if not same:
@@ -83,8 +87,39 @@ def digital(db: Database, number: str, path: Path) -> Document:
     return {**summary(db, number), "file": str(target)}
 
 
-def _is_signed(pdf: bytes) -> bool:
-    return b"/ByteRange" in pdf
+def stored_file(db: Database, number: str, path: Path) -> Document:
+    """Write the document of a certificate, as it was issued, to a file or into a folder. Raises NotFoundError."""
+    found = load_certificate(db, number)
+    target = path_of(path, number)
+    write_file(target, found.pdf)
+    return {**summary(db, number), "file": str(target)}
+
+
+def _no_longer(found: StoredCertificate) -> str:
+    """Why a genuine certificate is not valid."""
+    if found.state == "draft":
+        return "it is a draft"
+    replaced = f", replaced by {found.replaced_by}" if found.replaced_by else ""
+    return f"certificate {found.number} is {found.state}, no longer valid{replaced}: {found.reason}"
+
+
+def _claimed(db: Database, content: bytes) -> str:
+    """Which certificate an unknown document says that it is, and where it differs from that one."""
+    for number in {one.decode("utf-8", "replace") for one in _IDENTIFIER.findall(content)}:
+        try:
+            stored = load_certificate(db, number).pdf
+        except NotFoundError:
+            continue
+        differing = [
+            place for place, pair in enumerate(zip(content, stored, strict=False)) if pair[0] != pair[1]
+        ]
+        if len(content) != len(stored):
+            differing.append(min(len(content), len(stored)))
+        return (
+            f"it bears the number {number}, but differs from the document of that certificate from byte "
+            f"{differing[0]} on ({len(content)} bytes, where the genuine one has {len(stored)})"
+        )
+    return "altered, or not from here"
 
 
 def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
@@ -99,10 +134,9 @@ def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
     number = find_certificate(db, hashlib.sha256(content).hexdigest())
     chain = verify_audit(db)
-    signature = check_signature(content, trusted) if _is_signed(content) else SignatureFinding(None, None, ())
-    state = None
-    if number is not None:
-        state = load_certificate(db, number).state
+    signature = check_signature(content, trusted) if is_signed(content) else SignatureFinding(None, None, ())
+    found = None if number is None else load_certificate(db, number)
+    state = None if found is None else found.state
     checks = {
         "hash": number is not None,
         "chain": chain.ok,
@@ -110,13 +144,11 @@ def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
         "database": state == "issued",
     }
     faults = [*signature.faults, *chain.faults]
-    if number is None:
-        why = "altered, or not from here" if content.startswith(b"%PDF-") else "it is no PDF"
+    if found is None:
+        why = _claimed(db, content) if content.startswith(b"%PDF-") else "it is no PDF"
         faults.insert(0, f"no certificate of this database has the content of {file.name}: {why}")
     elif state != "issued":
-        faults.insert(
-            0, f"certificate {number} is {state}, no longer valid" if state != "draft" else "it is a draft"
-        )
+        faults.insert(0, _no_longer(found))
     ok = all(value for value in checks.values() if value is not None)
     return {
         "number": number,

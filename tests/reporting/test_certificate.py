@@ -36,6 +36,8 @@ def test_17025_every_letter_of_both_clauses_has_a_field() -> None:
         "accreditation",
         "country",
         "replaces",
+        "volumetric",
+        "language",
     }
 
 

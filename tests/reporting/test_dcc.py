@@ -20,7 +20,8 @@ from monitor.reporting.certificate import (
     ConformityVerdict,
     IncompleteCertificateError,
 )
-from monitor.reporting.dcc import DCC, SI, dcc_xml, unit_of
+from monitor.reporting.dcc import dcc_xml
+from monitor.reporting.dcc_results import DCC, SI, unit_of
 from monitor.reporting.render import certificate_pdf
 from monitor.reporting.results import RefusedParameters
 

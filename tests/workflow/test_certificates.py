@@ -21,7 +21,8 @@ from monitor.readers import read_campaign
 from monitor.reporting.certificate import CertificateRecord, ConformityStatement
 from monitor.reporting.documents import from_document, to_document
 from monitor.reporting.render import certificate_pdf
-from monitor.reporting.signature import sign
+from monitor.reporting.signing import FileKey, sign
+from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
 from monitor.workflow.certificate_checks import digital, remake, verify
 from monitor.workflow.certificate_results import results_of
@@ -111,7 +112,7 @@ def test_iso_19005_3_6_8_every_attached_file_stands_once_in_af_with_its_relation
 def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, found: Evaluated) -> None:
     attached = pypdf.PdfReader(guarded).attachments
     rows = list(csv.DictReader(io.StringIO(attached["results-1.csv"][0].decode())))
-    result = results_of(found)
+    result = results_of(found, texts_of())
     assert [row["parameter"] for row in rows] == list(result.names)
     assert [float(row["estimate"]) for row in rows] == result.estimate.tolist()
     assert [float(row["standard_uncertainty"]) for row in rows] == result.u.tolist()
@@ -138,8 +139,13 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: Evaluated) -> None:
     expanded = [
         unit.to_display(float(guf.expanded[place])) for unit, place in zip(units, places, strict=True)
     ]
+    result, english = results_of(found, texts_of()), texts_of()
+
+    def stated(rule: str) -> ConformityStatement:
+        return statement_of(result, rule, english, campaign="limited", dof=guf.dof)
+
     verdicts = {
-        rule: {one.name: one.verdict for one in statement_of(found, rule).verdicts}
+        rule: {one.name: one.verdict for one in stated(rule).verdicts}
         for rule in ("simple", "guard", "probability")
     }
     for name, value, width in zip(LIMITS, y, expanded, strict=True):
@@ -153,10 +159,10 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: Evaluated) -> None:
     assert verdicts["guard"]["EXX"] == "conditional pass"
     assert verdicts["guard"]["EA0B"] == "pass"
     assert verdicts["probability"]["EX0C"] == "fail"
-    for one in statement_of(found, "probability").verdicts:
+    for one in stated("probability").verdicts:
         assert (one.verdict == "pass") == (one.probability >= 0.95)
-    joint = statement_of(found, "simple").joint_probability
-    assert joint <= min(one.probability for one in statement_of(found, "simple").verdicts)
+    joint = stated("simple").joint_probability
+    assert joint <= min(one.probability for one in stated("simple").verdicts)
 
 
 def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(guarded: Path) -> None:
@@ -213,7 +219,7 @@ def test_a_signed_certificate_is_verified_check_by_check(db: Database, tmp_path:
     )  # fmt: skip
     p12 = tmp_path / "lab.p12"
     p12.write_bytes(pkcs12.serialize_key_and_certificates(b"lab", key, certificate, None, NoEncryption()))
-    made = issue(db, "limited", 20, LABORATORY, out=tmp_path, number="S-1", issued_on=DAY, key=p12)
+    made = issue(db, "limited", 20, LABORATORY, out=tmp_path, number="S-1", issued_on=DAY, key=FileKey(p12))
     file = Path(made["file"])
     good = verify(db, file)
     assert good["ok"] is True
@@ -231,7 +237,7 @@ def test_a_signed_certificate_is_verified_check_by_check(db: Database, tmp_path:
     # A forged copy with another good signature: the signature holds, the database does not know it.
     forged = tmp_path / "forged.pdf"
     record = from_document(CertificateRecord, load_certificate(db, "S-1").record)
-    forged.write_bytes(sign(certificate_pdf(record), p12, None))
+    forged.write_bytes(sign(certificate_pdf(record), FileKey(p12)))
     assert verify(db, forged)["checks"] == {
         "hash": False, "chain": True, "signature": True, "database": False
     }  # fmt: skip
@@ -258,7 +264,7 @@ def test_17025_7_8_8_3_an_amended_certificate_has_a_new_number_the_reason_and_na
         reason="the customer's address was wrong",
     )  # fmt: skip
     page = " ".join(pypdf.PdfReader(made["file"]).pages[0].extract_text().split())
-    assert "It replaces certificate A-1 of 2026-03-12: the customer's address was wrong" in page
+    assert "replaces certificate A-1 of 2026-03-12. Reason: the customer's address was wrong" in page
     old = load_certificate(db, "A-1")
     assert (old.state, old.replaced_by, old.reason) == ("amended", "A-2", "the customer's address was wrong")
     assert verify(db, tmp_path / "certificate-A-1.pdf")["ok"] is False
