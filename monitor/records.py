@@ -7,32 +7,73 @@ unit that their name ends in (``ambient_degC``, ``warm_up_min``).
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Vector = tuple[float, float, float]
+Kind = Literal["linear", "rotary", "spindle"]
+Branch = Literal["work", "tool"]
+
+#: ISO 841: X, Y, Z and U, V, W, parallel to them, are linear axes; A, B, C turn.
+LINEAR_LETTERS = "XYZUVW"
 
 
 @dataclass(frozen=True)
 class AxisSettings:
     """What the machine file says of one axis; None where it says nothing.
 
-    ``stroke`` is in mm for a linear axis and in rad for a rotary one, ``scale_pitch`` in mm.
+    ``stroke`` is in mm for a linear axis and in rad for a rotary one, ``scale_pitch`` in mm. ``gear_ratio`` is
+    the turns of the motor for one of a rotary axis.
     """
 
     name: str
     sign: int | None = None
     stroke: tuple[float, float] | None = None
     scale_pitch: float | None = None
+    gear_ratio: float | None = None
+
+
+@dataclass(frozen=True)
+class ChainAxis:
+    """One axis that the machine file places freely.
+
+    ``direction`` is the unit vector of its travel or rotation and ``offset`` (mm) the step from the axis before
+    it on its branch (from the bed for the first), both in the machine's frame at all axes zero. ``sign`` turns a
+    reading into the physical displacement; None: ISO 841, +1 on the tool's side and -1 on the work's.
+    """
+
+    name: str
+    kind: Kind
+    branch: Branch
+    direction: Vector
+    offset: Vector = (0.0, 0.0, 0.0)
+    sign: int | None = None
+
+
+def topology_of(axes: Sequence[ChainAxis]) -> str:
+    """The names of freely placed axes from the workpiece to the tool, the spindle in brackets: ``w b J1 J2 t``."""
+    work = [axis.name for axis in axes if axis.branch == "work"]
+    tool = [
+        f"({axis.name})" if axis.kind == "spindle" else axis.name for axis in axes if axis.branch == "tool"
+    ]
+    return " ".join(["w", *reversed(work), "b", *tool, "t"])
 
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine as its file describes it. ``tolerances`` are limits of absolute values in display units."""
+    """A machine as its file describes it. ``tolerances`` are limits of absolute values in display units.
+
+    ``chain`` holds the axes of a machine that places them freely, the work branch from the bed outwards, then
+    the tool branch; ``topology`` then only names them in their order. It is empty where the letters of
+    ``topology`` say everything. ``gravity`` is the direction of gravity in the machine's frame, None where the
+    file does not tell it.
+    """
 
     id: str
     topology: str
@@ -42,6 +83,15 @@ class Machine:
     location: str | None = None
     axes: Mapping[str, AxisSettings] = field(default_factory=dict)
     tolerances: Mapping[str, float] = field(default_factory=dict)
+    chain: tuple[ChainAxis, ...] = ()
+    gravity: Vector | None = None
+
+    def is_linear(self, axis: str) -> bool:
+        """Whether an axis travels rather than turns."""
+        for one in self.chain:
+            if one.name == axis:
+                return one.kind == "linear"
+        return axis[:1] in LINEAR_LETTERS
 
 
 @dataclass(frozen=True)

@@ -56,10 +56,11 @@ class BallMove:
 
 
 def plan_places(fit: Fit) -> npt.NDArray[np.int64]:
-    """Place in the plan (n,): the same number for the same target at the same angles, touch by touch."""
+    """Place in the plan (n,): the same number for the same target at the same pose, touch by touch."""
     context = fit.problem.context
-    turning = [place for place, joint in enumerate(context.chain.joints) if joint.turns]
-    angles = np.round(context.positions[:, turning], 6) + 0.0
+    measured = fit.problem.measured_joints
+    posed = [place for place in range(len(context.chain.joints)) if place not in measured]
+    angles = np.round(context.positions[:, posed], 6) + 0.0
     seen: dict[tuple[object, ...], int] = {}
     numbers: dict[tuple[object, ...], int] = {}
     found = np.empty(len(context), dtype=np.int64)
@@ -73,13 +74,18 @@ def plan_places(fit: Fit) -> npt.NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class _Deviations:
-    """Deviation (n, 3) of every probing from the other runs', in standard uncertainties, and its spread."""
+    """Deviation (n, d) of every probing from the other runs', in standard uncertainties, and its spread."""
 
     vectors: Array
     inflation: Array  # (n,): variance of a deviation over that of a residual
     rows: tuple[npt.NDArray[np.int64], ...]  # rows of every run
     bases: Array  # (R, N, p)
     scale: Array  # (n,): standard deviation of a coordinate in standard uncertainties
+
+    def of_run(self, run: int) -> Array:
+        """What the own unknowns of a run span, row by row (m, d, p)."""
+        rows, numbers = len(self.rows[run]), self.vectors.shape[1]
+        return self.bases[run, : numbers * rows].reshape(rows, numbers, -1)
 
 
 def _deviations(fit: Fit) -> _Deviations:
@@ -88,7 +94,7 @@ def _deviations(fit: Fit) -> _Deviations:
     places = plan_places(fit)
     kept = ~fit.left_out
     count = np.bincount(places, weights=kept)
-    total = np.stack([np.bincount(places, weights=white[:, axis]) for axis in range(3)], axis=1)
+    total = np.stack([np.bincount(places, weights=white[:, axis]) for axis in range(white.shape[1])], axis=1)
     others = count[places] - 1
     enough = kept & (others >= 2)
     mean = (total[places] - white) / np.where(enough, others, 1)[:, None]
@@ -99,8 +105,8 @@ def _deviations(fit: Fit) -> _Deviations:
     # A few bad points must not hide themselves: the scale is taken from the median. A run that is noisier than
     # the others as a whole has no bad points for that.
     squares = np.sum(vectors**2, axis=1) / inflation
-    share = fit.degrees_of_freedom / (3 * int(kept.sum()) + 1e-300)
-    usual = stats.chi2.median(3) * max(share, 1e-6)
+    share = fit.degrees_of_freedom / (fit.readings + 1e-300)
+    usual = stats.chi2.median(white.shape[1]) * max(share, 1e-6)
     scale = np.full(len(kept), np.median(squares[kept]) / usual)
     for own in rows:
         if kept[own].any():
@@ -110,8 +116,8 @@ def _deviations(fit: Fit) -> _Deviations:
 
 
 def _statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], Array]:
-    """Explained squares (n,), ranks (n,) and coefficients (n, 3) of columns with products ``onto`` (n, 3) and
-    ``gram`` (n, 3, 3)."""
+    """Explained squares (n,), ranks (n,) and coefficients (n, d) of columns with products ``onto`` (n, d) and
+    ``gram`` (n, d, d)."""
     values, vectors = np.linalg.eigh(gram)
     keep = values > CHECKED
     along = np.einsum("nij,ni->nj", vectors, onto) * keep
@@ -124,9 +130,12 @@ def _statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], 
 
 
 def _as_reading(fit: Fit, row: int, vector: Array) -> tuple[str, float]:
-    """The linear axis whose reading explains most of a vector, and by how much that reading is off, in mm."""
+    """The reading that explains most of a residual (d,), and by how much it is off, in mm."""
     chain = fit.problem.context.chain
-    linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
+    linear = fit.problem.measured_joints
+    if not linear:
+        most = int(np.abs(vector).argmax())
+        return fit.problem.components[most], float(vector[most])
     directions = np.array(
         [np.array(chain.joints[place].direction) * chain.joints[place].sign for place in linear]
     )
@@ -143,8 +152,8 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     tests = int((~fit.left_out).sum())
     found = []
     for run, rows in enumerate(deviations.rows):
-        basis = deviations.bases[run, : 3 * len(rows)].reshape(len(rows), 3, -1)
-        gram = np.eye(3) - basis @ np.swapaxes(basis, 1, 2)
+        basis = deviations.of_run(run)
+        gram = np.eye(basis.shape[1]) - basis @ np.swapaxes(basis, 1, 2)
         square, rank, sizes = _statistic(deviations.vectors[rows], gram)
         checked = (rank > 0) & ~fit.left_out[rows]
         if not checked.any():
@@ -180,9 +189,9 @@ def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
     found = []
     tests = 0
     for run, rows in enumerate(deviations.rows):
-        basis = deviations.bases[run, : 3 * len(rows)].reshape(len(rows), 3, -1)
+        basis = deviations.of_run(run)
         best: BallMove | None = None
-        for target in np.unique(context.target[rows]):
+        for target in np.intersect1d(context.target[rows], fit.problem.movable):
             own = np.flatnonzero((context.target[rows] == target) & ~fit.left_out[rows])
             first = np.arange(TOUCHES_EACH_SIDE, len(own) - TOUCHES_EACH_SIDE + 1)
             if len(first) == 0:

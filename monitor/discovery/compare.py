@@ -125,7 +125,7 @@ def _breakdown(fit: Fit) -> dict[str, dict[str, Part]]:
     halves = np.where(context.run_time < 0.5, "first half", "second half")
     found = {
         "target": by(context.target),
-        "axis": {"xyz"[axis]: _part(vectors[kept][:, [axis]]) for axis in range(3)},
+        "axis": {name: _part(vectors[kept][:, [axis]]) for axis, name in enumerate(fit.problem.components)},
         "run": by(context.run.astype(str)),
         "time_in_run": by(halves),
     }
@@ -140,7 +140,7 @@ def compare(fit: Fit, campaign: str, model: str) -> Comparison:
     excess = float(stats.chi2.sf(fit.sum_of_squares, fit.degrees_of_freedom))
     missing = test is not None and test.p_value < LACK_OF_FIT_LEVEL
     too_much = fit.scale > STATEMENT_TOLERANCE and excess < LACK_OF_FIT_LEVEL
-    readings = 3 * int((~fit.left_out).sum())
+    readings = fit.readings
     return Comparison(
         campaign=campaign,
         model=model,

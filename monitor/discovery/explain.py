@@ -28,7 +28,7 @@ from monitor.discovery.variants import cycles_of_unknown_pitch, variants_of, wit
 from monitor.discovery.varying import tell_varying
 from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Visible, see
 from monitor.effects.catalogue import catalogue, drivers_of
-from monitor.methods.touch import TouchProblem
+from monitor.methods.problem import ChainProblem
 from monitor.records import Campaign
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is told as it is.
@@ -54,7 +54,7 @@ class Explanation:
     final: Fit
 
 
-def _surroundings(campaign: Campaign, problem: TouchProblem) -> Surroundings:
+def _surroundings(campaign: Campaign, problem: ChainProblem) -> Surroundings:
     days = {run.run: run.day for run in campaign.runs}
     axes = campaign.machine.axes.items()
     return Surroundings(
@@ -67,7 +67,7 @@ def _surroundings(campaign: Campaign, problem: TouchProblem) -> Surroundings:
 
 def explain(
     campaign: Campaign,
-    problem: TouchProblem,
+    problem: ChainProblem,
     model: str,
     *,
     rate: float = 0.01,

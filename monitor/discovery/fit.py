@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.machine import evaluate
+from monitor.effects import Basis
 from monitor.methods.least_squares import Solution, eliminate, project_out
-from monitor.methods.touch import TouchProblem, solve_touch
+from monitor.methods.problem import ChainProblem, solve_problem
 from monitor.records import Array
 
 
@@ -31,23 +31,30 @@ class Own:
 class Fit:
     """A problem and its least-squares point; ``left_out`` (n,) marks probings without weight."""
 
-    problem: TouchProblem
+    problem: ChainProblem
     solution: Solution
     left_out: npt.NDArray[np.bool_]
 
     @cached_property
     def vectors(self) -> Array:
-        """Tip-to-target vectors (n, 3) in mm of all probings, those left out included."""
+        """Residuals (n, d) in mm of all rows, those left out included."""
         return self.problem.vectors(self.solution.local, self.solution.common)
 
     @cached_property
     def by_error(self) -> Array:
-        """Derivatives (n, 3, J, 2, 6) of the vectors by every error of the chain."""
-        errors, target, tip = self.problem.state(self.solution.local, self.solution.common)
-        context = self.problem.context
-        seen = evaluate(context.chain, context.positions, errors, target, tip, jacobian=True)
+        """Derivatives (n, 3, J, 2, 6) by every error of the chain of the vector that the rows tell (a part of)."""
+        seen = self.problem.evaluated(self.solution.local, self.solution.common, jacobian=True)
         assert seen.by_error is not None
         return seen.by_error
+
+    def moved_by(self, basis: Basis) -> Array:
+        """Change (n, d, k) of the residuals for each coefficient of an effect."""
+        return self.problem.observe(basis.displacement(self.by_error))
+
+    @property
+    def readings(self) -> int:
+        """How many numbers have weight, calibrated quantities aside."""
+        return int(self.vectors.shape[1]) * int((~self.left_out).sum())
 
     @cached_property
     def own(self) -> Own:
@@ -71,8 +78,8 @@ class Fit:
 
     @cached_property
     def degrees_of_freedom(self) -> int:
-        """Readings and calibrated lengths less what the model determines from them."""
-        readings = 3 * int((~self.left_out).sum()) + len(self.problem.runs) * len(self.problem.distances)
+        """Readings and calibrated quantities less what the model determines from them."""
+        readings = self.readings + len(self.problem.runs) * len(self.problem.extra_names)
         return readings - int(self.solution.rank.sum()) - int(self.solution.common_free.sum())
 
     @property
@@ -82,7 +89,7 @@ class Fit:
 
     @property
     def rms(self) -> float:
-        """Root mean square in mm of the coordinates of the vectors that have weight."""
+        """Root mean square in mm of the residuals that have weight."""
         kept = self.vectors[~self.left_out]
         return float(np.sqrt(np.mean(kept**2)))
 
@@ -98,7 +105,7 @@ class Fit:
 
 
 def fit(
-    problem: TouchProblem, left_out: npt.NDArray[np.bool_] | None = None, start: Fit | None = None
+    problem: ChainProblem, left_out: npt.NDArray[np.bool_] | None = None, start: Fit | None = None
 ) -> Fit:
     """The least-squares point of a problem; probings that are left out get no weight.
 
@@ -107,9 +114,9 @@ def fit(
     out = np.zeros(len(problem.context), dtype=bool) if left_out is None else left_out
     weighted = replace(problem, sigma=np.where(out[:, None], np.inf, problem.sigma)) if out.any() else problem
     if start is None:
-        return Fit(weighted, solve_touch(weighted), out)
+        return Fit(weighted, solve_problem(weighted), out)
     common = weighted.common_start.copy()
     known = start.problem.added_names
     if known == weighted.added_names[: len(known)]:
         common[: len(known)] = start.solution.common
-    return Fit(weighted, solve_touch(weighted, start.solution.local, common), out)
+    return Fit(weighted, solve_problem(weighted, start.solution.local, common), out)

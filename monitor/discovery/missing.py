@@ -248,7 +248,7 @@ def _rivals(
 def _rms(fit: Fit, visible: Visible, chosen: Sequence[Candidate]) -> float:
     basis = orthonormal(np.concatenate([visible.added, *(one.columns for one in chosen)], axis=1))
     left = without(basis, visible.residual[:, None])
-    return fit.sigma * float(np.sqrt(np.sum(left**2) / (3 * int((~fit.left_out).sum()))))
+    return fit.sigma * float(np.sqrt(np.sum(left**2) / fit.readings))
 
 
 def _held_out(

@@ -21,6 +21,7 @@ from monitor.effects.drivers import Always
 from monitor.exceptions import DataError
 from monitor.machine import Chain, evaluate, touching_positions
 from monitor.methods.least_squares import RANK_TOLERANCE
+from monitor.methods.touch import TouchProblem
 from monitor.records import Array
 
 # The grid of rotary positions; finer ones change the choice, not what it achieves.
@@ -104,10 +105,13 @@ def separating_poses(
     """Poses that separate an effect of the given coefficients from its rivals, and these from each other.
 
     ``strokes`` gives the range of axes in mm or rad where the machine file has one. No poses are offered where
-    effects differ by their driver (other times and temperatures separate those) or where no pose decides.
+    effects differ by their driver (other times and temperatures separate those), where no pose decides, or where
+    the method is not one of touching balls.
     """
     problem, context = fit.problem, fit.problem.context
     chain = context.chain
+    if not isinstance(problem, TouchProblem):
+        return Separation((), 0.0, 0.0)
     plain = [one for one in rivals if isinstance(one, ChainEffect) and isinstance(one.driver, Always)]
     if not plain or not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
         return Separation((), 0.0, 0.0)
@@ -121,7 +125,7 @@ def separating_poses(
     targets = list(balls) * len(grid)
     places = {str(t): context.nominal[np.flatnonzero(context.target == t)[0]] for t in balls}
     nominal = np.array([places[target] for target in targets])
-    tip = fit.solution.local[0, -3:]
+    tip = problem.own_of(fit.solution.local)[0, -3:]
     errors = np.zeros((len(nominal), len(chain.joints), 2, 6))
     try:
         positions = touching_positions(chain, np.repeat(grid, len(balls), axis=0), errors, nominal, tip)

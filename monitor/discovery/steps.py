@@ -47,24 +47,27 @@ def _balls(fit: Fit, left_out: frozenset[str], moved: frozenset[str]) -> dict[st
 
     Balls of ``left_out`` are not wanted; those of ``moved`` neither, and do not count for the middle.
     """
-    count = len(fit.problem.base_names)
-    touched = [int(np.sum(fit.problem.context.target == target)) for target in fit.problem.targets]
+    movable = fit.problem.movable
+    touched = [int(np.sum(fit.problem.context.target == target)) for target in movable]
     # A ball touched once a run has nothing to check it, and moves with the readings.
     often = [
         place
         for place, times in enumerate(touched)
-        if times >= 3 * len(fit.problem.runs) and fit.problem.targets[place] not in moved
+        if times >= 3 * len(fit.problem.runs) and movable[place] not in moved
     ]
     if len(often) < 3:
         return {}
-    places = fit.solution.local[:, count:-3].reshape(len(fit.problem.runs), -1, 3)[:, often]
+    coordinates = np.array(
+        [[fit.problem.local_names.index(f"ball {name} {axis}") for axis in "xyz"] for name in movable]
+    )
+    places = fit.solution.local[:, coordinates[often]]
     middle = np.median(places - places[:1], axis=1, keepdims=True)
     relative = places - places[:1] - middle
     return {
-        f"{fit.problem.targets[ball]}|{'xyz'[axis]}": relative[:, place, axis]
+        f"{movable[ball]}|{'xyz'[axis]}": relative[:, place, axis]
         for place, ball in enumerate(often)
         for axis in range(3)
-        if fit.problem.targets[ball] not in left_out
+        if movable[ball] not in left_out
     }
 
 

@@ -18,14 +18,14 @@ from monitor.discovery.variants import each_run
 from monitor.discovery.varying import most_varying
 from monitor.discovery.visible import Variant
 from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
-from monitor.methods.touch import TouchProblem
+from monitor.methods.problem import ChainProblem
 
 MOST_BAD_POINTS = 40
 # More effects that vary, each with a coefficient a run, than this are beyond what a plan can separate.
 MOST_VARYING = 2
 
 
-def with_effects(problem: TouchProblem, effects: Sequence[ChainEffect | ArtefactEffect]) -> TouchProblem:
+def with_effects(problem: ChainProblem, effects: Sequence[ChainEffect | ArtefactEffect]) -> ChainProblem:
     """The problem with further effects in common."""
     return replace(problem, added=(*problem.added, *effects))
 
@@ -51,13 +51,13 @@ class Suspects:
             and self.varying == other.varying
         )
 
-    def left_out(self, problem: TouchProblem) -> npt.NDArray[np.bool_]:
+    def left_out(self, problem: ChainProblem) -> npt.NDArray[np.bool_]:
         """Marks (n,) the bad points."""
         out = np.zeros(len(problem.context), dtype=bool)
         out[list(self.bad)] = True
         return out
 
-    def move_effects(self, problem: TouchProblem) -> list[ChainEffect | ArtefactEffect]:
+    def move_effects(self, problem: ChainProblem) -> list[ChainEffect | ArtefactEffect]:
         """The moves as effects."""
         return [
             parse_effect(
@@ -66,7 +66,7 @@ class Suspects:
             for move in self.moves.values()
         ]
 
-    def effects(self, problem: TouchProblem) -> list[ChainEffect | ArtefactEffect]:
+    def effects(self, problem: ChainProblem) -> list[ChainEffect | ArtefactEffect]:
         """Moves and varying effects, each with coefficients of its runs."""
         varying = [variant.effect for effect in self.varying if (variant := each_run(effect)) is not None]
         return [*self.move_effects(problem), *varying]
@@ -74,7 +74,7 @@ class Suspects:
 
 def find_suspects(
     under: Fit,
-    problem: TouchProblem,
+    problem: ChainProblem,
     chosen: Sequence[ChainEffect | ArtefactEffect],
     known: Suspects,
     variants: Sequence[Variant],

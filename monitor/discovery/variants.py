@@ -39,9 +39,7 @@ def cycles_of_unknown_pitch(chain: Chain) -> list[Variant]:
     pitches = [1.0 / (low + step * FREQUENCY_STEP) for step in range(count)]
     found = []
     for joint in chain.of_kind("linear"):
-        if 1.0 not in joint.direction:
-            continue
-        term = f"E{COMPONENTS[joint.direction.index(1.0)]}{joint.name}"
+        term = f"E{COMPONENTS[joint.main]}{joint.name}"
         for pitch in pitches:
             text = f"{term}:cyclic{pitch:.6g}mm"
             found.append(Variant(f"{term}:cyclic", parse_effect(text, chain), count))

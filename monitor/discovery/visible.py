@@ -46,7 +46,7 @@ class Variant:
 class Candidate:
     """An effect as the data see it.
 
-    ``columns`` (M, k) whitened and projected, M rows of all runs; ``raw`` (n, 3, k) mm the displacement at
+    ``columns`` (M, k) whitened and projected, M rows of all runs; ``raw`` (n, d, k) mm the displacement at
     every probing for a unit of each coefficient; ``share`` the part that projection leaves; ``largest`` the
     coefficients that a machine in use is likely to have at most, in internal units.
     """
@@ -97,7 +97,7 @@ def see(fit: Fit, variants: Sequence[Variant]) -> Visible:
         except EffectError as error:
             refused.append((variant.family, str(error)))
             continue
-        raw = np.ascontiguousarray(np.moveaxis(basis.displacement(fit.by_error), 2, 0))
+        raw = np.ascontiguousarray(np.moveaxis(fit.moved_by(basis), 2, 0))
         raw[np.abs(raw).max(axis=(1, 2), initial=0.0) < ROUNDING] = 0.0
         peak = float(np.sqrt(np.einsum("kna,kna->kn", raw, raw).max(initial=0.0)))
         kept.append((variant, raw, largest_coefficient(variant.effect, basis, peak)))
@@ -126,9 +126,9 @@ def _projected(fit: Fit, raw: Sequence[Array], basis_of_runs: Array) -> tuple[Ar
     problem = fit.problem
     runs, rows = fit.solution.last.residual.shape
     count = sum(len(one) for one in raw)
-    # Calibrated lengths follow the probings of a run and do not depend on the effects.
-    places = problem.padded(np.arange(3.0 * len(problem.context)).reshape(-1, 3) + 1.0).astype(np.int64) - 1
+    # Calibrated quantities follow the probings of a run and do not depend on the effects.
     weights = 1.0 / problem.sigma
+    places = problem.padded(np.arange(float(weights.size)).reshape(weights.shape) + 1.0).astype(np.int64) - 1
     left = np.zeros((count, runs, rows))
     if count:
         white = (np.concatenate(raw) * weights).reshape(count, -1)

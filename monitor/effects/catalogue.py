@@ -39,9 +39,7 @@ def _play(chain: Chain) -> Iterable[str]:
 
 def _cycles(chain: Chain, pitches: Mapping[str, float]) -> Iterable[str]:
     for joint in chain.of_kind("linear"):
-        own = COMPONENTS[joint.direction.index(1.0)] if 1.0 in joint.direction else None
-        if own is None:
-            continue
+        own = COMPONENTS[joint.main]
         for pitch in sorted({*SCREW_LEADS_MM, *([pitches[joint.name]] if joint.name in pitches else [])}):
             yield f"E{own}{joint.name}:cyclic{pitch:g}mm"
 

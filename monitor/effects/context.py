@@ -26,7 +26,8 @@ class Context:
     ``positions`` (n, J) physical displacements in mm and rad; ``run`` (n,) the run's number; ``sequence`` (n,);
     ``time`` (n,) s since the run began; ``day_time`` (n,) s since the first run of the day began; ``run_time``
     (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
-    the frame of the last work axis; ``columns`` recorded columns by their names in the file, in its units.
+    the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
+    the file, in its units.
     """
 
     chain: Chain
@@ -93,6 +94,7 @@ def context_of(campaign: Campaign, chain: Chain) -> Context:
         start, end = probings.time[rows].min(), probings.time[rows].max()
         run_time[rows] = (probings.time[rows] - start) / (end - start) if end > start else 0.0
     nominal = {ball.id: ball.nominal for ball in campaign.artefact.balls}
+    unknown = (np.nan, np.nan, np.nan)
     columns: dict[str, Array] = dict(probings.channels)
     for name in sorted({name for run in campaign.runs for name in run.conditions}):
         if name not in columns:
@@ -111,6 +113,6 @@ def context_of(campaign: Campaign, chain: Chain) -> Context:
         day_time=probings.time + np.array([since[int(run)] for run in probings.run]),
         run_time=run_time,
         target=probings.target,
-        nominal=np.array([nominal[target] for target in probings.target], dtype=float),
+        nominal=np.array([nominal.get(str(target), unknown) for target in probings.target]),
         columns=columns,
     )

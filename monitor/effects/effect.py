@@ -118,7 +118,7 @@ class ChainEffect:
             and self.term.stage == MOTION
             and not self.joint.turns
             and not self.term.is_rotation
-            and self.joint.direction[self.term.component] == 1.0
+            and self.joint.main == self.term.component
         )
 
     @cached_property

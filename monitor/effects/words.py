@@ -34,7 +34,7 @@ class Words:
 def _direction(effect: ChainEffect) -> str:
     axis = "XYZ"[effect.term.component % 3]
     name, joint = effect.joint.name, effect.joint
-    along = joint.direction[effect.term.component % 3] == 1.0
+    along = joint.main == effect.term.component % 3
     if effect.term.is_rotation:
         if joint.turns:
             kind = "angular positioning error" if along else f"tilt about {axis}"
@@ -93,7 +93,7 @@ def _driver(effect: ChainEffect | ArtefactEffect) -> str:
 
 def _cause_and_remedy(effect: ChainEffect) -> tuple[str, str, str]:
     shape, driver, joint, name = effect.shape, effect.driver, effect.joint, effect.joint.name
-    along = joint.direction[effect.term.component % 3] == 1.0
+    along = joint.main == effect.term.component % 3
     linear = not joint.turns
     own = along and (effect.term.is_rotation == joint.turns)
     if isinstance(driver, EachRun):

@@ -4,7 +4,7 @@ from monitor.machine.chain import Evaluation, evaluate
 from monitor.machine.gravity import gravity_in_joint_frames
 from monitor.machine.inverse import touching_positions
 from monitor.machine.terms import COMPONENTS, LOCATION, MOTION, Term, parse_term
-from monitor.machine.topology import Chain, Joint, parse_topology
+from monitor.machine.topology import Chain, Joint, chain_of_axes, parse_topology
 
 __all__ = [
     "COMPONENTS",
@@ -14,6 +14,7 @@ __all__ = [
     "Evaluation",
     "Joint",
     "Term",
+    "chain_of_axes",
     "evaluate",
     "gravity_in_joint_frames",
     "parse_term",

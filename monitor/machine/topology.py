@@ -1,22 +1,19 @@
-"""A serial machine: its joints from the bed outwards, read from a topology string in ISO 10791-1 notation.
+"""A serial machine: its joints from the bed outwards, as the machine file places them or as letters.
 
-``w C B X b Z Y (C1) t`` is read from the workpiece to the tool: ``b`` is the bed, an axis in brackets the
-spindle. X, Y, Z (and U, V, W parallel to them) are linear, A, B, C rotary about X, Y, Z; a digit after the
-letter tells axes of the same letter apart.
+``w C B X b Z Y (C1) t`` (ISO 10791-1) is read from the workpiece to the tool: ``b`` is the bed, an axis in
+brackets the spindle. X, Y, Z (and U, V, W parallel to them) are linear, A, B, C rotary about X, Y, Z; a digit
+after the letter tells axes of the same letter apart. The letters are a short form: they are first written out
+as axes that pass through the machine's origin along X, Y or Z, and one function makes the chain of either.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
 
 from monitor.exceptions import TopologyError
-
-Kind = Literal["linear", "rotary", "spindle"]
-Branch = Literal["work", "tool"]
-Vector = tuple[float, float, float]
+from monitor.records import Branch, ChainAxis, Kind, Vector, topology_of
 
 X: Vector = (1.0, 0.0, 0.0)
 Y: Vector = (0.0, 1.0, 0.0)
@@ -26,6 +23,8 @@ Z: Vector = (0.0, 0.0, 1.0)
 LINEAR: dict[str, Vector] = {"X": X, "Y": Y, "Z": Z, "U": X, "V": Y, "W": Z}
 ROTARY: dict[str, Vector] = {"A": X, "B": Y, "C": Z}
 TOKEN = re.compile(r"\(([A-Z]\d*)\)|([A-Z]\d*)|([wbt])|(\S)")
+# Rounding of a unit vector that was divided by its length leaves a few 1e-16.
+UNIT_TOLERANCE = 1e-12
 EXAMPLE = "an example is 'w C B X b Z Y (C1) t'"
 
 
@@ -49,14 +48,23 @@ class Joint:
         """Whether the joint rotates."""
         return self.kind != "linear"
 
+    @property
+    def main(self) -> int:
+        """The machine's direction (0 X, 1 Y, 2 Z) that the axis lies closest to, the first of equals."""
+        return max(range(3), key=lambda axis: (round(abs(self.direction[axis]), 9), -axis))
+
 
 @dataclass(frozen=True)
 class Chain:
-    """A serial chain. ``joints`` holds the work branch from the bed outwards, then the tool branch."""
+    """A serial chain. ``joints`` holds the work branch from the bed outwards, then the tool branch.
+
+    ``down`` is the direction of gravity in the machine's frame where somebody said it.
+    """
 
     topology: str
     work: tuple[Joint, ...]
     tool: tuple[Joint, ...]
+    down: Vector | None = None
     joints: tuple[Joint, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -89,9 +97,11 @@ class Chain:
     def gravity(self) -> Vector:
         """The direction of gravity in the machine frame at all axes zero.
 
-        The topology does not tell it. The linear axis next to the tool is taken as the vertical one, as on
+        A topology does not tell it. The linear axis next to the tool is taken as the vertical one, as on
         horizontal machines (Y carries the spindle head) and vertical ones (Z does); Z without such an axis.
         """
+        if self.down is not None:
+            return self.down
         for joint in reversed(self.tool):
             if joint.kind == "linear":
                 x, y, z = joint.direction
@@ -109,29 +119,63 @@ def _tokens(text: str) -> list[tuple[str, bool]]:
     return found
 
 
-def _joint(text: str, name: str, spindle: bool, branch: Branch, signs: Mapping[str, int]) -> Joint:
+def _letter_axis(text: str, name: str, spindle: bool, branch: Branch) -> ChainAxis:
     letter = name[0]
     if letter in LINEAR and not spindle:
-        kind: Kind = "linear"
-        direction = LINEAR[letter]
-    elif letter in ROTARY:
-        kind = "spindle" if spindle else "rotary"
-        direction = ROTARY[letter]
-    else:
-        allowed = "A, B, C" if spindle else "X, Y, Z, U, V, W (linear) and A, B, C (rotary)"
-        what = "a spindle" if spindle else "an axis"
-        raise TopologyError(f"topology '{text}': {what} cannot be called {name}; the letters are {allowed}")
-    # ISO 841: a positive reading moves the tool relative to the workpiece positively.
-    sign = signs.get(name, 1 if branch == "tool" else -1)
+        return ChainAxis(name, "linear", branch, LINEAR[letter])
+    if letter in ROTARY:
+        return ChainAxis(name, "spindle" if spindle else "rotary", branch, ROTARY[letter])
+    allowed = "A, B, C" if spindle else "X, Y, Z, U, V, W (linear) and A, B, C (rotary)"
+    what = "a spindle" if spindle else "an axis"
+    raise TopologyError(f"topology '{text}': {what} cannot be called {name}; the letters are {allowed}")
+
+
+def _joint(axis: ChainAxis, sign: int) -> Joint:
     if sign not in (1, -1):
-        raise TopologyError(f"axis {name}: sign must be +1 or -1, not {sign}")
-    return Joint(name, kind, direction, branch, sign)
+        raise TopologyError(f"axis {axis.name}: sign must be +1 or -1, not {sign}")
+    length = sum(part * part for part in axis.direction)
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        raise TopologyError(
+            f"axis {axis.name}: its direction {list(axis.direction)} is no unit vector; divide it by its length"
+        )
+    x, y, z = axis.direction
+    if (x, y, z) in (opposite(X), opposite(Y), opposite(Z)):
+        # The same axis said the other way round, so that every axis along X, Y or Z has a positive direction.
+        x, y, z = opposite((x, y, z))
+        sign = -sign
+    return Joint(axis.name, axis.kind, (x + 0.0, y + 0.0, z + 0.0), axis.branch, sign, axis.offset)
 
 
-def parse_topology(text: str, signs: Mapping[str, int] | None = None) -> Chain:
+def opposite(direction: Vector) -> Vector:
+    """The vector of the other sign, without negative zeros."""
+    x, y, z = direction
+    return (0.0 - x, 0.0 - y, 0.0 - z)
+
+
+def chain_of_axes(
+    axes: Sequence[ChainAxis], signs: Mapping[str, int] | None = None, gravity: Vector | None = None
+) -> Chain:
+    """The chain of axes, the work branch from the bed outwards, then the tool branch, both in order.
+
+    ``signs`` gives +1 or -1 for axes that have none of their own; without one ISO 841 holds. Raises
+    TopologyError for a sign that is neither, a direction that is no unit vector, an axis named twice.
+    """
+    given = dict(signs or {})
+    joints = []
+    for axis in axes:
+        # ISO 841: a positive reading moves the tool relative to the workpiece positively.
+        usual = 1 if axis.branch == "tool" else -1
+        joints.append(_joint(axis, given.get(axis.name, usual) if axis.sign is None else axis.sign))
+    work = tuple(joint for joint in joints if joint.branch == "work")
+    tool = tuple(joint for joint in joints if joint.branch == "tool")
+    return Chain(topology_of(axes), work, tool, gravity)
+
+
+def parse_topology(text: str, signs: Mapping[str, int] | None = None, gravity: Vector | None = None) -> Chain:
     """The chain of a topology string.
 
-    ``signs`` gives +1 or -1 for axes whose machine file says so; without one ISO 841 holds. Raises
+    ``signs`` gives +1 or -1 for axes whose machine file says so; without one ISO 841 holds. ``gravity`` is its
+    direction in the machine's frame where it is known. Raises
     TopologyError, with what would be right, for a string that cannot be parsed, an axis named twice, a
     spindle that is not next to the tool, or a chain without any axis.
     """
@@ -149,7 +193,6 @@ def parse_topology(text: str, signs: Mapping[str, int] | None = None) -> Chain:
     spindles = [place for place, (_, spindle) in enumerate(tokens) if spindle]
     if len(spindles) > 1 or (spindles and (spindles[0] < bed or spindles[0] != len(tokens) - 2)):
         raise TopologyError(f"topology '{text}': the spindle in brackets belongs just before t; {EXAMPLE}")
-    given = dict(signs or {})
-    work = tuple(_joint(text, name, spin, "work", given) for name, spin in reversed(tokens[1:bed]))
-    tool = tuple(_joint(text, name, spin, "tool", given) for name, spin in tokens[bed + 1 : -1])
-    return Chain(" ".join(f"({name})" if spindle else name for name, spindle in tokens), work, tool)
+    axes = [_letter_axis(text, name, spin, "work") for name, spin in reversed(tokens[1:bed])]
+    axes += [_letter_axis(text, name, spin, "tool") for name, spin in tokens[bed + 1 : -1]]
+    return chain_of_axes(axes, signs, gravity)

@@ -1,7 +1,7 @@
 """Calibration methods, one file each, and the least-squares solver that they share.
 
-A method is a module with ``NAME``, ``problem_of(campaign, model)`` and ``identify(campaign, model)``; another
-one is another file, listed here.
+A method is a module with ``NAME``, ``problem_of(campaign, model)``, ``identify(campaign, model)`` and ``advice``, what
+to do about parameters that a plan cannot separate; another one is another file, listed here.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 from types import ModuleType
 
 from monitor.exceptions import DataError
-from monitor.methods import samba
+from monitor.methods import rotary_probing, samba
 
-METHODS: dict[str, ModuleType] = {module.NAME: module for module in (samba,)}
+METHODS: dict[str, ModuleType] = {module.NAME: module for module in (samba, rotary_probing)}
 
 
 def method_named(name: str) -> ModuleType:

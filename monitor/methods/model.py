@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
 from monitor.exceptions import EffectError
-from monitor.machine import Chain, parse_topology
+from monitor.machine import Chain, chain_of_axes, parse_topology
 from monitor.methods.base_effects import base_effects
 from monitor.records import Machine
 
@@ -36,4 +36,6 @@ class Model:
 def chain_of(machine: Machine) -> Chain:
     """The chain that a machine's file describes."""
     signs = {name: axis.sign for name, axis in machine.axes.items() if axis.sign is not None}
-    return parse_topology(machine.topology, signs)
+    if machine.chain:
+        return chain_of_axes(machine.chain, signs, machine.gravity)
+    return parse_topology(machine.topology, signs, machine.gravity)

@@ -12,11 +12,11 @@ import numpy as np
 
 from monitor.effects import ChainEffect, context_of
 from monitor.exceptions import DataError
-from monitor.methods.identification import Identification, Refusal, RunIdentification
-from monitor.methods.least_squares import MEMBER_SHARE, Solution
+from monitor.methods.identification import Identification
 from monitor.methods.model import Model, chain_of
-from monitor.methods.shared_effects import shared_parameters
-from monitor.methods.touch import Distance, TouchProblem, solve_touch
+from monitor.methods.problem import ChainProblem, solve_problem
+from monitor.methods.results import identification
+from monitor.methods.touch import Distance, TouchProblem
 from monitor.records import Array, Campaign
 
 NAME = "samba"
@@ -68,48 +68,11 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TouchProblem
     )
 
 
-def _groups(null_space: Array, names: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """Unknowns that trade against each other: the blocks of the projector on the null space."""
-    projector = null_space.T @ null_space
-    # The same members as Solution.local_free refuses, so that no parameter stays without a number unnamed.
-    member = np.abs(null_space).max(axis=0) >= MEMBER_SHARE
-    size = np.sqrt(np.maximum(np.diag(projector), np.finfo(float).tiny))
-    linked = (np.abs(projector) > MEMBER_SHARE * np.outer(size, size)) & np.outer(member, member)
-    left = [int(place) for place in np.flatnonzero(member)]
-    groups = []
-    while left:
-        group, front = {left[0]}, [left[0]]
-        while front:
-            place = front.pop()
-            for other in np.flatnonzero(linked[place]):
-                if int(other) not in group:
-                    group.add(int(other))
-                    front.append(int(other))
-        left = [place for place in left if place not in group]
-        groups.append(tuple(names[place] for place in sorted(group)))
-    return groups
-
-
-def refusals(problem: TouchProblem, null_space: Array, run: int) -> tuple[Refusal, ...]:
-    """What one run cannot separate, by its null space, the reported parameters first, and why."""
-    reported = problem.base_names
-    found = []
-    for group in _groups(null_space, problem.local_names):
-        inside = tuple(name for name in group if name in reported)
-        if not inside:
-            continue
-        others = [name for name in group if name not in inside]
-        with_what = f"{' and '.join(inside)} cannot be told apart" if len(inside) > 1 else inside[0]
-        if others:
-            with_what += f"{' from' if len(inside) > 1 else ' cannot be told apart from'} {', '.join(others)}"
-        found.append(Refusal(inside, f"with this plan {with_what}{_advice(problem, inside, run)}"))
-    return tuple(found)
-
-
-def _advice(problem: TouchProblem, parameters: tuple[str, ...], run: int) -> str:
+def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     """What the plan kept still and would have to move."""
     rows = problem.context.run == run
-    bar = sorted({name for distance in problem.distances for name in distance.between})
+    distances = problem.distances if isinstance(problem, TouchProblem) else ()
+    bar = sorted({name for distance in distances for name in distance.between})
     missing = [name for name in bar if name not in problem.context.target[rows]]
     gains = {
         name
@@ -149,46 +112,5 @@ def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification
                 f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "probe more balls or indexations"
             )
-    solution = solve_touch(problem)
-    return _result(campaign, model, problem, solution)
-
-
-def _result(campaign: Campaign, model: Model, problem: TouchProblem, solution: Solution) -> Identification:
-    count = len(problem.base_names)
-    vectors = problem.vectors(solution.local, solution.common)
-    runs = []
-    for place, run in enumerate(problem.runs):
-        residuals = vectors[problem.context.run == run]
-        free = solution.local_free[place, :count]
-        both = free[:, None] & free
-        weighted = solution.last.residual[place]
-        runs.append(
-            RunIdentification(
-                run=int(run),
-                estimate=np.where(free, solution.local[place, :count], np.nan),
-                covariance=np.where(both, solution.local_covariance[place, :count, :count], np.nan),
-                unknowns=dict(
-                    zip(problem.local_names[count:], map(float, solution.local[place, count:]), strict=True)
-                ),
-                refused=refusals(problem, solution.null_space[place], int(run)),
-                residuals=residuals,
-                rms=float(np.sqrt(np.mean(residuals**2))),
-                chi_square=float(weighted @ weighted),
-                degrees_of_freedom=residuals.size + len(problem.distances) - int(solution.rank[place]),
-            )
-        )
-    shared = shared_parameters(problem, solution)
-    return Identification(
-        campaign=campaign.name,
-        method=NAME,
-        model=model.name,
-        parameters=problem.base_names,
-        units=tuple(effect.unit for effect in problem.base for _ in effect.parameters(problem.context)),
-        runs=tuple(runs),
-        added=shared.names,
-        added_units=shared.units,
-        added_estimate=shared.estimate,
-        added_covariance=shared.covariance,
-        added_refused=shared.refused,
-        iterations=solution.iterations,
-    )
+    solution = solve_problem(problem)
+    return identification(campaign, model, problem, solution, advice)

@@ -8,10 +8,9 @@ import numpy as np
 
 from monitor.effects import Basis, ChainEffect, Effect
 from monitor.effects.effect import ChainBasis
-from monitor.machine import evaluate
 from monitor.methods.identification import Refusal
 from monitor.methods.least_squares import Solution
-from monitor.methods.touch import TouchProblem
+from monitor.methods.problem import ChainProblem
 from monitor.records import Array
 from monitor.units import MINUTE, Unit
 
@@ -48,21 +47,19 @@ def largest_coefficient(effect: Effect, basis: Basis, peak: float) -> float:
     return limit
 
 
-def shared_parameters(problem: TouchProblem, solution: Solution) -> SharedParameters:
+def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParameters:
     """The common unknowns of a solution: time constants in seconds, and no number for what the plan barely sees."""
     estimate = solution.common.copy()
     covariance = solution.common_covariance.copy()
     units: list[Unit] = []
     why: list[str] = ["" if free else UNSEEN for free in solution.common_free]
-    errors, target, tip = problem.state(solution.local, solution.common)
-    context = problem.context
-    by_error = evaluate(context.chain, context.positions, errors, target, tip, jacobian=True).by_error
+    by_error = problem.evaluated(solution.local, solution.common, jacobian=True).by_error
     assert by_error is not None
     place = 0
     for added in problem.shared:
         own = slice(place, place + added.unknowns)
         basis = added.basis(solution.common[own])
-        moved = basis.displacement(by_error)
+        moved = problem.observe(basis.displacement(by_error))
         limit = largest_coefficient(
             added.effect, basis, float(np.linalg.norm(moved, axis=1).max(initial=0.0))
         )

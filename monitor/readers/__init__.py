@@ -5,6 +5,7 @@ format 1, for virtual campaigns and for handing data on. A format is one file in
 are one file in ``methods``; plug-ins come through the entry points of the group ``monitor.readers``.
 """
 
+from monitor.readers.folder_names import names_in
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, method_rules, read_campaign, readers
 from monitor.readers.writer import write_campaign
@@ -14,6 +15,7 @@ __all__ = [
     "Plan",
     "Reader",
     "method_rules",
+    "names_in",
     "read_campaign",
     "readers",
     "write_campaign",

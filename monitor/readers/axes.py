@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
 
 from monitor.readers.faults import quoted
+from monitor.records import Kind, Machine
 from monitor.units import DEGREE, MILLIMETRE, Unit
 
 EXAMPLE = "an example is 'w C B X b Z Y (C1) t'"
@@ -27,7 +27,7 @@ class Axis:
     """One axis of the topology, with the unit that its readings have in a file."""
 
     name: str
-    kind: Literal["linear", "rotary", "spindle"]
+    kind: Kind
 
     @property
     def unit(self) -> Unit:
@@ -48,6 +48,13 @@ class Axis:
     def farthest(self) -> float:
         """The largest reading without a stroke, in the unit of the file."""
         return FARTHEST_MM if self.kind == "linear" else FARTHEST_DEG
+
+
+def axes_of_machine(machine: Machine) -> tuple[Axis, ...]:
+    """The axes of a machine, whether it places them freely or names them by letters; none where it cannot be read."""
+    if machine.chain:
+        return tuple(Axis(axis.name, axis.kind) for axis in machine.chain)
+    return axes_of(machine.topology)[0]
 
 
 def axes_of(topology: str) -> tuple[tuple[Axis, ...], str | None]:

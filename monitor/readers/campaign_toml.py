@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 
-from monitor.readers.axes import axes_of
+from monitor.readers.axes import axes_of_machine
 from monitor.readers.decimals import decimal_in
-from monitor.records import Artefact, Campaign, Machine, Probe
+from monitor.records import Artefact, Campaign, ChainAxis, Machine, Probe
 from monitor.units import MICROMETRE
 
 
@@ -30,8 +30,13 @@ def _machine(machine: Machine) -> Iterator[str]:
         value = getattr(machine, key)
         if value is not None:
             yield f"{key} = {_text(value)}"
-    yield f"topology = {_text(machine.topology)}"
-    axes = {axis.name: axis for axis in axes_of(machine.topology)[0]}
+    if not machine.chain:
+        yield f"topology = {_text(machine.topology)}"
+    if machine.gravity is not None:
+        yield f"gravity = {_numbers(machine.gravity)}"
+    for placed in machine.chain:
+        yield from _placed(placed)
+    axes = {axis.name: axis for axis in axes_of_machine(machine)}
     for name, settings in machine.axes.items():
         yield from ("", f"[machine.axes.{_text(name)}]")
         if settings.sign is not None:
@@ -41,9 +46,24 @@ def _machine(machine: Machine) -> Iterator[str]:
             yield f"stroke_{axes[name].suffix} = [{ends}]"
         if settings.scale_pitch is not None:
             yield f"scale_pitch_mm = {settings.scale_pitch!r}"
+        if settings.gear_ratio is not None:
+            yield f"gear_ratio = {float(settings.gear_ratio)!r}"
     if machine.tolerances:
         yield from ("", "[machine.tolerances]")
         yield from (f"{_text(name)} = {float(limit)!r}" for name, limit in machine.tolerances.items())
+
+
+def _placed(axis: ChainAxis) -> Iterator[str]:
+    yield from (
+        "",
+        f"[[machine.{axis.branch}_chain]]",
+        f"name = {_text(axis.name)}",
+        f"kind = {_text(axis.kind)}",
+    )
+    yield f"{'along' if axis.kind == 'linear' else 'about'} = {_numbers(axis.direction)}"
+    yield f"offset_mm = {_numbers(axis.offset)}"
+    if axis.sign is not None:
+        yield f"sign = {axis.sign}"
 
 
 def _probe(probe: Probe) -> Iterator[str]:

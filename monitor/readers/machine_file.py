@@ -6,12 +6,15 @@ import re
 from dataclasses import dataclass
 
 from monitor.readers.axes import FARTHEST_MM, Axis, axes_of
+from monitor.readers.chain_tables import read_chain, unit_vector
 from monitor.readers.faults import near, one_of, quoted
 from monitor.readers.toml_table import Table
-from monitor.records import AxisSettings, Machine
+from monitor.records import AxisSettings, Machine, topology_of
 
 # ISO 230-1:2012, 3.4: E, then the direction (X, Y, Z) or rotation (A, B, C), then the axis; 0 for a location.
-TERM = re.compile(r"E([XYZABC])(0?)([A-Z][0-9]*)")
+TERM = re.compile(r"E([XYZABC])(0?)([A-Za-z][A-Za-z0-9]*)")
+#: More turns of a motor for one of its axis than any drive has.
+LARGEST_RATIO = 1e4
 
 
 @dataclass(frozen=True)
@@ -32,25 +35,46 @@ def read_machine(top: Table) -> MachinePart:
     if table is None:
         return MachinePart(None, None, {})
     identity = table.text("id", required=True, example='"HU40-T"')
-    topology = table.text("topology", required=True, example='"w C B X b Z Y (C1) t"')
+    free = [key for key in ("work_chain", "tool_chain") if key in table.data]
+    topology = table.text("topology", required=not free, example='"w C B X b Z Y (C1) t"')
+    chain = read_chain(table)
     words = {key: table.text(key) for key in ("manufacturer", "model", "serial_number", "location")}
     axes: tuple[Axis, ...] | None = None
-    if topology is not None:
+    if free:
+        if topology is not None:
+            told = f"[[machine.{free[0]}]] places the axes already; leave out topology, or these tables"
+            table.fault("topology", told)
+        elif chain:
+            topology = topology_of(chain)
+            axes = tuple(Axis(axis.name, axis.kind) for axis in chain)
+        elif chain is not None:
+            table.fault(free[0], "the chain has no axis; write [[machine.tool_chain]] above each of them")
+    elif topology is not None:
         found, wrong = axes_of(topology)
         if wrong is not None:
             table.fault("topology", f"{quoted(topology)} cannot be parsed: {wrong}")
         axes = None if wrong is not None else found
-    settings, strokes = _settings(table, axes)
+    signed = {axis.name for axis in chain or () if axis.sign is not None}
+    settings, strokes = _settings(table, axes, signed)
     tolerances = _tolerances(table, axes)
+    gravity = unit_vector(table, "gravity") if table.raw("gravity", required=False, example="") else None
     table.finish()
     if identity is None or topology is None or axes is None:
         return MachinePart(None, axes, strokes)
-    machine = Machine(id=identity, topology=topology, axes=settings, tolerances=tolerances, **words)
+    machine = Machine(
+        id=identity,
+        topology=topology,
+        axes=settings,
+        tolerances=tolerances,
+        chain=chain or (),
+        gravity=gravity,
+        **words,
+    )
     return MachinePart(machine, axes, strokes)
 
 
 def _settings(
-    machine: Table, axes: tuple[Axis, ...] | None
+    machine: Table, axes: tuple[Axis, ...] | None, signed: set[str]
 ) -> tuple[dict[str, AxisSettings], dict[str, tuple[float, float]]]:
     settings: dict[str, AxisSettings] = {}
     strokes: dict[str, tuple[float, float]] = {}
@@ -67,18 +91,26 @@ def _settings(
         table = outer.table(name)
         if table is None:
             continue
-        sign = table.raw("sign", required=False, example="1")
-        if sign is not None and (type(sign) is not int or sign not in (1, -1)):
-            table.fault("sign", f"{quoted(sign)} is not a sign; write sign = 1 or sign = -1")
-            sign = None
+        sign = table.sign("sign")
+        if sign is not None and name in signed:
+            table.fault("sign", f"the chain gives axis {name} a sign already; write it in one place")
         stroke = _stroke(table, axis)
         pitch = table.number("scale_pitch_mm", positive=True, largest=FARTHEST_MM, unit="mm", example="0.02")
+        ratio = None
+        if axis.kind != "linear":
+            ratio = table.number(
+                "gear_ratio",
+                positive=True,
+                largest=LARGEST_RATIO,
+                unit="turns of the motor a turn",
+                example="121.0",
+            )
         table.finish()
         inside = None
         if stroke is not None:
             strokes[name] = stroke
             inside = (axis.unit.to_internal(stroke[0]), axis.unit.to_internal(stroke[1]))
-        settings[name] = AxisSettings(name, sign, inside, pitch)
+        settings[name] = AxisSettings(name, sign, inside, pitch, ratio)
     return settings, strokes
 
 

@@ -90,6 +90,14 @@ class Table:
         kept = tuple(item for item in found if item is not None)
         return kept if len(kept) == count else None
 
+    def sign(self, key: str) -> int | None:
+        """+1 or -1, where the key is there."""
+        value = self.raw(key, required=False, example="1")
+        if value is not None and (type(value) is not int or value not in (1, -1)):
+            self.fault(key, f"{quoted(value)} is not a sign; write {key} = 1 or {key} = -1")
+            return None
+        return value
+
     def table(self, key: str, *, required: bool = False) -> Table | None:
         """The table under a key."""
         self._known.append(key)

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from monitor.exceptions import CampaignError, InputError
-from monitor.readers.axes import axes_of
+from monitor.readers.axes import axes_of, axes_of_machine
 from monitor.readers.campaign_toml import campaign_toml
 from monitor.readers.decimals import decimal_in
 from monitor.readers.registry import read_campaign
@@ -88,8 +88,9 @@ def _runs(campaign: Campaign) -> Iterable[list[str]]:
 
 def _probings(campaign: Campaign) -> Iterable[list[str]]:
     probings = campaign.probings
-    axes, wrong = axes_of(campaign.machine.topology)
-    if wrong is not None:
+    axes = axes_of_machine(campaign.machine)
+    if not axes:
+        wrong = axes_of(campaign.machine.topology)[1]
         raise InputError(f"topology '{campaign.machine.topology}' cannot be parsed: {wrong}")
     missing = [axis.name for axis in axes if axis.name not in probings.readings]
     if missing:

@@ -3,7 +3,8 @@
 One method, one file. Units are those of the arrays passed in; nothing here knows a database.
 """
 
-from monitor.statistics.changes import Change, History, find_changes, joint_change
+from monitor.statistics.changes import Change, History, find_changes
+from monitor.statistics.common_change import joint_change
 from monitor.statistics.components import VarianceComponents, variance_components
 from monitor.statistics.conditions import Coefficient, Cycle, Dependence, dependence
 from monitor.statistics.control import (

@@ -2,7 +2,7 @@
 
 A step is preferred over a trend where it explains more; a history that known events split is searched
 piece by piece; several parameters share one false-alarm probability. For a change that many parameters
-share, none of which shows it alone, use ``joint_change``.
+share, none of which shows it alone, use ``common_change.joint_change``.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
+from monitor.statistics.checks import as_positive, as_probability, as_vector
 from monitor.statistics.scan import EDGE, Base, Kind, Scan, Scanner
+from monitor.statistics.sums import label_groups
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,17 @@ class _Series:
     y: Array
     t: Array
     u: Array | None
+    day: npt.NDArray[np.intp] | None
 
     def part(self, start: int, stop: int) -> _Series:
         own = None if self.u is None else self.u[start:stop]
-        return _Series(self.name, self.y[start:stop], self.t[start:stop], own)
+        day = None if self.day is None else np.unique(self.day[start:stop], return_inverse=True)[1]
+        return _Series(self.name, self.y[start:stop], self.t[start:stop], own, _repeated(day))
+
+
+def _repeated(day: npt.NDArray[np.intp] | None) -> npt.NDArray[np.intp] | None:
+    """The days where a day component can be told from the scatter of the runs: several days, one with two runs."""
+    return None if day is None or not 0 < int(day.max()) < len(day) - 1 else day
 
 
 #: 95 % point of the likelihood ratio for the place of a change, -2 log(1 - sqrt(0.95)): the larger of two
@@ -70,18 +78,18 @@ class _Series:
 PLACE = -2.0 * float(np.log(1.0 - np.sqrt(0.95)))
 
 
-def _when(found: Scan, t: Array, fitted: int) -> tuple[float, float]:
-    """Times between which the change lies, from all places that explain nearly as much as the best."""
-    same = np.array([kind == found.kind for kind in found.kinds])
-    rss, places = found.rss[same], found.positions[same]
-    freedom = max(len(t) - fitted, 1)
-    floor = max(float(rss.min()), 1e-300)
-    inside = places[freedom * np.log(np.maximum(rss, floor) / floor) <= PLACE]
+def when(t: Array, places: npt.NDArray[np.int64], deviance: Array, fitted: int) -> tuple[float, float]:
+    """Times between which a change lies, from all ``places`` (c,) that explain nearly as much as the best.
+
+    ``deviance`` (c,) is minus twice their log-likelihood, ``fitted`` the number of fitted coefficients.
+    """
+    freedom = max(len(t) - fitted, 1) / len(t)
+    inside = places[freedom * (deviance - deviance.min()) <= PLACE]
     return float(t[max(int(inside.min()) - 1, 0)]), float(t[min(int(inside.max()), len(t) - 1)])
 
 
 def _size(series: _Series, found: Scan, base: Base) -> tuple[float, float]:
-    """Least-squares size of the change and its standard uncertainty, its place taken as known."""
+    """Generalised least squares: size of the change and its standard uncertainty, place and correlation as known."""
     t = series.t
     columns = [np.ones_like(t)] if base == "constant" else [np.ones_like(t), t - t.mean()]
     after = (np.arange(len(t)) >= found.at).astype(np.float64)
@@ -93,26 +101,33 @@ def _size(series: _Series, found: Scan, base: Base) -> tuple[float, float]:
         columns.append(found.column)
     else:
         columns.append(t - t.mean())
-    root = np.ones_like(t) if series.u is None else 1.0 / series.u
-    design = root[:, np.newaxis] * np.column_stack(columns)
+    both = np.column_stack([*columns, series.y - series.y.mean()])
+    rows = found.shape.whiten(found.root[:, np.newaxis] * both)
+    design, y = rows[:, :-1], rows[:, -1]
     norm = np.sqrt((design**2).sum(axis=0))
-    solution = np.linalg.lstsq(design / norm, root * series.y, rcond=None)[0]
-    left = root * series.y - design / norm @ solution
+    solution = np.linalg.lstsq(design / norm, y, rcond=None)[0]
+    left = y - design / norm @ solution
     variance = float(left @ left) / max(len(t) - len(columns), 1)
     inverse = np.linalg.inv((design / norm).T @ (design / norm))
-    # A first-order process lets a mean of many runs know less: variance times (1 + r) / (1 - r).
-    swell = (1.0 + found.correlation) / (1.0 - found.correlation)
-    return float(solution[-1] / norm[-1]), float(np.sqrt(variance * inverse[-1, -1] * swell) / norm[-1])
+    return float(solution[-1] / norm[-1]), float(np.sqrt(variance * inverse[-1, -1]) / norm[-1])
 
 
 def _change(series: _Series, found: Scan, base: Base, offset: int) -> Change:
     size, u = _size(series, found, base)
     if found.kind in ("trend", "transient"):
-        when = (float(series.t[0]), float(series.t[-1]))
+        between = (float(series.t[0]), float(series.t[-1]))
     else:
-        when = _when(found, series.t, 3 if base == "constant" else 4)
+        same = np.array([kind == found.kind for kind in found.kinds])
+        between = when(series.t, found.positions[same], found.deviance[same], 3 if base == "constant" else 4)
     return Change(
-        series.name, found.kind, offset + found.at, float(series.t[found.at]), when, size, u, found.p_value
+        series.name,
+        found.kind,
+        offset + found.at,
+        float(series.t[found.at]),
+        between,
+        size,
+        u,
+        found.p_value,
     )
 
 
@@ -123,32 +138,33 @@ class _Search:
         self.rng, self.trials = rng, trials
         self._kept: dict[tuple[object, ...], Scanner] = {}
 
-    def scan(self, series: _Series, base: Base) -> Scan:
-        key = (base, series.t.tobytes(), None if series.u is None else series.u.tobytes())
+    def scan(self, series: _Series, base: Base, level: float) -> Scan:
+        plan = (series.t, series.u, series.day)
+        key = (base, *(None if one is None else one.tobytes() for one in plan))
         if key not in self._kept:
-            self._kept[key] = Scanner(series.t, series.u, base)
-        return self._kept[key].scan(series.y, self.rng, self.trials)
+            self._kept[key] = Scanner(series.t, series.u, base, series.day)
+        return self._kept[key].scan(series.y, self.rng, self.trials, level)
 
     def piece(self, series: _Series, offset: int, level: float) -> tuple[list[Change], list[Change]]:
         """Changes and trends of one piece of history, split again at every step found."""
         if len(series.y) < 2 * EDGE + 2 or np.ptp(series.y) == 0.0:
             return [], []
-        found = self.scan(series, "constant")
+        found = self.scan(series, "constant", level)
         if found.p_value > level:
             return [], []
         base: Base = "constant"
         trends: list[Change] = []
         if found.kind == "transient":
-            bent = self.scan(series, "line")
+            bent = self.scan(series, "line", level)
             # Two coefficients and a place more must earn their keep (Schwarz's criterion).
-            gain = len(series.y) * np.log(max(found.rss.min(), 1e-300) / max(bent.rss.min(), 1e-300))
+            gain = float(found.deviance.min() - bent.deviance.min())
             if bent.p_value > level or gain < 3.0 * np.log(len(series.y)):
                 return [], [_change(series, found, base, offset)]
             found = replace(found, kind="trend", at=0)
         if found.kind == "trend":
             trends = [_change(series, found, base, offset)]
             base = "line"
-            found = self.scan(series, base)
+            found = self.scan(series, base, level)
             if found.p_value > level:
                 return [], trends
         change = _change(series, found, base, offset)
@@ -168,6 +184,7 @@ def find_changes(
     *,
     rng: np.random.Generator,
     u: Mapping[str, npt.ArrayLike] | None = None,
+    days: npt.ArrayLike | None = None,
     events: Sequence[float] = (),
     false_alarm: float = 0.05,
     trials: int = 1999,
@@ -175,13 +192,14 @@ def find_changes(
     """Steps and changes of slope of several parameters (name to (n,)) over ``times`` (n,), any unit, rising.
 
     ``events`` are times of known changes (crash, repair, compensation): the history is split there, and the
-    change at an event is no finding. ``u`` (name to (n,)) weighs the runs. ``false_alarm`` is shared
-    equally among parameters and pieces (Bonferroni), so it holds for whatever dependence among them; inside
-    a piece every step that is found splits it again at the same level. Serial correlation of first order is
-    estimated and allowed for. Measured false alarms at 5 %: 5 % for independent runs (4500 histories of 20);
-    with a correlation of 0.3 12 % (20 runs) and 9 % (44), with 0.6 21 % and 11 %: 20 runs do not tell
-    correlation from change. Pieces of fewer than 6 runs are not searched. Raises ``DataError`` for times
-    that fall, unknown names in ``u``, trials that cannot reach the level, or non-finite values.
+    change at an event is no finding. ``u`` (name to (n,)) weighs the runs; ``days`` (n,) are labels whose runs
+    may share a component. ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
+    holds for whatever dependence among them; inside a piece every step that is found splits it again at the
+    same level. It holds for runs whose neighbours correlate by up to 0.7 and for day components up to four
+    times the scatter of a run: whatever of these a series does not refute is allowed for (see ``scan``), so for
+    independent runs the rate is below it. Measured rates and power: docs/trials-statistics.md. Pieces of fewer
+    than 6 runs are not searched. Raises ``DataError`` for times that fall, unknown names in ``u``, trials that
+    cannot reach the level, or non-finite values.
     """
     t = as_vector(times, "times", least=2 * EDGE + 2)
     if (np.diff(t) < 0.0).any():
@@ -206,13 +224,14 @@ def find_changes(
             f"trials is {trials}; {len(values)} parameters in {len(pieces)} pieces at {false_alarm} need at least "
             f"{int(np.ceil(1.0 / level)) - 1}."
         )
+    day = None if days is None else label_groups(days, len(t))[1]
     search = _Search(rng, trials)
     changes: list[Change] = []
     trends: list[Change] = []
     for name, recorded in values.items():
         y = as_vector(recorded, name, length=len(t))
         own = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
-        series = _Series(name, y, t, own)
+        series = _Series(name, y, t, own, _repeated(day))
         for start, stop in pieces:
             found, slopes = search.piece(series.part(start, stop), start, level)
             changes += found
@@ -220,61 +239,3 @@ def find_changes(
     order = {name: i for i, name in enumerate(values)}
     changes.sort(key=lambda c: (c.index, order[c.parameter]))
     return History(tuple(changes), tuple(trends), false_alarm, trials)
-
-
-def joint_change(
-    values: npt.ArrayLike, times: npt.ArrayLike, *, rng: np.random.Generator, trials: int = 1999
-) -> Change:
-    """The best common step of all columns of ``values`` (n, p), in any units, and its p-value.
-
-    The statistic is the largest Hotelling T² over all places; its null distribution does not depend on the
-    covariance and is simulated. ``size`` is the Mahalanobis length of the step in units of the scatter.
-    Raises ``DataError`` unless n > p + 4, or for columns that are exactly dependent. Neglected: serial
-    correlation; take day means where runs of a day resemble each other.
-    """
-    y = as_matrix(values, "values", least=2 * EDGE + 2)
-    n, p = y.shape
-    t = as_vector(times, "times", length=n)
-    if n <= p + 4:
-        raise DataError(f"{n} runs for {p} parameters; more than {p + 4} runs are needed.")
-    places = np.arange(EDGE, n - EDGE + 1)
-    steps = (np.arange(n)[:, np.newaxis] >= places).astype(np.float64)
-    steps -= steps.mean(axis=0)
-    steps /= np.sqrt((steps**2).sum(axis=0))
-    centred = y - y.mean(axis=0)
-    norm = np.sqrt((centred**2).sum(axis=0))
-    if (norm == 0.0).any() or np.linalg.svd(centred / norm, compute_uv=False)[-1] < 1e-9:
-        raise DataError("values has columns that never vary or are exactly dependent; leave one out.")
-    share = ((np.linalg.qr(centred / norm)[0].T @ steps) ** 2).sum(axis=0)
-    null = np.concatenate(
-        [_largest_share(rng, min(100, trials - i), n, p, steps) for i in range(0, trials, 100)]
-    )
-    best = int(share.argmax())
-    p_value = (1 + int((null >= share[best]).sum())) / (trials + 1)
-    steps_of: list[Kind] = ["step"] * len(places)
-    found = Scan(
-        "step",
-        int(places[best]),
-        float(share[best]),
-        p_value,
-        0.0,
-        steps[:, best],
-        tuple(steps_of),
-        places,
-        1.0 - share,
-    )
-    ratio = share[best] / max(1.0 - share[best], 1e-300)
-    runs = places[best] * (n - places[best]) / n
-    length = float(np.sqrt(ratio * (n - 2) / runs))
-    when = _when(found, t, p + 2)
-    return Change(
-        "all", "step", found.at, float(t[found.at]), when, length, float(np.sqrt(1.0 / runs)), p_value
-    )
-
-
-def _largest_share(rng: np.random.Generator, trials: int, n: int, p: int, steps: Array) -> Array:
-    """Largest share over all places for normal noise, (trials,)."""
-    draws = rng.standard_normal((trials, n, p))
-    draws -= draws.mean(axis=1, keepdims=True)
-    q = np.linalg.qr(draws)[0].transpose(0, 2, 1)
-    return np.asarray(((q @ steps) ** 2).sum(axis=1).max(axis=1))

@@ -1,11 +1,14 @@
 """Search for one change in a series: the best of steps, bends, decays and the straight line, calibrated.
 
-The p-value belongs to the whole search. It is simulated with the same plan and the same steps as for the
-data, the estimate of the serial correlation included, so the false-alarm probability is the one stated.
+Few runs do not tell a change from runs that resemble each other. The statistic is therefore the gain in
+likelihood over no change at all, with the correlation of the runs free on both sides; and the p-value is the
+largest over every correlation that the series, its best change taken off, does not refute. It belongs to the
+whole search: it is simulated with the same plan and the same steps as for the data.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,12 +16,23 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
+from monitor.statistics.serial import DayComponent, FirstOrder, Shape
 
 Base = Literal["constant", "line"]
 Kind = Literal["step", "slope", "trend", "transient"]
 
-#: Lag-1 correlations for which the regressors are prepared; between two of them nothing depends on r.
+#: Correlations of neighbours of which the likelihood is computed.
 GRID = np.arange(0.0, 0.91, 0.1)
+#: Beyond this correlation no level is claimed: some dozens of such runs have no constant mean to change from.
+HIGHEST = 0.7
+#: Day components of which the likelihood is computed, in standard deviations of a run.
+DAY_GRID = (0.5, 1.0, 2.0, 4.0)
+#: A correlation is refuted where the logarithm of its likelihood is so far below the highest: one-sided 97.7 % for
+#: a normal estimate. Chosen by measured rates (docs/trials-statistics.md): 1 leaves 6 % false alarms of 20 runs.
+REFUTED = 2.0
+#: Simulations until a p-value is clearly no finding: so many exceedances end them (Besag and Clifford,
+#: Biometrika 78 (1991) 301), looked at after each block.
+EXCEEDANCES, BLOCK = 20, 100
 #: Time constants of a warm-up or running-in tried, as fractions of the history; a finer fit is `warm_up`'s.
 DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
 #: Fewest runs on each side of a change: one run alone is an outlier, not a change.
@@ -27,19 +41,22 @@ EDGE = 2
 
 @dataclass(frozen=True)
 class Scan:
-    """Best candidate: ``kind``, ``at`` (the change lies before this run; 0 for a trend
-    or transient), its share of the
-    sum of squares, and the p-value of the whole search; ``rss`` by candidate for the interval of when."""
+    """Best candidate: ``kind``, ``at`` (the change lies before this run; 0 for a trend or transient).
+
+    ``p_value`` is that of the whole search; where it is above the level it may be that of the first correlation that
+    explains the series. ``deviance`` by candidate is minus twice the log-likelihood at ``shape``, the likeliest
+    correlation, up to a constant of the plan; ``root`` (n,) the weights and ``column`` (n,) the candidate.
+    """
 
     kind: Kind
     at: int
-    share: float
     p_value: float
-    correlation: float
+    shape: Shape
+    root: Array
     column: Array
     kinds: tuple[Kind, ...]
     positions: npt.NDArray[np.int64]
-    rss: Array
+    deviance: Array
 
 
 def candidates(times: Array, base: Base) -> tuple[Array, tuple[Kind, ...], npt.NDArray[np.int64]]:
@@ -67,110 +84,146 @@ def _transients() -> list[Kind]:
     return ["transient" for _ in DECAYS]
 
 
-class Scanner:
-    """Everything of the search that does not depend on the values: prepared once for one plan."""
+@dataclass(frozen=True)
+class _Prepared:
+    """One shape with what the base and the candidates are under it."""
 
-    def __init__(self, times: Array, u: Array | None, base: Base) -> None:
-        columns, self.kinds, self.positions = candidates(times, base)
-        self.columns = columns
-        self._null: dict[tuple[int, int], Array] = {}
+    shape: Shape
+    base: Array
+    inverse: Array
+    weight: Array
+    constant: float
+
+
+class Scanner:
+    """Everything of the search that does not depend on the values: prepared once for one plan.
+
+    ``days`` (n,) are indices of the runs' days, None where no day has two runs.
+    """
+
+    def __init__(
+        self, times: Array, u: Array | None, base: Base, days: npt.NDArray[np.intp] | None = None
+    ) -> None:
+        self.columns, self.kinds, self.positions = candidates(times, base)
         n = len(times)
         root = np.ones(n) if u is None else 1.0 / u
+        self.root = root / np.sqrt(np.mean(root**2))
         line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)
         basis = np.column_stack([np.ones(n), line] if base == "line" else [np.ones(n)])
-        self.root = root / np.sqrt(np.mean(root**2))
-        self.prepared = []
-        for r in GRID:
-            q, _ = np.linalg.qr(_whiten(self.root[:, np.newaxis] * basis, r))
-            rows = _whiten(self.root[:, np.newaxis] * columns, r)
-            rows = rows - q @ (q.T @ rows)
-            rows -= q @ (q.T @ rows)
-            norm = np.sqrt((rows**2).sum(axis=0))
-            # A candidate that the base already contains explains nothing.
-            self.prepared.append((q, rows / np.where(norm > 1e-8, norm, np.inf)))
-        # The correlation comes from what a line and its best step or bend leave, whatever the base: what a
-        # poorer model leaves of a bend looks like correlation and would hide the bend.
-        rich = candidates(times, "line")[0]
-        self.line, _ = np.linalg.qr(self.root[:, np.newaxis] * np.column_stack([np.ones(n), line]))
-        rows = self.root[:, np.newaxis] * rich
-        rows = rows - self.line @ (self.line.T @ rows)
-        norm = np.sqrt((rows**2).sum(axis=0))
-        self.rich = rows / np.where(norm > 1e-8, norm, np.inf)
+        self.free = n - basis.shape[1]
+        self.at = np.arange(EDGE, n - EDGE + 1)
+        self.scaled = (times - times[0]) / max(float(np.ptp(times)), 1e-300)
+        self.smooth = self.columns[:, : len(self.kinds) - len(self.at)] if base == "constant" else None
+        shapes: list[Shape] = [FirstOrder(float(r)) for r in GRID]
+        if days is not None:
+            shapes += [DayComponent(ratio, days, self.root) for ratio in DAY_GRID]
+        self.prepared = [self._prepare(shape, basis) for shape in shapes]
+        self._null: dict[int, Array] = {}
+        self._seed: int | None = None
 
-    def _shares(self, y: Array, grid: int) -> tuple[Array, Array]:
-        """Share of the sum of squares by candidate (c, m), and what the base leaves (n, m)."""
-        q, unit = self.prepared[grid]
-        rows = _whiten(y, GRID[grid])
-        rows = rows - q @ (q.T @ rows)
-        total = (rows**2).sum(axis=0)
-        return (unit.T @ rows) ** 2 / np.where(total > 0.0, total, np.inf), rows
+    def _prepare(self, shape: Shape, basis: Array) -> _Prepared:
+        q, r = np.linalg.qr(shape.whiten(self.root[:, np.newaxis] * basis))
+        rows = shape.whiten(self.root[:, np.newaxis] * self.columns)
+        rows -= q @ (q.T @ rows)
+        rows -= q @ (q.T @ rows)
+        square = (rows**2).sum(axis=0)
+        # A candidate that the base already contains explains nothing.
+        good = square > 1e-16
+        square = np.where(good, square, 1.0)
+        constant = shape.log_determinant + 2.0 * float(np.log(np.abs(np.diag(r))).sum())
+        # The residual likelihood counts the determinant of the candidate as that of every fitted coefficient; its
+        # coefficient is taken in units of the scatter, so that the gain does not depend on the unit of the values.
+        weight = np.where(good, square ** (1.0 / self.free), np.inf)
+        return _Prepared(shape, q, np.where(good, 1.0 / square, 0.0), weight, constant)
 
-    def search(self, weighted: Array) -> tuple[Array, npt.NDArray[np.int64]]:
-        """Best share (m,) of each column of root-weighted values (n, m), and the correlation's place in GRID."""
-        rows = weighted - self.line @ (self.line.T @ weighted)
-        along = self.rich.T @ rows
-        best = np.abs(along).argmax(axis=0)
-        left = rows - self.rich[:, best] * along[best, np.arange(len(best))]
-        grid = _nearest(_correlation(left, 3))
-        result = np.empty(weighted.shape[1])
-        for g in np.unique(grid):
-            chosen = grid == g
-            result[chosen] = self._shares(weighted[:, chosen], int(g))[0].max(axis=0)
-        return result, grid
+    def _residual(self, prepared: _Prepared, weighted: Array) -> tuple[Array, Array]:
+        """What the base leaves of columns (n, m), as a sum of squares (m,), and what each candidate (c, m) takes."""
+        rows = prepared.shape.whiten(weighted)
+        rows -= prepared.base @ (prepared.base.T @ rows)
+        total = np.einsum("ij,ij->j", rows, rows)
+        along = self.root[:, np.newaxis] * prepared.shape.back(rows)
+        # Steps and bends are sums from their place to the end.
+        steps = np.cumsum(along[::-1], axis=0)[::-1][self.at]
+        if self.smooth is not None:
+            found = np.concatenate([self.smooth.T @ along, steps])
+        elif len(self.at) > 4:
+            ramps = np.cumsum((along * self.scaled[:, np.newaxis])[::-1], axis=0)[::-1][self.at]
+            bends = ramps - self.scaled[self.at - 1, np.newaxis] * steps
+            found = np.concatenate([steps, bends[1:-1]])
+        else:
+            found = steps
+        return total, found**2 * prepared.inverse[:, np.newaxis]
 
-    def scan(self, y: Array, rng: np.random.Generator, trials: int) -> Scan:
-        """The best candidate for ``y`` (n,) and its p-value from ``trials`` simulated series."""
+    def _deviances(self, weighted: Array) -> tuple[Array, Array]:
+        """Minus twice the residual log-likelihood by shape (s, m): of no change, and of the best candidate."""
+        plain = np.empty((len(self.prepared), weighted.shape[1]))
+        best = np.empty_like(plain)
+        for i, one in enumerate(self.prepared):
+            total, taken = self._residual(one, weighted)
+            floor = 1e-15 * total + 1e-300
+            left = (np.maximum(total - taken, floor) * one.weight[:, np.newaxis]).min(axis=0)
+            plain[i] = one.constant + self.free * np.log(total + 1e-300)
+            best[i] = one.constant + self.free * np.log(left)
+        return plain, best
+
+    def gain(self, weighted: Array) -> Array:
+        """The statistic (m,) of columns (n, m) times the root of their weights."""
+        plain, best = self._deviances(weighted)
+        return np.asarray(plain.min(axis=0) - best.min(axis=0))
+
+    def _simulated(self, place: int, count: int, rng: np.random.Generator) -> Array:
+        """The statistic of at least ``count`` series without a change, of one shape; kept and added to."""
+        if self._seed is None:
+            self._seed = int(rng.integers(2**63))
+        kept = self._null.get(place, np.empty(0))
+        while len(kept) < count:
+            # Every shape sees the same noise: their p-values differ by the shape alone.
+            noise = np.random.default_rng([self._seed, len(kept)]).standard_normal((len(self.root), BLOCK))
+            kept = np.append(kept, self.gain(self.prepared[place].shape.colour(noise)))
+        self._null[place] = kept
+        return kept[:count]
+
+    def _p_value(self, gain: float, place: int, level: float, rng: np.random.Generator, trials: int) -> float:
+        exceeding = 0
+        for done in range(0, trials, BLOCK):
+            upto = min(done + BLOCK, trials)
+            exceeding += int((self._simulated(place, upto, rng)[done:] >= gain).sum())
+            if exceeding >= EXCEEDANCES and exceeding / upto > 2.0 * level:
+                return exceeding / upto
+        return (1 + exceeding) / (trials + 1)
+
+    def _not_refuted(self, best: Array) -> Sequence[int]:
+        """Shapes that the deviances (s,) allow, the likeliest first; and every weaker one, of which they say less."""
+        likely = best - best.min() <= 2.0 * REFUTED
+        kept: set[int] = set()
+        for family in (range(len(GRID)), range(len(GRID), len(best))):
+            last = max((i for i in family if likely[i]), default=-1)
+            kept |= {i for i in family if i <= last}
+        kept = {i for i in kept if i >= len(GRID) or GRID[i] <= HIGHEST + 1e-9}
+        return sorted(kept, key=lambda i: float(best[i]))
+
+    def scan(self, y: Array, rng: np.random.Generator, trials: int, level: float) -> Scan:
+        """The best candidate for ``y`` (n,) and its p-value from ``trials`` simulated series a shape."""
         weighted = (self.root * (y - y.mean()))[:, np.newaxis]
-        share, grid = self.search(weighted)
-        g = int(grid[0])
-        shares, rows = self._shares(weighted, g)
-        # Parameters with the same plan and correlation share the simulated series.
-        if (g, trials) not in self._null:
-            draws = _colour(rng.standard_normal((len(y), trials)), float(GRID[g]))
-            self._null[g, trials] = self.search(draws)[0]
-        null = self._null[g, trials]
-        p = (1 + int((null >= share[0]).sum())) / (trials + 1)
-        best = int(shares[:, 0].argmax())
-        rss = float((rows**2).sum()) * (1.0 - shares[:, 0])
+        plain, best = self._deviances(weighted)
+        gain = float(plain.min() - best.min())
+        p = 0.0
+        for place in self._not_refuted(best[:, 0]):
+            p = max(p, self._p_value(gain, place, level, rng, trials))
+            if p > level:
+                break
+        likeliest = self.prepared[int(best[:, 0].argmin())]
+        total, taken = self._residual(likeliest, weighted)
+        left = np.maximum(total - taken, 1e-15 * total + 1e-300)[:, 0]
+        chosen = int((left * likeliest.weight).argmin())
         return Scan(
-            self.kinds[best],
-            int(self.positions[best]),
-            float(share[0]),
+            self.kinds[chosen],
+            int(self.positions[chosen]),
             p,
-            float(GRID[g]),
-            self.columns[:, best],
+            likeliest.shape,
+            self.root,
+            self.columns[:, chosen],
             self.kinds,
             self.positions,
-            rss,
+            likeliest.shape.log_determinant + len(y) * np.log(left),
         )
-
-
-def _whiten(rows: Array, r: float) -> Array:
-    """Rows of a first-order process made independent (Prais and Winsten 1954)."""
-    result = np.array(rows, dtype=np.float64)
-    if r > 0.0:
-        result[1:] = rows[1:] - r * rows[:-1]
-        result[0] = rows[0] * np.sqrt(1.0 - r * r)
-    return result
-
-
-def _colour(draws: Array, r: float) -> Array:
-    """Independent rows made a stationary first-order process."""
-    if r > 0.0:
-        draws[0] /= np.sqrt(1.0 - r * r)
-        for i in range(1, len(draws)):
-            draws[i] += r * draws[i - 1]
-    return draws
-
-
-def _correlation(left: Array, fitted: int) -> Array:
-    """Lag-1 correlation of each column, corrected for the bias of the fitted coefficients."""
-    n = len(left)
-    square = (left**2).sum(axis=0)
-    r = (left[1:] * left[:-1]).sum(axis=0) / np.where(square > 0.0, square, np.inf)
-    return np.asarray(r + (fitted + 1 + (fitted + 3) * r) / n)
-
-
-def _nearest(r: Array) -> npt.NDArray[np.int64]:
-    """Place in GRID of the correlation next to each estimate; a negative one counts as none."""
-    return np.asarray(np.clip(np.rint(r / (GRID[1] - GRID[0])), 0, len(GRID) - 1), dtype=np.int64)

@@ -14,7 +14,7 @@ from monitor.store.analyses import (
 )
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, load_campaign
-from monitor.store.catalogue import list_campaigns, list_machines, list_runs
+from monitor.store.catalogue import described_machines, list_campaigns, list_machines, list_runs
 from monitor.store.certificates import (
     StoredCertificate,
     find_certificate,
@@ -36,6 +36,7 @@ from monitor.store.identifications import (
     save_identification,
 )
 from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
+from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
 from monitor.store.verification import Verification, verify_audit
@@ -50,9 +51,12 @@ __all__ = [
     "StoredCertificate",
     "StoredIdentification",
     "StoredModel",
+    "StoredRefusal",
     "StoredRun",
     "StoredSelection",
     "Verification",
+    "clear_refusals",
+    "described_machines",
     "export_tables",
     "find_certificate",
     "find_selection",
@@ -79,6 +83,8 @@ __all__ = [
     "mark_certificate",
     "model_history",
     "record_event",
+    "record_refusal",
+    "refusals",
     "restore",
     "save_analysis",
     "save_certificate",

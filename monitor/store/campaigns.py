@@ -38,7 +38,7 @@ def import_campaign(db: Database, campaign: Campaign) -> Imported:
     Raises CampaignError, with nothing kept, where a campaign of that name has other content, or its machine
     has another topology in the database; DataError where a number is not finite.
     """
-    rows = probings.printed(campaign.probings)
+    rows = probings.printed(campaign.probings, campaign.machine)
     for run in campaign.runs:
         _check_run(run)
     content = _content(campaign, rows)
@@ -200,17 +200,18 @@ def _load(db: Database, name: str) -> tuple[Campaign, probings.PrintedProbings]:
     files = db.rows(
         "SELECT file, content FROM source_file WHERE campaign_id = ? ORDER BY rowid", [campaign_id]
     )
+    described = record_json.machine_record(machine)
     campaign = Campaign(
         name=name,
         method=method,
-        machine=record_json.machine_record(machine),
+        machine=described,
         probe=record_json.probe_record(probe),
         artefact=record_json.artefact_record(artefact),
         runs=tuple(
             Run(run, _moment(at, offset), day, warm_up, dict(zip(names, values, strict=True)))
             for run, at, offset, day, warm_up, names, values in stored_runs
         ),
-        probings=probings.as_record(rows),
+        probings=probings.as_record(rows, described),
         files=tuple(SourceFile(file, content) for file, content in files),
     )
     return campaign, rows

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pandas as pd
 
 from monitor.exceptions import NotFoundError
+from monitor.records import Machine
 from monitor.store.connection import Database
+from monitor.store.record_json import machine_record
 
 
 def list_campaigns(db: Database) -> pd.DataFrame:
@@ -22,6 +24,16 @@ def list_runs(db: Database, campaign: str) -> pd.DataFrame:
 def list_machines(db: Database) -> pd.DataFrame:
     """All machines by name: the view ``v_machines``."""
     return db.frame("SELECT * FROM v_machines ORDER BY machine")
+
+
+def described_machines(db: Database) -> tuple[Machine, ...]:
+    """Every machine by name, as its latest campaign describes it."""
+    return tuple(
+        machine_record(text)
+        for (text,) in db.rows(
+            "SELECT arg_max(machine_description, campaign_id) FROM campaign GROUP BY machine ORDER BY machine"
+        )
+    )
 
 
 def campaign_number(db: Database, name: str) -> int:

@@ -16,13 +16,10 @@ import numpy.typing as npt
 import pandas as pd
 
 from monitor.exceptions import DataError
-from monitor.records import Array, Probings
+from monitor.records import Array, Machine, Probings
 from monitor.store.audit import digest
 from monitor.store.connection import Database
 from monitor.units import DEGREE
-
-#: Letters of linear axes in ISO 841; every other axis turns.
-LINEAR_AXES = "XYZUVW"
 
 #: Most decimals of a degree that are tried: beyond, the shortest number has no meaning for a controller.
 _MOST_DECIMALS = 15
@@ -53,8 +50,11 @@ class PrintedProbings:
         return digest(columns)
 
 
-def printed(probings: Probings) -> PrintedProbings:
-    """A record in the controller's units. Raises DataError for no rows, and for a reading that is not finite."""
+def printed(probings: Probings, machine: Machine) -> PrintedProbings:
+    """A record in the controller's units; the machine says which axes turn.
+
+    Raises DataError for no rows, and for a reading that is not finite.
+    """
     if len(probings) == 0:
         raise DataError("a campaign needs at least one probing")
     for name, values in {"time": probings.time, **probings.readings}.items():
@@ -72,20 +72,23 @@ def printed(probings: Probings) -> PrintedProbings:
         probings.sequence,
         probings.time,
         [str(target) for target in probings.target],
-        {axis: _printed_reading(axis, values) for axis, values in probings.readings.items()},
+        {
+            axis: _printed_reading(values, linear=machine.is_linear(axis))
+            for axis, values in probings.readings.items()
+        },
         dict(probings.channels),
     )
 
 
-def as_record(rows: PrintedProbings) -> Probings:
-    """The rows in internal units."""
+def as_record(rows: PrintedProbings, machine: Machine) -> Probings:
+    """The rows in internal units; the machine says which axes turn."""
     return Probings(
         rows.run,
         rows.sequence,
         rows.time,
         np.array(rows.target, dtype=np.str_),
         {
-            axis: values if _is_linear(axis) else values * DEGREE.factor
+            axis: values if machine.is_linear(axis) else values * DEGREE.factor
             for axis, values in rows.readings.items()
         },
         dict(rows.channels),
@@ -141,12 +144,8 @@ def select(db: Database, campaign_id: int) -> PrintedProbings:
     )
 
 
-def _is_linear(axis: str) -> bool:
-    return axis[:1].upper() in LINEAR_AXES
-
-
-def _printed_reading(axis: str, internal: Array) -> Array:
-    if _is_linear(axis):
+def _printed_reading(internal: Array, *, linear: bool) -> Array:
+    if linear:
         return np.asarray(internal, dtype=np.float64)
     degrees = np.asarray(internal, dtype=np.float64) / DEGREE.factor
     # The quotient may be off by one unit of the last place: its neighbours stand in line after the decimals.

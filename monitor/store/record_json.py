@@ -6,33 +6,48 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from monitor.records import Artefact, AxisSettings, Ball, Machine, Probe, ScaleBar
+from monitor.records import Artefact, AxisSettings, Ball, ChainAxis, Machine, Probe, ScaleBar
 
 
 def machine_json(machine: Machine) -> str:
-    """A machine as text; strokes in mm or rad, scale pitches in mm, tolerances in display units."""
-    return _text(
-        {
-            "id": machine.id,
-            "topology": machine.topology,
-            "manufacturer": machine.manufacturer,
-            "model": machine.model,
-            "serial_number": machine.serial_number,
-            "location": machine.location,
-            "axes": {name: asdict(settings) for name, settings in machine.axes.items()},
-            "tolerances": dict(machine.tolerances),
-        }
-    )
+    """A machine as text; strokes in mm or rad, pitches and offsets in mm, tolerances in display units.
+
+    What a machine of letters does not have is left out, so that its text and its hash stay what they were.
+    """
+    axes = {name: asdict(settings) for name, settings in machine.axes.items()}
+    for settings in axes.values():
+        if settings["gear_ratio"] is None:
+            del settings["gear_ratio"]
+    data: dict[str, Any] = {
+        "id": machine.id,
+        "topology": machine.topology,
+        "manufacturer": machine.manufacturer,
+        "model": machine.model,
+        "serial_number": machine.serial_number,
+        "location": machine.location,
+        "axes": axes,
+        "tolerances": dict(machine.tolerances),
+    }
+    if machine.chain:
+        data["chain"] = [asdict(axis) for axis in machine.chain]
+    if machine.gravity is not None:
+        data["gravity"] = machine.gravity
+    return _text(data)
 
 
 def machine_record(text: str) -> Machine:
     """The machine of ``machine_json``."""
     data = json.loads(text)
+    gravity = _tuple(data.pop("gravity", None))
     axes = {
         name: AxisSettings(**{**settings, "stroke": _tuple(settings["stroke"])})
         for name, settings in data.pop("axes").items()
     }
-    return Machine(**data, axes=axes)
+    chain = tuple(
+        ChainAxis(**{**axis, "direction": _tuple(axis["direction"]), "offset": _tuple(axis["offset"])})
+        for axis in data.pop("chain", ())
+    )
+    return Machine(**data, axes=axes, chain=chain, gravity=gravity)
 
 
 def probe_json(probe: Probe) -> str:

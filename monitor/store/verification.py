@@ -20,6 +20,7 @@ from monitor.store.connection import Database
 from monitor.store.events import event_content
 from monitor.store.identifications import stored_identification_content
 from monitor.store.models import all_models, model_content, model_key
+from monitor.store.refusals import cleared_content, refusal_content
 from monitor.store.selections import selection_content
 
 
@@ -80,6 +81,10 @@ def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
         yield ("event", str(number)), event_content(db, number)
     for (number,) in db.rows("SELECT selection_id FROM selection ORDER BY ALL"):
         yield ("selection", str(number)), selection_content(db, number)
+    for (number,) in db.rows("SELECT refusal_id FROM refused_import ORDER BY ALL"):
+        yield ("refused import", str(number)), refusal_content(db, number)
+    for (number,) in db.rows("SELECT refusal_id FROM refusal_cleared ORDER BY ALL"):
+        yield ("cleared refusal", str(number)), cleared_content(db, number)
     for number, entry, own in db.rows("SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"):
         yield ("certificate", f"{number} entry {entry}"), own
 

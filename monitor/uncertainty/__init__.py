@@ -34,7 +34,8 @@ from monitor.uncertainty.marginals import (
 from monitor.uncertainty.montecarlo import RunEstimator, run_estimator
 from monitor.uncertainty.projection import Projection, nearest_correlation
 from monitor.uncertainty.propagation import Model, Summary
-from monitor.uncertainty.run_problem import RunProblem, repeated_readings, run_problem
+from monitor.uncertainty.row_problem import RowProblem, repeated_readings, run_problem
+from monitor.uncertainty.run_problem import OneRun, RunProblem
 from monitor.uncertainty.sampling import (
     BlockSampler,
     JointDistribution,
@@ -60,9 +61,11 @@ __all__ = [
     "Model",
     "MonteCarloResult",
     "Normal",
+    "OneRun",
     "OutputContribution",
     "Projection",
     "Rectangular",
+    "RowProblem",
     "RunEstimator",
     "RunProblem",
     "Sampled",

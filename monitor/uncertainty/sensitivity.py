@@ -16,8 +16,10 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.methods.least_squares import MEMBER_SHARE, RANK_TOLERANCE
 from monitor.records import Array
+from monitor.uncertainty.expansion import expansion_of
 from monitor.uncertainty.program import compile_program
-from monitor.uncertainty.run_problem import RunProblem
+from monitor.uncertainty.row_problem import RowProblem
+from monitor.uncertainty.run_problem import OneRun, RunProblem
 
 Gradient = Callable[[Array, Array], Array]
 
@@ -66,7 +68,7 @@ class Sensitivity:
         return np.array([self.names.index(name) for name in names], dtype=np.int64)
 
 
-def sensitivity_of(run: RunProblem, inputs: Array | None = None, start: Array | None = None) -> Sensitivity:
+def sensitivity_of(run: OneRun, inputs: Array | None = None, start: Array | None = None) -> Sensitivity:
     """The sensitivity of one run at ``inputs`` (N,), by default the run's own readings.
 
     ``start`` (p,) is where the search for the least-squares point begins. Raises DataError where it fails.
@@ -79,16 +81,9 @@ def sensitivity_of(run: RunProblem, inputs: Array | None = None, start: Array | 
         raise DataError("the identification of this run did not converge")
     theta = found[:, 0]
     space, determined, steps = _space(run, x, theta)
-    program = compile_program(run)
-    # The compiler takes half a second to import: commands that identify nothing do not wait for it.
-    from monitor.uncertainty.kernel import gradient_of
-
-    def compiled(unknowns: Array, trials: Array) -> Array:
-        assert program is not None
-        return gradient_of(program, unknowns, trials)
-
-    quick = program is not None and _agree(compiled, run.gradient, theta, x, steps)
-    gradient: Gradient = compiled if quick else run.gradient
+    fast = _fast(run, theta, steps)
+    quick = fast is not None and _agree(fast, run.gradient, theta, x, steps)
+    gradient: Gradient = fast if fast is not None and quick else run.gradient
     for _ in range(_POLISH):
         hessian = _differences(gradient, theta, x, np.diag(steps), of_inputs=False) / (2.0 * steps)
         hessian = 0.5 * (hessian + hessian.T)
@@ -112,8 +107,22 @@ def sensitivity_of(run: RunProblem, inputs: Array | None = None, start: Array | 
         rank=space.shape[1],
         steps=steps,
         gradient=gradient,
-        compiled=quick,
+        compiled=quick and isinstance(run, RunProblem),
     )
+
+
+def _fast(run: OneRun, theta: Array, steps: Array) -> Gradient | None:
+    """A gradient of many trials, where there is one for such a run: compiled, or expanded to second order."""
+    if isinstance(run, RowProblem):
+        return expansion_of(run, theta, steps).gradient
+    assert isinstance(run, RunProblem)
+    program = compile_program(run)
+    if program is None:
+        return None
+    # The compiler takes half a second to import: commands that identify nothing do not wait for it.
+    from monitor.uncertainty.kernel import gradient_of
+
+    return lambda unknowns, trials: gradient_of(program, unknowns, trials)
 
 
 def _agree(first: Gradient, second: Gradient, theta: Array, x: Array, steps: Array) -> bool:
@@ -130,7 +139,7 @@ def _agree(first: Gradient, second: Gradient, theta: Array, x: Array, steps: Arr
     return bool(np.all(np.abs(first(thetas, inputs) - right) <= 1e-7 * size))
 
 
-def _space(run: RunProblem, inputs: Array, theta: Array) -> tuple[Array, npt.NDArray[np.bool_], Array]:
+def _space(run: OneRun, inputs: Array, theta: Array) -> tuple[Array, npt.NDArray[np.bool_], Array]:
     """Basis (p, rank) of what the plan determines, which unknowns that is (p,), and steps (p,) of STEP mm."""
     jacobian = run.repeated(inputs[:, None]).linearise(theta[None], run.common).local[0]
     scale = np.linalg.norm(jacobian, axis=0)
@@ -138,8 +147,9 @@ def _space(run: RunProblem, inputs: Array, theta: Array) -> tuple[Array, npt.NDA
     _, values, vectors = np.linalg.svd(jacobian / scale, full_matrices=False)
     keep = values > RANK_TOLERANCE * values[0]
     share = np.max(np.abs(vectors[~keep]), axis=0, initial=0.0)
-    sigma = float(np.sqrt(np.mean(run.problem.sigma**2)))
-    largest = np.max(np.abs(jacobian[: 3 * run.probings]), axis=0) * sigma
+    weighed = np.isfinite(run.problem.sigma)
+    sigma = float(np.sqrt(np.mean(run.problem.sigma[weighed] ** 2)))
+    largest = np.max(np.abs(jacobian[: run.problem.sigma.size]), axis=0) * sigma
     steps = STEP / np.where(largest > 0.0, largest, 1.0)
     return (vectors[keep] / scale).T, share < MEMBER_SHARE, steps
 

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from monitor.exceptions import InputError, NotFoundError
-from monitor.readers import read_campaign
+from monitor.exceptions import CampaignError, InputError, NotFoundError, StoreError
+from monitor.readers import names_in, read_campaign
 from monitor.records import Campaign
-from monitor.store import Database, import_campaign, list_campaigns, list_runs, load_campaign
+from monitor.store import (
+    Database,
+    Imported,
+    clear_refusals,
+    import_campaign,
+    list_campaigns,
+    list_runs,
+    load_campaign,
+    record_refusal,
+)
 
 Document = dict[str, Any]
 
@@ -20,13 +30,13 @@ def import_folders(
 ) -> Document:
     """Import every folder, all or nothing each; the first refusal stops, what was imported before stays.
 
-    Raises CampaignError with all faults of the folder that is refused.
+    Raises CampaignError with all faults of the folder that is refused; that it was refused is recorded.
     """
     done: list[Document] = []
     for folder in folders:
         progress(str(folder))
         try:
-            imported = import_campaign(db, read_campaign(Path(folder)))
+            imported = _import(db, Path(folder))
         except InputError as error:
             if not done:
                 raise
@@ -43,6 +53,31 @@ def import_folders(
             }
         )
     return {"imported": done}
+
+
+def _import(db: Database, folder: Path) -> Imported:
+    """Import one folder, which settles earlier refusals of it or of its campaign, or record that it was refused."""
+    place = _whole(folder)
+    try:
+        imported = import_campaign(db, read_campaign(folder))
+    except StoreError:
+        # Nothing is wrong with the folder; and where the database cannot be written nothing can be recorded.
+        raise
+    except InputError as error:
+        faults = [str(fault) for fault in error.faults] if isinstance(error, CampaignError) else [str(error)]
+        campaign, machine = names_in(folder)
+        with suppress(StoreError):  # the faults of the folder are what the user has to hear
+            record_refusal(db, place, faults, campaign=campaign, machine=machine)
+        raise
+    clear_refusals(db, place, imported.campaign)
+    return imported
+
+
+def _whole(folder: Path) -> str:
+    try:
+        return str(folder.resolve())
+    except (OSError, ValueError, RuntimeError):  # a NUL in the name, links in a ring
+        return str(folder)
 
 
 def campaigns(db: Database) -> Document:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from monitor.methods.shared_effects import shared_parameters
 from monitor.records import Campaign
 from monitor.store import Database, StoredModel, load_campaign, model_history, save_analysis
 from monitor.units import DEGREE, MICROMETRE, Unit
+from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.models import as_model, label, resolve
 
 Document = dict[str, Any]
@@ -209,18 +211,27 @@ def _answer(document: Document) -> str:
 
 
 def explain_campaign(
-    db: Database, campaign: str, model: str | None = None, rate: float = 0.01
+    db: Database,
+    campaign: str,
+    model: str | None = None,
+    rate: float = 0.01,
+    *,
+    before: datetime | None = None,
 ) -> tuple[Document, Explanation]:
-    """Which physical effect is missing; the document is stored, with the seed of the search for steps."""
+    """Which physical effect is missing; the document is stored, with the seed of the search for steps.
+
+    Runs that began at or after ``before`` (local time without a zone) take no part; the document is then stored
+    as ``partial explanation``.
+    """
     if not 0.0 < rate < 1.0:
         raise InputError(f"the false discovery rate must lie between 0 and 1, not {rate}")
-    loaded = load_campaign(db, campaign)
+    loaded = runs_before(load_campaign(db, campaign), before)
     stored = resolve(db, model, loaded.method)
     problem = method_named(loaded.method).problem_of(loaded, as_model(stored))
     found = explain(loaded, problem, label(stored), rate=rate, rng=np.random.default_rng(SEED))
     document = explanation_document(found)
     save_analysis(
-        db, "explanation", document, method=loaded.method, campaign=campaign,
+        db, kind_of("explanation", before), document, method=method_of(loaded.method, before), campaign=campaign,
         model=stored.name, model_version=stored.version, seed=SEED,
     )  # fmt: skip
     return document, found

@@ -56,7 +56,7 @@ def _along(mapped: Mapped, place: int) -> tuple[Array, Array, Array]:
     readings = np.linspace(*mapped.ranges[joint.name], TABLE_POINTS)
     positions = np.tile(middle(known.chain, mapped.ranges), (TABLE_POINTS, 1))
     positions[:, place] = joint.sign * readings
-    component = joint.direction.index(1.0)
+    component = joint.main
     chosen = [
         effect.term.joint == place and effect.term.stage == MOTION and effect.term.component == component
         for effect in known.effects
@@ -82,7 +82,7 @@ def _positioning(mapped: Mapped) -> Iterator[Row]:
 
 
 def _has_own(mapped: Mapped, place: int) -> bool:
-    component = mapped.known.chain.joints[place].direction.index(1.0)
+    component = mapped.known.chain.joints[place].main
     return any(
         isinstance(effect, ChainEffect)
         and (effect.term.joint, effect.term.stage, effect.term.component) == (place, MOTION, component)

@@ -220,10 +220,7 @@ def _predicted(found: Explanation, effect: str) -> tuple[Array, Array] | None:
     for one in problem.added:
         basis = one.basis(problem.context)
         if one.text == effect and isinstance(one, ChainEffect):
-            own = (
-                basis.displacement(found.final.by_error)
-                @ found.final.solution.common[place : place + basis.size]
-            )
+            own = found.final.moved_by(basis) @ found.final.solution.common[place : place + basis.size]
             axis = int(np.argmax(np.sum(own**2, axis=0)))
             um = MICROMETRE.to_display(1.0)
             # The effect explains the residual with the opposite sign: what is measured without it is its negative.

@@ -13,8 +13,6 @@ from monitor.reporting.health import (
     DataQuality,
     Drift,
     History,
-    MissingEffect,
-    ModelHealth,
     ParameterHealth,
 )
 from monitor.reporting.health_words import in_words
@@ -22,7 +20,8 @@ from monitor.reporting.symbols import describe
 from monitor.statistics import Change as Found
 from monitor.store import Database
 from monitor.units import COLUMN_UNITS
-from monitor.workflow.health_history import DriftFound, Event, PastRun, Series, moment, plain
+from monitor.workflow.health_history import Event, PastRun
+from monitor.workflow.health_series import DriftFound, Series, moment
 from monitor.workflow.trend_parameter import SHORTEST_DAYS
 from monitor.workflow.weeks import Week
 
@@ -138,39 +137,6 @@ def conditions_of(here: list[PastRun]) -> tuple[ConditionRange, ...]:
             ConditionRange(words, unit.name if unit else "", min(values), float(np.mean(values)), max(values))
         )
     return tuple(found)
-
-
-def model_of(explained: Document | None, span: tuple[int, datetime, datetime] | None) -> ModelHealth | None:
-    """The comparison, which is of all runs of the campaign: their number and days (``span``) are said with it."""
-    if explained is None or span is None:
-        return None
-    count, first, last = span
-    runs = "the one run" if count == 1 else f"all {count} runs"
-    days = f"{first:%Y-%m-%d}" if first.date() == last.date() else f"{first:%Y-%m-%d} to {last:%Y-%m-%d}"
-    return ModelHealth(
-        campaign=explained["campaign"],
-        runs=f"{runs} of campaign {explained['campaign']}, {days}",
-        model=explained["model"],
-        verdict=explained["verdict"],
-        answer=explained["answer"],
-        rms_um=explained["rms_um"],
-        repeatability_um=plain(explained["repeatability_um"]),
-        lack_of_fit_f=plain(explained["lack_of_fit"]["f"]),
-        lack_of_fit_p=plain(explained["lack_of_fit"]["p"]),
-        missing=tuple(
-            MissingEffect(
-                one["effect"],
-                one["meaning"],
-                one["cause"],
-                one["remedy"],
-                plain(one["peak_um"]),
-                plain(one["rms_before_um"]),
-                plain(one["rms_after_um"]),
-                tuple(one["indistinguishable_from"]),
-            )
-            for one in explained["missing"]
-        ),
-    )
 
 
 def quality_of(

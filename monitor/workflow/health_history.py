@@ -1,28 +1,16 @@
-"""The past of a machine as a health report needs it: runs up to the week's end, parameters over time, what changed."""
+"""The past of a machine as a health report needs it: its runs and events up to the week's end."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Any
 
 import numpy as np
 
-from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.records import Array
-from monitor.statistics import Change as Found
-from monitor.statistics import find_changes, forecast, trend
-from monitor.store import Database, StoredModel
+from monitor.exceptions import NotFoundError
+from monitor.store import Database
 from monitor.workflow.weeks import Week
-
-DAY = 86400.0
-#: Probability of any change where there is none, over all parameters and the whole history of a machine.
-FALSE_ALARM = 0.01
-#: Fewer runs than this between two events are not searched (``find_changes``).
-FEWEST_RUNS = 6
-#: Seed of the simulated null distributions of the search, so that a report can be made again.
-SEED = 20260310
-DAYS_A_YEAR = 365.25
 
 
 @dataclass(frozen=True)
@@ -45,30 +33,18 @@ class Event:
     what: str
 
 
-@dataclass(frozen=True, eq=False)
-class Series:
-    """A parameter over the runs: times, days since the first run (n,), values and standard uncertainties (n,)."""
-
-    name: str
-    unit: str
-    times: tuple[datetime, ...]
-    t: Array
-    values: Array
-    u: Array
-    warm_up: Array
-
-
 @dataclass(frozen=True)
-class DriftFound:
-    """A drift since the last change, and how long a run stays in tolerance with 95 % (days from ``now``)."""
+class Span:
+    """The runs of a campaign up to the week's end: how many, the local starts of the first and the last of them.
 
-    slope: float
-    u_slope: float
-    p_value: float
-    crosses: float | None
-    crosses_between: tuple[float, float]
-    good_for: float | None
-    horizon: float
+    ``later`` began after it; ``before`` is then the week's end, else None: the campaign is whole.
+    """
+
+    count: int
+    first: datetime
+    last: datetime
+    later: int
+    before: datetime | None
 
 
 def past_runs(
@@ -137,13 +113,15 @@ def first_run(db: Database, machine: str, campaigns: tuple[str, ...]) -> tuple[d
     return next(((at, name) for at, name in rows if not campaigns or name in campaigns), None)
 
 
-def campaign_span(db: Database, campaign: str) -> tuple[int, datetime, datetime]:
-    """Number of runs of a campaign and the local starts of its first and last."""
-    ((count, first, last),) = db.rows(
-        "SELECT count(*), min(started_at_local), max(started_at_local) FROM v_runs WHERE campaign = ?",
-        [campaign],
+def campaign_span(db: Database, campaign: str, week: Week) -> Span:
+    """The runs of a campaign up to the week's end, of which there is at least one."""
+    ((count, first, last, later),) = db.rows(
+        "SELECT count(*) FILTER (started_at_local < $ends), min(started_at_local), "
+        "max(started_at_local) FILTER (started_at_local < $ends), count(*) FILTER (started_at_local >= $ends) "
+        "FROM v_runs WHERE campaign = $campaign",
+        {"campaign": campaign, "ends": week.ends},
     )
-    return int(count), first, last
+    return Span(int(count), first, last, int(later), week.ends if later else None)
 
 
 def past_events(db: Database, machine: str, week: Week) -> list[Event]:
@@ -154,94 +132,6 @@ def past_events(db: Database, machine: str, week: Week) -> list[Event]:
         [machine, week.ends],
     )
     return [Event(at, kind, what) for at, kind, what in rows]
-
-
-def series_of(db: Database, machine: str, model: StoredModel, runs: list[PastRun]) -> dict[str, Series]:
-    """Every parameter that the runs have a number of, under one version of a model."""
-    at = {(one.campaign, one.run): one for one in runs}
-    rows = db.rows(
-        "SELECT campaign, run, parameter, value, u, unit FROM v_parameters "
-        "WHERE machine = ? AND model = ? AND model_version = ? AND value IS NOT NULL "
-        "ORDER BY started_at, campaign, run",
-        [machine, model.name, model.version],
-    )
-    found: dict[str, list[tuple[PastRun, float, float, str]]] = {}
-    for campaign, run, parameter, value, u, unit in rows:
-        if (campaign, run) in at and np.isfinite(value):
-            found.setdefault(parameter, []).append((at[campaign, run], value, u, unit))
-    origin = runs[0].at if runs else None
-    return {
-        name: Series(
-            name,
-            points[-1][3],
-            tuple(one.at for one, *_ in points),
-            np.array([(one.at - origin).total_seconds() / DAY for one, *_ in points]),
-            np.array([value for _, value, _, _ in points]),
-            np.array([u for _, _, u, _ in points]),
-            np.array([one.warm_up for one, *_ in points], dtype=np.float64),
-        )
-        for name, points in found.items()
-        if origin is not None
-    }
-
-
-def changes_of(series: dict[str, Series], events: list[Event], origin: datetime) -> dict[str, list[Found]]:
-    """Changes of every parameter, runs that were warming up left out; the false-alarm probability is shared.
-
-    Parameters that were found in the same runs are searched together. The index of a change is not that of
-    the series but its ``at`` and ``interval`` are times in days since ``origin``.
-    """
-    groups: dict[bytes, list[Series]] = {}
-    for one in series.values():
-        steady = one.warm_up == 0
-        if steady.sum() >= FEWEST_RUNS:
-            groups.setdefault(one.t[steady].tobytes(), []).append(one)
-    share = FALSE_ALARM / max(len(groups), 1)
-    split = sorted((event.at - origin).total_seconds() / DAY for event in events)
-    found: dict[str, list[Found]] = {}
-    rng = np.random.default_rng(SEED)
-    for group in groups.values():
-        steady = group[0].warm_up == 0
-        times = group[0].t[steady]
-        pieces = len({0, *np.searchsorted(times, split).tolist()})
-        trials = max(1999, int(2 * len(group) * pieces / share))
-        history = find_changes(
-            {one.name: one.values[steady] for one in group}, times,
-            rng=rng, events=split, false_alarm=share, trials=trials,
-        )  # fmt: skip
-        for change in history.changes:
-            found.setdefault(change.parameter, []).append(change)
-    return found
-
-
-def drift_of(one: Series, since: float, now: float, tolerance: float | None) -> DriftFound | None:
-    """The drift of a parameter since its last change (days since the first run); None with fewer than three days.
-
-    Nothing is said of times further ahead than the history is long.
-    """
-    kept = (one.warm_up == 0) & (one.t >= since)
-    days = np.array([at.toordinal() for at in one.times])[kept]
-    if len(set(days.tolist())) < 3:
-        return None
-    try:
-        line = trend(one.values[kept], one.t[kept], u=one.u[kept], days=days)
-        span = float(np.ptp(one.t[kept]))
-        if tolerance is None:
-            return DriftFound(
-                line.slope * DAYS_A_YEAR, line.u_slope * DAYS_A_YEAR, line.p_value, None, (np.inf, np.inf), None, span
-            )  # fmt: skip
-        ahead = forecast(line, (-tolerance, tolerance), now, [], horizon=now + span)
-    except (DataError, InputError):
-        return None
-    return DriftFound(
-        line.slope * DAYS_A_YEAR, line.u_slope * DAYS_A_YEAR, line.p_value,
-        ahead.crossing.at, ahead.crossing.interval, float(min(ahead.recommended_interval, span)), span,
-    )  # fmt: skip
-
-
-def moment(origin: datetime, days: float) -> datetime | None:
-    """A time given in days since the first run; None where it is infinite."""
-    return origin + timedelta(days=days) if np.isfinite(days) else None
 
 
 def plain(value: Any) -> float | None:

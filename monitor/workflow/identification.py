@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from monitor.exceptions import NotFoundError
 from monitor.methods import method_named
 from monitor.methods.identification import Identification, RunIdentification
 from monitor.records import Array, Campaign
 from monitor.store import Database, StoredIdentification, StoredRun, load_campaign, save_identification
 from monitor.units import MICROMETRE, Unit
+from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.models import as_model, resolve
 
 Document = dict[str, Any]
@@ -70,18 +69,6 @@ def _stored(campaign: Campaign, found: Identification, model: str, version: int)
             )
             for run in found.runs
         ),
-    )
-
-
-def only_run(campaign: Campaign, run: int) -> Campaign:
-    """A campaign with one run alone. Raises NotFoundError where there is no such run."""
-    if run not in {one.run for one in campaign.runs}:
-        there = ", ".join(str(one.run) for one in campaign.runs)
-        raise NotFoundError(f"campaign {campaign.name} has no run {run}; it has {there}")
-    return replace(
-        campaign,
-        runs=tuple(one for one in campaign.runs if one.run == run),
-        probings=campaign.probings.rows(campaign.probings.run == run),
     )
 
 

@@ -10,12 +10,12 @@ from typing import Any
 
 from monitor.effects import parse_effect
 from monitor.effects.words import describe
-from monitor.exceptions import InputError, NotFoundError
-from monitor.machine import parse_topology
+from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.machine import Chain
 from monitor.methods import METHODS
 from monitor.methods.base_effects import base_effects
-from monitor.methods.model import Model
-from monitor.store import Database, StoredModel, list_machines, list_models, load_model, save_model
+from monitor.methods.model import Model, chain_of
+from monitor.store import Database, StoredModel, described_machines, list_models, load_model, save_model
 
 Document = dict[str, Any]
 
@@ -83,12 +83,16 @@ def list_(db: Database) -> Document:
 def show(db: Database, name: str) -> Document:
     """A model, its added effects in words, and its base effects on every machine that is there."""
     stored = resolve(db, name)
-    machines = list_machines(db)
+    method = _method_of(db, stored)
     base: dict[str, list[str]] = {}
     words: dict[str, str] = {}
-    for machine, topology in zip(machines["machine"], machines["topology"], strict=True):
-        chain = parse_topology(str(topology))
-        base[str(machine)] = list(base_effects(chain))
+    for machine in described_machines(db):
+        chain = chain_of(machine)
+        try:
+            base[machine.id] = list(_base_of(method, chain))
+        except DataError:
+            # A method that this machine cannot be calibrated by has no base on it.
+            continue
         for text in stored.effects:
             try:
                 words.setdefault(text, describe(parse_effect(text, chain)).meaning)
@@ -104,7 +108,7 @@ def add(db: Database, effect: str, to: str, as_: str | None = None, note: str = 
     """
     parent = resolve(db, to)
     text = _known(db, effect)
-    if _is_base(db, text):
+    if _is_base(db, text, _method_of(db, parent)):
         raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
     if text in parent.effects:
         raise InputError(
@@ -135,21 +139,44 @@ def _name(as_: str | None, parent: StoredModel) -> str:
     return as_
 
 
-def _is_base(db: Database, effect: str) -> bool:
-    """Whether an effect is a base effect on every machine."""
-    topologies = dict.fromkeys(str(topology) for topology in list_machines(db)["topology"])
-    return all(effect in base_effects(parse_topology(topology)) for topology in topologies)
+def _method_of(db: Database, stored: StoredModel) -> str:
+    """The method that a model descends from."""
+    while stored.parent is not None:
+        stored = load_model(db, *stored.parent)
+    return stored.name if stored.name in METHODS else next(iter(METHODS))
+
+
+def _base_of(method: str, chain: Chain) -> tuple[str, ...]:
+    """The effects that are free in every run of a method; a method that names none has the complete model's."""
+    found: tuple[str, ...] = getattr(METHODS[method], "base_effects", base_effects)(chain)
+    return found
+
+
+def _is_base(db: Database, effect: str, method: str) -> bool:
+    """Whether an effect is a base effect of a method on every machine that it can calibrate."""
+    found = []
+    for chain in _chains(db):
+        try:
+            found.append(effect in _base_of(method, chain))
+        except DataError:
+            continue
+    return bool(found) and all(found)
+
+
+def _chains(db: Database) -> tuple[Chain, ...]:
+    """The different chains of the machines that are there."""
+    return tuple(dict.fromkeys(chain_of(machine) for machine in described_machines(db)))
 
 
 def _known(db: Database, effect: str) -> str:
     """The effect in its own words, if any machine has it."""
-    topologies = [str(topology) for topology in list_machines(db)["topology"]]
-    if not topologies:
+    chains = _chains(db)
+    if not chains:
         raise NotFoundError("there is no machine yet that could have an effect; import a campaign first")
     fault: InputError | None = None
-    for topology in dict.fromkeys(topologies):
+    for chain in chains:
         try:
-            return parse_effect(effect, parse_topology(topology)).text
+            return parse_effect(effect, chain).text
         except InputError as error:
             fault = fault or error
     assert fault is not None

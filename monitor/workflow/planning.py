@@ -241,7 +241,7 @@ def _separate(loaded: Campaign, stored: StoredModel, texts: tuple[str, str]) -> 
     chain = fitted.problem.context.chain
     effect, rival = (parse_effect(text, chain) for text in texts)
     basis = effect.basis(fitted.problem.context)
-    moved = basis.displacement(fitted.by_error) @ np.ones(basis.size)
+    moved = fitted.moved_by(basis) @ np.ones(basis.size)
     largest = float(np.linalg.norm(moved, axis=1).max())
     size = SEPARATED_PEAK / largest if largest > 0.0 else 1.0
     rotary, linear = strokes_of(loaded, chain, fitted.problem.context.positions)

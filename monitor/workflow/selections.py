@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.methods import method_named
-from monitor.methods.touch import TouchProblem
+from monitor.methods.problem import ChainProblem
 from monitor.records import Array
 from monitor.reporting.figure_style import save
 from monitor.reporting.figures_trend import selections_side_by_side
@@ -29,7 +29,7 @@ from monitor.store import (
     load_campaign,
     save_selection,
 )
-from monitor.uncertainty.run_problem import repeated_readings
+from monitor.uncertainty.row_problem import repeated_readings
 from monitor.workflow.campaigns import records
 from monitor.workflow.models import as_model
 from monitor.workflow.run_columns import run_columns, selected
@@ -74,7 +74,7 @@ def group(db: Database, name: str, campaign: str | None = None) -> StoredSelecti
 
 
 def selected_readings(
-    db: Database, name: str, campaign: str, model: StoredModel, problem: TouchProblem
+    db: Database, name: str, campaign: str, model: StoredModel, problem: ChainProblem
 ) -> tuple[Array, npt.NDArray[np.int64]]:
     """Readings (runs, 3n) in mm of the selected runs, and their days; the plan is that of ``problem``.
 
@@ -97,7 +97,7 @@ def selected_readings(
     return repeated_readings(own)[keep], labels
 
 
-def _same_plan(one: TouchProblem, other: TouchProblem) -> bool:
+def _same_plan(one: ChainProblem, other: ChainProblem) -> bool:
     """Whether the first runs probed the same targets at the same angles."""
     plans = []
     for problem in (one, other):

@@ -10,9 +10,11 @@ from threadpoolctl import threadpool_limits
 
 from monitor.exceptions import InputError
 from monitor.uncertainty import BlockSampler, Inputs, normal_inputs, run_estimator
-from monitor.uncertainty.cluster import cluster, processes, spread
+from monitor.uncertainty.cluster import cluster
+from monitor.uncertainty.processes import processes
 from monitor.uncertainty.propagation import Model
-from monitor.uncertainty.run_problem import RunProblem
+from monitor.uncertainty.run_problem import OneRun
+from monitor.uncertainty.spread import spread
 
 # Threads of this process where nothing else was asked for: the trials release the interpreter's lock.
 THREADS = 2
@@ -20,7 +22,7 @@ THREADS = 2
 
 @contextmanager
 def trials_of(
-    one: RunProblem,
+    one: OneRun,
     inputs: Inputs,
     names: tuple[str, ...],
     seed: int,

@@ -25,6 +25,7 @@ from monitor.statistics import (
     warm_up,
 )
 from monitor.units import DEGREE_CELSIUS, ONE, Unit, column_unit
+from monitor.workflow.change_search import weights_of
 
 Document = dict[str, Any]
 
@@ -65,7 +66,7 @@ class Series:
 
     def weights(self) -> Array | None:
         """The uncertainties of the runs, None where a run has none (then all count alike)."""
-        return self.u if bool(np.isfinite(self.u).all() and (self.u > 0.0).all()) else None
+        return weights_of(self)
 
 
 def date(t: float, offset: timedelta) -> str | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.records import Array
-from monitor.statistics import Change, History, Trend, control_false_discoveries, find_changes
+from monitor.statistics import Change, History, Trend, control_false_discoveries
 from monitor.store import (
     Database,
     MachineHistory,
@@ -21,6 +20,7 @@ from monitor.store import (
     save_analysis,
     unidentified_campaigns,
 )
+from monitor.workflow.change_search import DAYS_FOR_MEANS, search_changes
 from monitor.workflow.identification import identify
 from monitor.workflow.models import resolve
 from monitor.workflow.trend_campaigns import chosen_only, same_hours
@@ -43,14 +43,9 @@ Document = dict[str, Any]
 # Seeds what is simulated: the null distributions of changes and warm-up, the limit of MEWMA; stored with the result.
 SEED = 20260302
 SECONDS_PER_DAY = 86400.0
-#: From so many days on, changes and alarms are sought in the means of the days, which hide no day component.
-DAYS_FOR_MEANS = 15
-#: Uncertainties that differ by less than this factor weigh runs alike (it costs less than 1 % of the precision).
-ALIKE = 1.25
 #: The next check where none is named: as far away as the campaigns lie apart (median), or this many days.
 NEXT_CHECK_D = 30.0
 FALSE_ALARM = 0.05
-TRIALS = 1999
 
 
 @dataclass(frozen=True)
@@ -120,55 +115,6 @@ def _series(history: MachineHistory) -> list[tuple[Series, npt.NDArray[np.bool_]
     return found
 
 
-def day_means(series: Series) -> tuple[Array, Array, Array | None]:
-    """Times, means and uncertainties of the means by day, in order of time; None where the days weigh alike."""
-    labels, first, index = np.unique(series.days, return_index=True, return_inverse=True)
-    weight = 1.0 / series.u**2 if series.weights() is not None else np.ones_like(series.values)
-    total = np.bincount(index, weight)
-    order = np.argsort(first, kind="stable")
-    t, y = (np.bincount(index, weight * x) / total for x in (series.t, series.values))
-    u = 1.0 / np.sqrt(total)
-    assert len(labels) == len(total)
-    return t[order], y[order], u[order] if u.max() > ALIKE * u.min() else None
-
-
-def _changes(
-    all_series: Sequence[Series], events: list[float]
-) -> dict[str, tuple[History | None, str | None]]:
-    """Steps, bends and transients of each parameter; or why none were sought.
-
-    Parameters measured at the same times share one search, and with it the simulated null distribution. Which
-    search a parameter is in does not change its share of the false-alarm probability.
-    """
-    searches: dict[tuple[bytes, bytes], tuple[Array, Array | None, dict[str, Array]]] = {}
-    for series in all_series:
-        if len(np.unique(series.days)) >= DAYS_FOR_MEANS:
-            t, y, u = day_means(series)
-        else:
-            t, y = series.t, series.values
-            u = series.u if series.weights() is not None and series.u.max() > ALIKE * series.u.min() else None
-        key = (t.tobytes(), b"" if u is None else u.tobytes())
-        searches.setdefault(key, (t, u, {}))[2][series.name] = y
-    found: dict[str, tuple[History | None, str | None]] = {}
-    for t, u, values in searches.values():
-        try:
-            history = find_changes(
-                values, t, rng=np.random.default_rng([SEED, len(t)]), events=events,
-                u=None if u is None else dict.fromkeys(values, u),
-                false_alarm=FALSE_ALARM * len(values) / len(all_series), trials=TRIALS,
-            )  # fmt: skip
-        except DataError as error:
-            found |= dict.fromkeys(values, (None, f"no search for changes: {error}"))
-            continue
-        for name in values:
-            own = [
-                tuple(one for one in part if one.parameter == name)
-                for part in (history.changes, history.trends)
-            ]
-            found[name] = (replace(history, changes=own[0], trends=own[1]), None)
-    return found
-
-
 def _change(one: Change, series: Series) -> Document:
     slope = one.kind in ("slope", "trend")
     # A slope of a short history is stated a day: see SHORTEST_DAYS.
@@ -198,7 +144,7 @@ def _steady(series: Series, warm: npt.NDArray[np.bool_]) -> Series:
 
 def _parameter(
     series: Series, history: MachineHistory, own: npt.NDArray[np.bool_], events: list[float], check: float,
-    choice: Choice, charts: Charts, place: int, searched: dict[str, tuple[History | None, str | None]],
+    choice: Choice, charts: Charts, place: int, searched: Mapping[str, tuple[History | None, str | None]],
 ) -> tuple[Document, Trend | None]:  # fmt: skip
     steady = _steady(series, history.warm_up[own])
     found, why = searched[series.name]
@@ -300,7 +246,12 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
     reference = None if choice.reference is None else (_days(choice.reference[0]), _days(choice.reference[1]))
     charts = Charts(_points(history, series), reference)
     check = _next_check(history, choice)
-    searched = _changes([_steady(one, history.warm_up[own]) for one, own in series if len(one.t)], events)
+    searched = search_changes(
+        [_steady(one, history.warm_up[own]) for one, own in series if len(one.t)],
+        events,
+        false_alarm=FALSE_ALARM,
+        seed=SEED,
+    )
     judged = {
         one.name: _parameter(one, history, own, events, check, choice, charts, place, searched)
         for place, (one, own) in enumerate(series)

@@ -1,13 +1,14 @@
 """Uncertainty of one run's geometric errors after JCGM 102:2011: GUM framework, Monte Carlo, validation.
 
-The inputs are the readings of the linear axes at every probing and the length of the bar. Their covariance is
-pooled by day from the repeated runs where there are enough of them, else all runs together, else the probe's
-stated standard uncertainty, uncorrelated.
+The inputs are the readings and the calibrated quantities: for touched balls those of the linear axes at every probing
+and the length of the bar, else what every row tells. The covariance of the readings is pooled by day from the repeated
+runs where there are enough of them, else all runs together, else the stated standard uncertainty, uncorrelated.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from monitor.effects.catalogue import catalogue
 from monitor.exceptions import DataError, InputError
 from monitor.methods import method_named
 from monitor.methods.identification import Refusal
+from monitor.methods.results import refusals
 from monitor.records import Array, Campaign
 from monitor.store import Database, StoredModel, load_campaign, save_analysis
 from monitor.uncertainty import (
@@ -38,9 +40,11 @@ from monitor.uncertainty import (
     validate,
 )
 from monitor.uncertainty.coverage import ellipsoid_factor, rectangle_factor
-from monitor.uncertainty.run_problem import RunProblem, repeated_readings, run_problem
+from monitor.uncertainty.row_problem import repeated_readings, run_problem
+from monitor.uncertainty.run_problem import OneRun, RunProblem
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
 from monitor.units import Unit
+from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.models import as_model, label, resolve
 from monitor.workflow.selections import selected_readings
 from monitor.workflow.spreading import trials_of
@@ -52,6 +56,7 @@ Document = dict[str, Any]
 VALIDATION_TIGHTENING = 2.5
 READINGS = "readings"
 BAR = "scale bar"
+CALIBRATED = "calibrated quantities"
 LACK_OF_FIT = "lack of fit of the model"
 # A covariance from fewer degrees of freedom than this says little about itself; then the next choice is taken.
 FEWEST_DEGREES_OF_FREEDOM = 8
@@ -78,15 +83,16 @@ class Evaluated:
 
 
 def _reading_inputs(
-    db: Database, found: Fit, campaign: Campaign, one: RunProblem, model: StoredModel, select: str | None
+    db: Database, found: Fit, campaign: Campaign, one: OneRun, model: StoredModel, select: str | None
 ) -> tuple[Inputs, str]:
     """Inputs of the readings of a run, and in words where their covariance is from: all runs, or a stored selection."""
-    count = one.probings * len(one.linear)
-    names, units = one.input_names[:count], ("mm",) * count
+    problem, names = found.problem, one.reading_names
+    count = len(names)
+    units = ("mm",) * count
     days = {run.run: run.day for run in campaign.runs}
-    labels = np.array([days[int(run)] for run in found.problem.runs])
+    labels = np.array([days[int(run)] for run in problem.runs])
     if select is not None:
-        values, labels = selected_readings(db, select, campaign.name, model, found.problem)
+        values, labels = selected_readings(db, select, campaign.name, model, problem)
         if len(labels) - 1 < FEWEST_DEGREES_OF_FREEDOM:
             raise DataError(
                 f"--select {select}: {len(labels)} runs leave {len(labels) - 1} degrees of freedom for a covariance; "
@@ -94,7 +100,7 @@ def _reading_inputs(
             )
     else:
         try:
-            values = repeated_readings(found.problem)
+            values = repeated_readings(problem)
         except DataError:
             values = np.zeros((0, count))
     runs = len(labels)
@@ -108,7 +114,7 @@ def _reading_inputs(
     else:
         repeatability = lack_of_fit(found)[1]
         u = max(stated, repeatability or 0.0)
-        inputs = uncorrelated(names, units, one.inputs[:count], np.full(count, u), source=READINGS)
+        inputs = uncorrelated(names, units, one.inputs[:count], one.stated * (u / stated), source=READINGS)
         words = f"the probe's stated standard uncertainty of {stated * 1e3:g} µm; too few repeated runs of one plan"
         if u > stated:
             words = f"the repeatability of {u * 1e3:.2g} µm, which exceeds the probe's statement; too few runs for more"
@@ -121,18 +127,13 @@ def _reading_inputs(
     return own, words
 
 
-def _bar_inputs(one: RunProblem) -> Inputs | None:
-    distances = one.problem.distances
-    if not distances:
+def _calibrated_inputs(one: OneRun) -> Inputs | None:
+    names, unit, u = one.calibrated
+    if not names:
         return None
-    count = one.probings * len(one.linear)
-    return uncorrelated(
-        one.input_names[count:],
-        ("mm",) * len(distances),
-        one.inputs[count:],
-        [distance.standard_uncertainty for distance in distances],
-        source=BAR,
-    )
+    count = len(one.reading_names)
+    source = BAR if isinstance(one, RunProblem) else CALIBRATED
+    return uncorrelated(names, (unit,) * len(names), one.inputs[count:], u, source=source)
 
 
 def _lack_of_fit(
@@ -164,10 +165,12 @@ def evaluate(
     workers: int | None = None,
     cluster: str | None = None,
     select: str | None = None,
+    before: datetime | None = None,
 ) -> Evaluated:
     """Evaluate the uncertainty of one run (the last by default). Raises InputError, DataError, NotFoundError.
 
     ``select`` names a stored selection, or a campaign of the same plan: its runs give the covariance of the readings.
+    Runs that began at or after ``before`` (local time without a zone) take no part.
     The trials go to ``workers`` processes or the Dask scheduler at the address ``cluster``, else to threads.
     """
     if method not in ("guf", "mcm", "both"):
@@ -178,7 +181,7 @@ def evaluate(
         raise InputError(f"--seed {seed}: a seed is a whole number from 0 to 9223372036854775807")
     if not 0.0 < p < 1.0:
         raise InputError(f"-p {p}: a coverage probability lies between 0 and 1")
-    loaded = load_campaign(db, campaign)
+    loaded = runs_before(load_campaign(db, campaign), before)
     stored = resolve(db, model, loaded.method)
     found = fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
     number = int(found.problem.runs[-1]) if run is None else run
@@ -186,8 +189,8 @@ def evaluate(
     fixed, coefficients = found.problem.resolved(found.solution.common)
     one = run_problem(fixed, number, coefficients)
     readings, words = _reading_inputs(db, found, loaded, one, stored, select)
-    bar = _bar_inputs(one)
-    inputs = joined(readings, bar) if bar is not None else readings
+    calibrated = _calibrated_inputs(one)
+    inputs = joined(readings, calibrated) if calibrated is not None else readings
     place = int(np.flatnonzero(found.problem.runs == number)[0])
     at = sensitivity_of(one, start=found.solution.local[place])
     names = tuple(name for name in found.problem.base_names if at.determined[at.names.index(name)])
@@ -227,7 +230,8 @@ def evaluate(
             finite_dof=False,
         )
         validation = validate(plain, mcm, digits=digits)
-    refused = method_named(loaded.method).refusals(found.problem, found.solution.null_space[place], number)
+    advice = method_named(loaded.method).advice
+    refused = refusals(found.problem, found.solution.null_space[place], number, advice)
     return Evaluated(loaded, stored, found, number, framework, units, refused, words, mcm, validation, causes)
 
 
@@ -345,7 +349,11 @@ def _scaled(one: Any, found: Evaluated, value: float) -> float:
 
 
 def uncertainty(db: Database, campaign: str, run: int | None = None, **options: Any) -> Document:
-    """Evaluate, store and return the document. ``options`` are those of ``evaluate``."""
+    """Evaluate, store and return the document. ``options`` are those of ``evaluate``.
+
+    With ``before`` it is stored as ``partial uncertainty``: it is not the result of the whole campaign.
+    """
+    before = options.get("before")
     found = evaluate(db, campaign, run, **options)
     result = document(found)
     # How long it took is no part of what is stored: the same result has the same document.
@@ -355,8 +363,8 @@ def uncertainty(db: Database, campaign: str, run: int | None = None, **options: 
         else result
     )
     save_analysis(
-        db, "uncertainty", kept, method=options.get("method", "both"), campaign=campaign, run=found.run,
-        model=found.model.name, model_version=found.model.version,
+        db, kind_of("uncertainty", before), kept, method=method_of(options.get("method", "both"), before),
+        campaign=campaign, run=found.run, model=found.model.name, model_version=found.model.version,
         seed=None if found.monte_carlo is None else found.monte_carlo.seed,
     )  # fmt: skip
     return result

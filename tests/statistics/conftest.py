@@ -84,3 +84,13 @@ def rate_agrees() -> Callable[[int, int, float], bool]:
         return bool(low <= alarms <= high)
 
     return agrees
+
+
+@pytest.fixture(scope="session")
+def rate_at_most() -> Callable[[int, int, float], bool]:
+    """Whether so many alarms in so many trials are no more than a nominal rate allows (exact binomial, 99.9 %)."""
+
+    def agrees(alarms: int, trials: int, nominal: float) -> bool:
+        return bool(alarms <= stats.binom.isf(0.001, trials, nominal))
+
+    return agrees

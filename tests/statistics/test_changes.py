@@ -10,6 +10,7 @@ import pytest
 
 from monitor.exceptions import DataError
 from monitor.statistics import find_changes, joint_change
+from monitor.statistics.scan import Scanner
 
 PARAMETERS = Path(__file__).resolve().parents[1] / "references" / "campaign-parameters"
 
@@ -29,29 +30,83 @@ def first_order(rng, n, r):
     return e
 
 
+def share_called(scanner, series, rng, level=0.05):
+    """Share of series (m, n) with any finding; they share the simulated null distributions."""
+    return sum(scanner.scan(y, rng, 999, level).p_value <= level for y in series)
+
+
 @pytest.mark.parametrize(
-    # Nominal 5 %; as measured with 1500 other histories each.
-    ("n", "r", "level"),
-    [(20, 0.0, 0.05), (44, 0.0, 0.048), (44, 0.5, 0.085)],
+    ("n", "r"), [(12, 0.0), (12, 0.3), (20, 0.0), (20, 0.3), (20, 0.6), (44, 0.3), (44, 0.6), (200, 0.6)]
 )
-def test_false_alarm_rate(n, r, level, rate_agrees):
+def test_false_alarm_rate_whatever_the_correlation(n, r, rate_at_most):
     rng = np.random.default_rng([n, int(10 * r)])
-    alarms = 0
-    for _ in range(300):
-        history = find_changes({"a": first_order(rng, n, r)}, np.arange(n), rng=rng, trials=399)
-        alarms += bool(history.changes or history.trends)
-    assert rate_agrees(alarms, 300, level), alarms / 300
+    series = [first_order(rng, n, r) for _ in range(200 if n == 200 else 600)]
+    alarms = share_called(Scanner(np.arange(n, dtype=float), None, "constant"), series, rng)
+    assert rate_at_most(alarms, len(series), 0.05), alarms / len(series)
 
 
-def test_false_alarm_rate_of_many_heteroscedastic_parameters_together(rate_agrees):
+@pytest.mark.parametrize(("days", "runs", "component"), [(5, 4, 1.0), (5, 4, 3.0), (6, 3, 2.0), (10, 4, 1.0)])
+def test_false_alarm_rate_with_a_component_of_the_day(days, runs, component, rate_at_most):
+    rng = np.random.default_rng([days, runs])
+    day = np.repeat(np.arange(days), runs)
+    series = [rng.normal(size=len(day)) + component * rng.normal(size=days)[day] for _ in range(400)]
+    t = np.arange(len(day), dtype=float)
+    alarms = share_called(Scanner(t, None, "constant", day), series, rng)
+    assert rate_at_most(alarms, len(series), 0.05), alarms / len(series)
+    without = share_called(Scanner(t, None, "constant"), series, rng)
+    assert without > 2 * alarms or component < 2.0
+
+
+@pytest.mark.parametrize(
+    # Steps of five innovation standard deviations; measured with 500 others: 0.95, 0.93, 1.00, 0.98.
+    ("n", "r", "least"),
+    [(20, 0.0, 0.91), (20, 0.3, 0.87), (44, 0.3, 0.97), (44, 0.6, 0.94)],
+)
+def test_power_stays_useful(n, r, least):
+    rng = np.random.default_rng([n, int(10 * r), 1])
+    series = [first_order(rng, n, r) + 5.0 * (np.arange(n) >= 12 * n // 20) for _ in range(300)]
+    found = share_called(Scanner(np.arange(n, dtype=float), None, "constant"), series, rng)
+    assert found / 300 >= least
+
+
+@pytest.mark.parametrize("r", [0.0, 0.6])
+def test_false_alarm_rate_of_many_heteroscedastic_parameters_together(r, rate_at_most):
     rng = np.random.default_rng(3)
     u = np.exp(0.5 * rng.normal(size=24))
     alarms = 0
     for _ in range(150):
-        values = {f"p{j}": rng.normal(size=24) * u for j in range(4)}
+        values = {f"p{j}": first_order(rng, 24, r) * u for j in range(4)}
         history = find_changes(values, np.arange(24), u=dict.fromkeys(values, u), rng=rng, trials=399)
         alarms += bool(history.changes or history.trends)
-    assert rate_agrees(alarms, 150, 0.05), alarms / 150
+    assert rate_at_most(alarms, 150, 0.05), alarms / 150
+
+
+def test_the_likelihood_of_a_shape_is_that_of_the_dense_normal_density():
+    # Two ways: cumulative sums of whitened rows, and the residual likelihood of Patterson and Thompson
+    # (Biometrika 58 (1971) 545) with dense matrices.
+    rng = np.random.default_rng(8)
+    t, u, day = np.sort(rng.uniform(0, 10, 15)), rng.uniform(0.5, 2.0, 15), np.repeat(np.arange(5), 3)
+    y = rng.normal(size=15)
+    for base in ("constant", "line"):
+        scanner = Scanner(t, u, base, day)
+        plain, best = scanner._deviances((scanner.root * y)[:, np.newaxis])
+        fixed = np.column_stack([np.ones(15), t] if base == "line" else [np.ones(15)])
+        gains = []
+        for prepared in scanner.prepared:
+            colour = prepared.shape.colour(np.eye(15)) / scanner.root[:, np.newaxis]
+            v = np.linalg.inv(colour @ colour.T)
+
+            def deviance(design, v=v, base=fixed.shape[1]):
+                # The candidate's coefficient in units of the scatter: the power of the base alone.
+                p = v - v @ design @ np.linalg.inv(design.T @ v @ design) @ design.T @ v
+                logdet = np.linalg.slogdet(design.T @ v @ design)[1] - np.linalg.slogdet(v)[1]
+                return (15 - base) * np.log(y @ p @ y) + logdet
+
+            candidates = [deviance(np.column_stack([fixed, c])) for c in scanner.columns.T]
+            gains.append(deviance(fixed) - min(candidates))
+        # Up to the scales of the columns, which are constants of the plan.
+        apart = (plain - best)[:, 0] - np.array(gains)
+        assert apart == pytest.approx(np.full(len(gains), apart[0]), abs=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -64,6 +119,9 @@ def test_five_days_reset_of_the_b_axis_is_found_and_nothing_else_flagged(seed):
     assert day[change.index - 1 : change.index + 1].tolist() == [3.0, 4.0]
     assert change.interval == (hours[11], hours[12])
     assert change.p_value < 0.05 / 13
+    with_days = find_changes(parameters, hours, days=day, rng=np.random.default_rng(seed))
+    assert [(c.parameter, c.index) for c in with_days.changes] == [("EB0C", change.index)]
+    assert with_days.trends == ()
 
 
 def test_hot_cold_warms_up_and_is_not_taken_for_steps():
@@ -76,7 +134,7 @@ def test_hot_cold_warms_up_and_is_not_taken_for_steps():
 def test_a_step_is_a_step_and_a_drift_a_trend():
     rng = np.random.default_rng(4)
     steps = drifts = 0
-    for _ in range(60):
+    for _ in range(40):
         noise = rng.normal(size=(2, 40))
         values = {"step": noise[0] + 4.0 * (np.arange(40) >= 25), "drift": noise[1] + 0.15 * np.arange(40)}
         history = find_changes(values, np.arange(40), rng=rng, trials=399)
@@ -85,8 +143,8 @@ def test_a_step_is_a_step_and_a_drift_a_trend():
         assert not any(
             t.parameter == "step" and t.kind == "trend" and t.index == 0 for t in history.trends[:1]
         )
-    assert steps >= 57
-    assert drifts >= 51
+    assert steps >= 38
+    assert drifts >= 34
 
 
 def test_a_change_of_slope_is_found_with_its_size():
@@ -102,17 +160,31 @@ def test_a_change_of_slope_is_found_with_its_size():
 def test_interval_for_when_covers(rate_agrees):
     rng = np.random.default_rng(7)
     trials = inside = 0
-    for _ in range(120):
+    for _ in range(80):
         y = rng.normal(size=44) + 2.5 * (np.arange(44) >= 20)
         found = [
-            c for c in find_changes({"a": y}, np.arange(44), rng=rng, trials=399).changes if c.kind == "step"
+            c for c in find_changes({"a": y}, np.arange(44), rng=rng, trials=199).changes if c.kind == "step"
         ]
         if found:
             nearest = min(found, key=lambda c: abs(c.index - 20))
             trials += 1
             inside += nearest.interval[0] <= 19 and nearest.interval[1] >= 20
-    assert trials > 114
+    assert trials > 76
     assert inside / trials > 0.93  # nominal 0.95; whole runs make it conservative
+
+
+def test_the_unit_of_the_values_and_the_origin_of_the_times_change_nothing():
+    hours, day, parameters = campaign("five-days")
+    plain, other = (
+        find_changes(
+            {name: parameters[name] * unit for name in ("EB0C", "EXX")}, hours / scale + origin, days=day,
+            rng=np.random.default_rng(1), trials=999,
+        )
+        for unit, scale, origin in ((1.0, 1.0, 0.0), (1e-6, 24.0, 20000.0))
+    )  # fmt: skip
+    assert [(c.index, c.p_value) for c in plain.changes] == [(c.index, c.p_value) for c in other.changes]
+    assert plain.changes[0].size == pytest.approx(other.changes[0].size * 1e6, rel=1e-6)
+    assert plain.changes[0].u == pytest.approx(other.changes[0].u * 1e6, rel=1e-6)
 
 
 def test_known_events_split_the_history_and_are_no_findings():

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from monitor.exceptions import CampaignError, DataError, NotFoundError
-from monitor.records import Campaign, Probings, Run
+from monitor.records import Campaign, Machine, Probings, Run
 from monitor.store import (
     Database,
     import_campaign,
@@ -26,6 +26,7 @@ from monitor.store.probings import as_record, printed
 from monitor.units import DEGREE
 
 Make = Callable[..., Campaign]
+TURNING = Machine("M", "w B b X (C1) t")
 
 
 def _assert_same_arrays(one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]) -> None:
@@ -97,9 +98,9 @@ def test_any_printed_degree_returns_to_the_last_digit(digits: int, decimals: int
     degrees = float(f"{digits}e-{decimals}")
     radians = np.array([degrees * DEGREE.factor])
     one = np.array([1])
-    rows = printed(Probings(one, one, np.zeros(1), np.array(["S1"]), {"B": radians}))
+    rows = printed(Probings(one, one, np.zeros(1), np.array(["S1"]), {"B": radians}), TURNING)
     assert rows.readings["B"][0] * DEGREE.factor == radians[0]
-    np.testing.assert_array_equal(as_record(rows).readings["B"], radians)
+    np.testing.assert_array_equal(as_record(rows, TURNING).readings["B"], radians)
     # A shorter number that gives the same radians may stand for it: then both are the same to a double.
     assert abs(rows.readings["B"][0] - degrees) <= np.spacing(abs(degrees))
 
@@ -107,8 +108,8 @@ def test_any_printed_degree_returns_to_the_last_digit(digits: int, decimals: int
 def test_reading_that_no_degree_gives_is_kept_to_one_unit_of_the_last_place() -> None:
     radians = np.random.default_rng(3).uniform(-7, 7, 2000)
     count = np.arange(len(radians))
-    rows = printed(Probings(count, count, radians, np.array(["S1"] * len(radians)), {"C1": radians}))
-    assert np.all(np.abs(as_record(rows).readings["C1"] - radians) <= np.spacing(np.abs(radians)))
+    rows = printed(Probings(count, count, radians, np.array(["S1"] * len(radians)), {"C1": radians}), TURNING)
+    assert np.all(np.abs(as_record(rows, TURNING).readings["C1"] - radians) <= np.spacing(np.abs(radians)))
 
 
 def test_every_file_is_kept_byte_for_byte_and_hashed(db: Database, campaign: Campaign) -> None:

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import threading
 from dataclasses import replace
 from functools import partial
 
@@ -19,18 +20,10 @@ from monitor.uncertainty import (
     run_estimator,
     uncorrelated,
 )
-from monitor.uncertainty.cluster import (
-    MOST_DEATHS,
-    NumberedBlocks,
-    RunTask,
-    WorkerLostError,
-    cluster,
-    in_order,
-    map_in_order,
-    monte_carlo_of_runs,
-    processes,
-    spread,
-)
+from monitor.uncertainty.cluster import cluster
+from monitor.uncertainty.engine import MOST_DEATHS, WorkerLostError, in_order, map_in_order
+from monitor.uncertainty.processes import processes
+from monitor.uncertainty.spread import NumberedBlocks, RunTask, monte_carlo_of_runs, spread
 
 TRIALS = 80_000
 NAMES = ("EC0Y", "EXX", "EYY", "EZZ")
@@ -126,6 +119,35 @@ def test_jcgm102_7_2_same_bits_on_a_dask_cluster_of_which_one_worker_is_killed_i
 def test_runs_on_processes_come_back_in_their_order():
     with processes(2) as engine:
         assert map_in_order(engine, abs, range(-20, 0)) == list(range(20, 0, -1))
+
+
+# What a process does that is killed while it writes: half of an answer stays in its connection.
+KILLED_WHILE_ANSWERING = """
+import gc, os, signal
+from multiprocessing.connection import Connection
+mine = next(one for one in gc.get_objects() if isinstance(one, Connection) and not one.closed)
+os.write(mine.fileno(), bytes([0, 0, 255, 255]) + bytes(1000))
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_worker_killed_in_the_middle_of_its_answer_is_noticed():
+    with processes(2) as engine:
+        before = engine.process_ids
+        with pytest.raises(RefusedResultError, match="5 workers died one after the other"):
+            list(in_order(engine, exec, [(KILLED_WHILE_ANSWERING,)]))
+        assert engine.process_ids != before
+        assert map_in_order(engine, abs, [-1, -2, -3]) == [1, 2, 3]
+
+
+def test_what_a_task_raises_is_not_taken_for_a_lost_worker():
+    with processes(1) as engine, pytest.raises(EOFError, match="of the task"):
+        list(in_order(engine, exec, [("raise EOFError('of the task')",)]))
+
+
+def test_an_answer_that_cannot_be_sent_is_said_so():
+    with processes(1) as engine, pytest.raises(RuntimeError, match="the answer of a worker cannot be sent"):
+        list(in_order(engine, threading.Lock, [()]))
 
 
 class _Deadly:

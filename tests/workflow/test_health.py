@@ -26,8 +26,9 @@ from monitor.reporting.health_render import health_html, health_pdf
 from monitor.reporting.health_words import in_words
 from monitor.store import Database, import_campaign, record_event
 from monitor.workflow.health import report, stored_health
-from monitor.workflow.health_history import FALSE_ALARM, Series, changes_of, drift_of
 from monitor.workflow.health_machine import Settings
+from monitor.workflow.health_series import FALSE_ALARM, Series, changes_of, drift_of
+from monitor.workflow.uncertainty import uncertainty
 from monitor.workflow.volumetric import volumetric_map
 from monitor.workflow.weeks import week_before, week_named
 
@@ -139,7 +140,7 @@ def test_a_page_has_every_parameter_with_tolerance_uncertainty_and_history(
         assert all(one.history.this_week)
         assert (one.probability_out is not None) == (one.name in WIDE)
     assert found.model is not None
-    assert found.model.runs.startswith("all ")
+    assert found.model.runs.startswith("all 16 runs ")
     assert found.model.lack_of_fit_p is not None
     assert found.quality.probings == 16 * 62
     assert found.conditions[0].name == "ambient"
@@ -367,11 +368,46 @@ def test_a_map_of_a_run_after_the_week_is_left_out_and_the_comparison_says_its_r
     assert health.map is not None
     assert health.map.run < 17
     assert health.model is not None
-    assert health.model.runs == "all 20 runs of campaign campaign-B-stepped, 2026-03-02 to 2026-03-09"
+    assert health.model.runs == (
+        "all 16 runs of campaign campaign-B-stepped until the end of the week, 2026-03-02 to 2026-03-05; "
+        "4 later left out"
+    )
     assert health.model.runs in Path(found["files"][0]).read_text(encoding="utf-8")
     assert "run 20" not in text_of(found["files"][1])[1]
     later = report(fleet, "2026-W11", "B-stepped", tmp_path, made_at=MADE)
     assert "Volumetric error, run 20" in text_of(later["files"][1])[1]
+
+
+def test_a_report_made_late_says_what_one_made_on_monday_said(
+    week10: dict, fleet: Database, tmp_path: Path, make_folder: Callable[..., Path]
+) -> None:
+    # The same campaign cut off at the week's end: runs 17 to 20 were not yet made.
+    folder = make_folder("five-days", "B-stepped", WIDE)
+    for name in ("runs.csv", "probings.csv"):
+        head, *lines = (folder / name).read_text(encoding="utf-8").splitlines(keepends=True)
+        kept = [line for line in lines if int(line.split(",")[0]) <= 16]
+        (folder / name).write_text("".join([head, *kept]), encoding="utf-8")
+    with Database(tmp_path / "monday.duckdb", threads=1) as db:
+        import_campaign(db, read_campaign(folder))
+        record_event(
+            db, "B-stepped", datetime.fromisoformat("2026-03-04T18:00:00-05:00"), "repair", "C axis brake changed"
+        )  # fmt: skip
+        report(db, "2026-W10", out=tmp_path, made_at=MADE)
+        then = stored(db, "B-stepped")
+    report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
+    late = stored(fleet, "B-stepped")
+    assert [one.u for one in late.parameters] == pytest.approx([one.u for one in then.parameters], rel=1e-9)
+    assert late.factor == then.factor
+    assert late.basis == then.basis == "repeated runs, pooled by day, 12 degrees of freedom"
+    assert late.model is not None
+    assert then.model is not None
+    assert late.model.rms_um == pytest.approx(then.model.rms_um, rel=1e-9)
+    assert late.model.lack_of_fit_p == pytest.approx(then.model.lack_of_fit_p, rel=1e-6)
+    # The whole campaign's own result is another, and is left alone.
+    whole = uncertainty(fleet, "campaign-B-stepped", 16, method="guf")
+    assert whole["input_covariance"] == "repeated runs, pooled by day, 15 degrees of freedom"
+    report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
+    assert stored(fleet, "B-stepped").basis == then.basis
 
 
 def test_machines_outside_the_chosen_campaigns_are_left_out(

@@ -1,0 +1,110 @@
+"""Since when are the parameters of a machine others? The one search behind `monitor trend` and the health report.
+
+Both ask with their own probability of a false alarm; what is searched, and how it is weighed, is the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import ceil
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.statistics import Change, History, find_changes
+
+#: From so many days on, changes are sought in the means of the days, which hide no day component.
+DAYS_FOR_MEANS = 15
+#: Uncertainties that differ by less than this factor weigh runs alike (it costs less than 1 % of the precision).
+ALIKE = 1.25
+#: Trials of the simulated null distribution at least; more where the level asks for it.
+TRIALS = 1999
+
+
+class Recorded(Protocol):
+    """One parameter in the order of time: ``values``, ``u`` and ``t`` (n,), and ``days`` (n,), labels of the days."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def values(self) -> Array: ...
+
+    @property
+    def u(self) -> Array: ...
+
+    @property
+    def t(self) -> Array: ...
+
+    @property
+    def days(self) -> npt.NDArray[np.str_]: ...
+
+
+def weights_of(series: Recorded) -> Array | None:
+    """The uncertainties of the runs, None where a run has none (then all count alike)."""
+    return series.u if bool(np.isfinite(series.u).all() and (series.u > 0.0).all()) else None
+
+
+def day_means(series: Recorded) -> tuple[Array, Array, Array | None, Array]:
+    """Times, means and uncertainties of the means by day, in order of time, and when each day's first run was.
+
+    The uncertainties are None where the days weigh alike.
+    """
+    labels, first, index = np.unique(series.days, return_index=True, return_inverse=True)
+    weight = 1.0 / series.u**2 if weights_of(series) is not None else np.ones_like(series.values)
+    total = np.bincount(index, weight)
+    order = np.argsort(first, kind="stable")
+    t, y = (np.bincount(index, weight * x) / total for x in (series.t, series.values))
+    u = 1.0 / np.sqrt(total)
+    assert len(labels) == len(total)
+    return t[order], y[order], u[order] if u.max() > ALIKE * u.min() else None, series.t[first[order]]
+
+
+def search_changes(
+    every: Sequence[Recorded], events: Sequence[float], *, false_alarm: float, seed: int
+) -> Mapping[str, tuple[History | None, str | None]]:
+    """Steps, bends and transients of each parameter; or why none were sought.
+
+    ``events`` are times of known changes, in the unit of ``t``. Parameters measured at the same times share one
+    search, and with it the simulated null distribution. Which search a parameter is in does not change its
+    share of ``false_alarm``, the probability of any finding where there is nothing to find. The ``at`` of a
+    change is the start of its run, or of the first run of its day.
+    """
+    searches: dict[tuple[bytes, bytes], tuple[Array, Array, Array | None, dict[str, Array]]] = {}
+    for series in every:
+        if len(np.unique(series.days)) >= DAYS_FOR_MEANS:
+            t, y, u, begins = day_means(series)
+        else:
+            t, y, begins, u = series.t, series.values, series.t, weights_of(series)
+            u = u if u is not None and u.max() > ALIKE * u.min() else None
+        key = (t.tobytes(), b"" if u is None else u.tobytes())
+        searches.setdefault(key, (t, begins, u, {}))[3][series.name] = y
+    found: dict[str, tuple[History | None, str | None]] = {}
+    for t, begins, u, values in searches.values():
+        pieces = len({0, *np.searchsorted(t, np.asarray(events, dtype=np.float64)).tolist()} - {len(t)})
+        try:
+            history = find_changes(
+                values, t, rng=np.random.default_rng([seed, len(t)]), events=sorted(events),
+                u=None if u is None else dict.fromkeys(values, u),
+                false_alarm=false_alarm * len(values) / len(every),
+                # Twice as many trials as the level of one parameter in one piece needs at least.
+                trials=max(TRIALS, ceil(2 * len(every) * pieces / false_alarm)),
+            )  # fmt: skip
+        except DataError as error:
+            found |= dict.fromkeys(values, (None, f"no search for changes: {error}"))
+            continue
+        for name in values:
+            changes, trends = (
+                tuple(_at_first_run(one, begins) for one in part if one.parameter == name)
+                for part in (history.changes, history.trends)
+            )
+            found[name] = (replace(history, changes=changes, trends=trends), None)
+    return found
+
+
+def _at_first_run(one: Change, begins: Array) -> Change:
+    return replace(one, at=float(begins[one.index]))
