@@ -67,7 +67,7 @@ def printed_map(found: VolumetricResult, texts: Texts) -> PrintedMap:
 def place_words(place: Place, texts: Texts) -> str:
     """A place of the machine: ``X −178.9 mm, B −90.0°``."""
     return ", ".join(
-        f"{axis} {_tenths(reading, texts)}{'' if unit == '°' else chr(0xA0)}{unit}"
+        f"{axis}\N{NO-BREAK SPACE}{_tenths(reading, texts)}{'' if unit == '°' else chr(0xA0)}{unit}"
         for axis, reading, unit in place
     )
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -48,7 +49,7 @@ def volumetric_slices(
     """Three slices through the middle of a regular grid of points (n, 3), one across each axis.
 
     ``vectors_um`` (n, 3) is the error along the machine's axes, ``expanded_um`` (n,) the expanded uncertainty of its
-    length. Colour is the length of the error (only grey for a ``grey`` figure), arrows are its part in the slice. The
+    length. Colour is the length of the error (grey bands in a ``grey`` figure), arrows are its part in the slice. The
     words are those of ``texts``, English without.
     """
     places = np.asarray(readings_mm, dtype=np.float64)
@@ -70,7 +71,8 @@ def volumetric_slices(
     longest = float(lengths.max())
     scale = Normalize(0.0, longest if longest > 0.0 else 1.0)
     say = texts or texts_of()
-    look = _Look(_GREYS if grey else _LENGTHS, scale, say)
+    bands = np.asarray(MaxNLocator(8).tick_values(0.0, float(scale.vmax or 1.0))) if grey else None
+    look = _Look(_GREYS if grey else _LENGTHS, scale, say, bands)
     with style():
         figure = new_figure(PAGE_WIDTH_MM, 86.0 if title else 62.0, title)
         panels = figure.subplots(1, 3)
@@ -87,11 +89,16 @@ def volumetric_slices(
 
 @dataclass(frozen=True)
 class _Look:
-    """What all slices share: the colours of a length, their scale, the words."""
+    """What all slices share: the colours of a length, their scale, the words.
+
+    With ``bands`` lengths are drawn as areas between these: lines and areas only, since a picture smoothed by the
+    reader (``/Interpolate``) has no place in PDF/A (ISO 19005-3:2012, 6.2.8).
+    """
 
     colours: LinearSegmentedColormap
     scale: Normalize
     say: Texts
+    bands: Array | None
 
 
 def _slice(
@@ -110,9 +117,12 @@ def _slice(
     flat = np.take(lengths, middle, axis=across)
     part = np.take(cube, middle, axis=across)
     sure = np.take(spread, middle, axis=across)
-    axes.pcolormesh(
-        first, second, flat.T, cmap=look.colours, norm=look.scale, shading="gouraud", rasterized=True
-    )
+    if look.bands is not None:
+        axes.contourf(first, second, flat.T, levels=look.bands, cmap=look.colours)
+    else:
+        axes.pcolormesh(
+            first, second, flat.T, cmap=look.colours, norm=look.scale, shading="gouraud", rasterized=True
+        )
     x, y = np.meshgrid(first, second, indexing="ij")
     longest = float(np.abs(np.linalg.norm(cube, axis=-1)).max())
     length = 0.16 * max(np.ptp(first), np.ptp(second)) / (longest if longest > 0.0 else 1.0)

@@ -188,20 +188,20 @@ def _inputs(found: Evaluated, monte_carlo: StoredMonteCarlo | None) -> Document:
 
 
 def amend(
-    db: Database, number: str, laboratory: Path, reason: str, *, campaign: str | None = None,
+    db: Database, replaces: str, laboratory: Path, reason: str, *, campaign: str | None = None,
     run: int | None = None, **options: Any,
 ) -> Document:  # fmt: skip
     """Issue a new certificate that replaces another, of the same run unless ``campaign`` and ``run`` are given.
 
     ``options`` are those of ``issue``. Raises what ``issue`` raises.
     """
-    old = load_certificate(db, number)
+    old = load_certificate(db, replaces)
     return issue(
         db,
         campaign or old.campaign,
         old.runs[0] if run is None else run,
         laboratory,
-        replaces=number,
+        replaces=replaces,
         reason=reason,
         **options,
     )
