@@ -38,6 +38,7 @@ def add_issuing(parser: ArgumentParser) -> None:
         help="state conformity with the machine's tolerances by this rule",
     )
     parser.add_argument("--map", action="store_true", help="state the volumetric error too, with its figure")
+    add_fonts(parser)
     signing = parser.add_argument_group("signature (extra [sign]; for a token, extra [token])")
     signing.add_argument("--sign", type=Path, metavar="P12", help="sign with the key of a PKCS#12 file")
     signing.add_argument(
@@ -61,6 +62,14 @@ def add_issuing(parser: ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def add_fonts(parser: ArgumentParser) -> None:
+    """The option for letters that our own fonts lack."""
+    parser.add_argument(
+        "--font", type=Path, action="append", default=[], metavar="FILE",
+        help="a TrueType or OpenType font for letters that DejaVu Sans lacks, such as Chinese; may be repeated",
+    )  # fmt: skip
+
+
 def issuing(options: Namespace) -> dict[str, Any]:
     """The options as ``certificates.issue`` and ``certificates.amend`` take them. Raises InputError."""
     return {
@@ -71,6 +80,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "method": options.method,
         "conformity": options.conformity,
         "with_map": options.map,
+        "fonts": tuple(options.font),
         "key": _key(options),
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from monitor.store import (
     load_certificate,
     verify_audit,
 )
-from monitor.workflow.certificate_files import path_of, write_file
+from monitor.workflow.certificate_files import font_hashes, path_of, write_file
 
 Document = dict[str, Any]
 #: The identifier that a certificate's file bears, its number (ISO 32000-2:2020, 14.4).
@@ -51,15 +52,21 @@ def show(db: Database, number: str | None = None) -> Document:
     return {"certificates": [summary(db, str(one)) for one in list_certificates(db)["number"]]}
 
 
-def remake(db: Database, number: str, path: Path | None = None) -> Document:
+def remake(db: Database, number: str, path: Path | None = None, fonts: Sequence[Path] = ()) -> Document:
     """Make a certificate again from its stored record and compare it, byte for byte, with the stored document.
 
     A signature is no part of what can be made again: it is appended to the document, which has to lie unchanged
-    below it. ``path`` is a folder or a file for the document that was made again. Raises NotFoundError.
+    below it. ``path`` is a folder or a file for the document that was made again. ``fonts`` are those that it was
+    made with besides ours. Raises NotFoundError, InputError where the fonts are others.
     """
     stored = load_certificate(db, number)
     record = from_document(CertificateRecord, stored.record)
-    pdf = certificate_pdf(record, inputs=stored.record.get("inputs"))
+    inputs = stored.record.get("inputs") or {}
+    wanted = inputs.get("fonts", [])
+    if [one["sha256"] for one in font_hashes(fonts)] != [one["sha256"] for one in wanted]:
+        named = ", ".join(f"{one['name']} (SHA-256 {one['sha256']})" for one in wanted) or "no font but ours"
+        raise InputError(f"certificate {number} was made with {named}: give the same by --font")
+    pdf = certificate_pdf(record, fonts, inputs)
     signed = is_signed(stored.pdf)
     same = stored.pdf.startswith(pdf) if signed else stored.pdf == pdf
     found = {**summary(db, number), "identical": same, "signed": signed, "file": None}

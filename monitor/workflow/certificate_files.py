@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from monitor.exceptions import InputError
@@ -16,6 +17,14 @@ def path_of(out: Path | None, number: str) -> Path:
     if out is None:
         return Path(name)
     return out if out.suffix.lower() == ".pdf" else out / name
+
+
+def font_hashes(fonts: Sequence[Path]) -> list[dict[str, str]]:
+    """Name and SHA-256 of fonts that are not ours: they are too large to be kept with every certificate."""
+    try:
+        return [{"name": one.name, "sha256": hashlib.sha256(one.read_bytes()).hexdigest()} for one in fonts]
+    except OSError as error:
+        raise InputError(f"the font {error.filename} cannot be read: {error.strerror or error}") from error
 
 
 def keep_issued(db: Database, path: Path) -> None:

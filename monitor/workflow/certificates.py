@@ -27,7 +27,7 @@ from monitor.store import (
     save_certificate,
 )
 from monitor.workflow.certificate_checks import summary
-from monitor.workflow.certificate_files import keep_issued, path_of, prepared, publish
+from monitor.workflow.certificate_files import font_hashes, keep_issued, path_of, prepared, publish
 from monitor.workflow.certificate_map import volumetric_result
 from monitor.workflow.certificate_results import StoredMonteCarlo, results_of, stored_monte_carlo
 from monitor.workflow.conformity import statement_of
@@ -42,7 +42,8 @@ class Wishes:
     """What a certificate states besides the results, and how it is closed.
 
     ``method``: guf, or mcm for the stored Monte Carlo result. ``conformity`` names a decision rule; its statement
-    replaces the laboratory's word on conformity. ``with_map`` adds the volumetric error. ``key`` signs it.
+    replaces the laboratory's word on conformity. ``with_map`` adds the volumetric error. ``key`` signs it. ``fonts``
+    are files with letters that DejaVu Sans lacks.
     ``replaces`` is the number of the certificate that this one amends, for a ``reason``: it says so on paper
     (ISO/IEC 17025:2017, 7.8.8.3), and the old one is marked with it.
     """
@@ -53,6 +54,7 @@ class Wishes:
     conformity: str | None = None
     with_map: bool = False
     key: Key | None = None
+    fonts: tuple[Path, ...] = ()
     replaces: str | None = None
     reason: str = ""
 
@@ -95,8 +97,8 @@ def issue(
     monte_carlo = stored_monte_carlo(db, found)
     record = _record(stated, found, monte_carlo, wanted, number=chosen, issued_on=day)
     record = dataclasses.replace(record, replaces=replaced)
-    inputs = _inputs(found, monte_carlo)
-    pdf = certificate_pdf(record, inputs=inputs)
+    inputs = {**_inputs(found, monte_carlo), "fonts": font_hashes(wanted.fonts)}
+    pdf = certificate_pdf(record, wanted.fonts, inputs)
     if wanted.key is not None:
         pdf = sign(pdf, wanted.key)
     # The file is whole on the disk before the entry is, and gets its name after it: whenever this is killed, no file

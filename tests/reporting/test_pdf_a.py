@@ -144,7 +144,7 @@ def preflight(file: Path) -> Counter[str]:
     path = ":".join(str(JAVA / f"{jar}.jar") for jar in JARS)
     command = ["java", "-cp", path, "org.apache.pdfbox.preflight.Validator_A1b", str(file)]
     said = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert f"{file} is not a valid PDF/A-1b file" in said.stdout or "is a valid" in said.stdout, said.stderr
+    assert f"The file {file.name} is not a valid PDF/A-1b file" in said.stdout, said.stdout + said.stderr
     return Counter(re.findall(r"^([\d.]+) : ", said.stdout, re.MULTILINE))
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-import numpy as np
 import pypdf
 import pytest
 
@@ -85,17 +84,6 @@ def test_signing_keeps_pdf_a_and_attachments(plain: bytes, signed: bytes) -> Non
     for name in ("/Metadata", "/OutputIntents", "/MarkInfo"):
         assert name in after.root_object
     assert 'pdfaid:part="3"' in after.root_object["/Metadata"].get_object().get_data().decode("utf-8")
-
-
-def test_one_altered_byte_at_200_random_places_is_seen(signed: bytes) -> None:
-    rng = np.random.default_rng(200)
-    unseen = []
-    for place in rng.integers(0, len(signed), 200):
-        altered = bytearray(signed)
-        altered[place] ^= 1 << int(rng.integers(0, 8))
-        if check_signature(bytes(altered)).good is True:
-            unseen.append(int(place))
-    assert unseen == []
 
 
 def test_an_altered_attachment_is_seen_and_named_as_altered(plain: bytes, signed: bytes) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from monitor.cli import output
 from monitor.cli.database import opened
-from monitor.cli.issuing import add_issuing, issuing
+from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, told
 from monitor.exceptions import InputError
 from monitor.workflow import certificate_checks, certificates
@@ -43,6 +43,7 @@ def options(parser: ArgumentParser) -> None:
         "--pdf", type=Path, metavar="PATH",
         help="write the document as it was issued (a folder, or a file ending in .pdf)",
     )  # fmt: skip
+    add_fonts(shown)
     shown.set_defaults(run=_show)
     verified = verbs.add_parser(
         "verify",
@@ -138,7 +139,7 @@ def _show(options: Namespace) -> int:
 
 def _remake(options: Namespace) -> int:
     with opened(options) as db, output.working("making it again"):
-        found = certificate_checks.remake(db, options.number, options.remake)
+        found = certificate_checks.remake(db, options.number, options.remake, options.font)
     if options.json:
         output.document(found)
     else:
