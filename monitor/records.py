@@ -130,12 +130,88 @@ class ScaleBar:
 
 
 @dataclass(frozen=True)
+class KnownError:
+    """An error that was measured by other means: ``EXX(110)``, its value and standard uncertainty in mm."""
+
+    parameter: str
+    value: float
+    standard_uncertainty: float
+    certificate: str
+
+
+@dataclass(frozen=True)
+class SelfCalibration:
+    """How the errors of a self-calibration are tabulated, and what fixes the frame that no reading fixes.
+
+    ``nodes`` maps a linear axis to the readings in mm at which its errors are unknowns. ``conditions`` are the
+    boundary conditions, each a parameter that is zero by choice (``EYX(0)``) or a word of the method; empty
+    means the method's own. ``length`` is the one error that has to be known, for the unit of length.
+    """
+
+    nodes: Mapping[str, tuple[float, ...]]
+    length: KnownError
+    conditions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reflector:
+    """A reflector that a tracker looks at: on the tool, or ``fixed`` beside the machine."""
+
+    id: str
+    fixed: bool = False
+
+
+@dataclass(frozen=True)
+class Module:
+    """A module of an L-shaped piece: calibrated ``centre`` (2,) mm and ``tilt`` (2,) rad along the arms."""
+
+    id: str
+    centre: tuple[float, float]
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How the piece lies: its arms along the two axes of ``plane``; ``corner`` (3,) mm are the readings of X, Y and Z
+    with which the sensor stands over the first module."""
+
+    plane: str
+    corner: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LShape:
+    """An L-shaped standard piece and the optics that it is scanned with.
+
+    ``focal_length`` of the autocollimator and ``paraboloid``, the radius of curvature at the vertex of the modules'
+    paraboloids, in mm; standard uncertainties of the modules' calibration in mm and rad. The module whose centre is
+    nearest to the piece's origin is the ``reference`` to which the others were calibrated.
+    """
+
+    focal_length: float
+    paraboloid: float
+    place_uncertainty: float
+    tilt_uncertainty: float
+    modules: tuple[Module, ...]
+    placements: tuple[Placement, ...]
+
+    @property
+    def reference(self) -> int:
+        """Place of the reference module."""
+        return min(range(len(self.modules)), key=lambda place: sum(c**2 for c in self.modules[place].centre))
+
+
+@dataclass(frozen=True)
 class Artefact:
-    """The balls, and the scale bar where the method needs one."""
+    """The balls; the scale bar where the method needs one; the reflectors where the file lists them; the tables and
+    conditions of a self-calibration."""
 
     id: str
     balls: tuple[Ball, ...]
     scale_bar: ScaleBar | None = None
+    reflectors: tuple[Reflector, ...] = ()
+    l_shape: LShape | None = None
+    self_calibration: SelfCalibration | None = None
 
 
 @dataclass(frozen=True)
@@ -205,3 +281,47 @@ class Campaign:
     runs: tuple[Run, ...]
     probings: Probings
     files: tuple[SourceFile, ...] = ()
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What a curve belongs to: a load cell, a resistor, a thermometer."""
+
+    id: str
+    manufacturer: str | None = None
+    model: str | None = None
+    serial_number: str | None = None
+    location: str | None = None
+
+
+@dataclass(frozen=True)
+class CurveCampaign:
+    """One response measured at many values of its inputs, row by row in file order (n rows).
+
+    ``columns`` are the numbers (n,) by name, the response among them, each in the unit of ``units`` ("" where
+    nothing says one); a column of dates holds days since its first. ``groups`` are labels (n,) by name. ``base``
+    is the one-line model; ``time`` the column that says when a row was measured, None where the order of the
+    rows is all there is; ``lines`` (n,) the line of each row in the file. ``standard_uncertainty`` is that of one
+    response as stated, in its unit.
+    """
+
+    name: str
+    method: str
+    instrument: Instrument
+    response: str
+    base: str
+    columns: Mapping[str, Array]
+    groups: Mapping[str, npt.NDArray[np.str_]]
+    units: Mapping[str, str]
+    time: str | None
+    lines: npt.NDArray[np.int64]
+    standard_uncertainty: float | None = None
+    files: tuple[SourceFile, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def measured(self) -> Array:
+        """The response (n,)."""
+        return self.columns[self.response]

@@ -25,6 +25,8 @@ LACK_OF_FIT_LEVEL = 1e-3
 # A standard uncertainty from ten observations is itself known to 24 % (JCGM 100:2008, table E.1), and few probes
 # were tested with more; what exceeds the statement by less than that is no finding.
 STATEMENT_TOLERANCE = 1.25
+# Poses beyond this number are no indexations that somebody would read one by one.
+MOST_INDEXATIONS = 200
 EXPLAINED, SOMETHING_IS_MISSING = "explained", "something is missing"
 
 
@@ -129,7 +131,7 @@ def _breakdown(fit: Fit) -> dict[str, dict[str, Part]]:
         "run": by(context.run.astype(str)),
         "time_in_run": by(halves),
     }
-    if turning:
+    if turning and len(np.unique(angles)) <= MOST_INDEXATIONS:
         found["indexation"] = by(angles)
     return found
 

@@ -18,21 +18,24 @@ from monitor.discovery.anomalies import BadPoint, BallMove
 from monitor.discovery.compare import SOMETHING_IS_MISSING, Comparison, compare
 from monitor.discovery.evidence import p_value_against_runs
 from monitor.discovery.fit import Fit, fit
-from monitor.discovery.held_out import held_out_rms
+from monitor.discovery.gears import gear_variants
+from monitor.discovery.held_out import held_out_error
 from monitor.discovery.missing import Missing, Surroundings, tell
 from monitor.discovery.refine import refine, refine_all
-from monitor.discovery.scan import scan
+from monitor.discovery.scan import ScanResult, scan
 from monitor.discovery.steps import Step, find_steps
 from monitor.discovery.suspects import Suspects, find_suspects, with_effects
 from monitor.discovery.variants import cycles_of_unknown_pitch, variants_of, with_drivers
 from monitor.discovery.varying import tell_varying
-from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Visible, see
+from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Variant, Visible, see
 from monitor.effects.catalogue import catalogue, drivers_of
 from monitor.methods.problem import ChainProblem
 from monitor.records import Campaign
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is told as it is.
 MOST_ROUNDS = 6
+# More orders of gears than this are noise that no order explains.
+MOST_GEARS = 12
 
 
 @dataclass(frozen=True)
@@ -84,21 +87,14 @@ def explain(
         name: axis.scale_pitch for name, axis in campaign.machine.axes.items() if axis.scale_pitch is not None
     }
     known = [effect.text for effect in (*problem.base, *problem.added)]
-    effects = catalogue(problem.context.chain, known, drivers, pitches)
+    effects = catalogue(problem.context.chain, known, drivers, pitches, problem.method_effects(drivers))
     variants = [variant for effect in effects for variant in variants_of(effect)]
     variants += cycles_of_unknown_pitch(problem.context.chain)
     suspects = Suspects()
     for _ in range(MOST_ROUNDS):
         out, own = suspects.left_out(problem), suspects.effects(problem)
         now = fit(with_effects(problem, own), out, first) if suspects.any else first
-        visible = see(now, variants)
-        result = scan(
-            visible,
-            rate=rate,
-            more=partial(_driven, now, drivers),
-            accept=partial(_stands, visible, runs, rate),
-            best_value=partial(_at_best, now, visible),
-        )
+        visible, result = _scanned(now, variants, drivers, runs, rate)
         refined = refine_all(now, visible, result)
         chosen = [one.candidate.variant.effect for one in refined]
         under = fit(with_effects(problem, [*own, *chosen]), out, now) if chosen else now
@@ -141,6 +137,28 @@ def explain(
     )
 
 
+def _scanned(
+    now: Fit, variants: Sequence[Variant], drivers: Sequence[str], runs: npt.NDArray[np.int64], rate: float
+) -> tuple[Visible, ScanResult]:
+    """The scan of a fit; where gears stand out of what it leaves, once more with them."""
+    gears: list[Variant] = []
+    while True:
+        visible = see(now, [*variants, *gears])
+        result = scan(
+            visible,
+            rate=rate,
+            more=partial(_driven, now, drivers),
+            accept=partial(_stands, now, visible, runs, rate),
+            best_value=partial(_at_best, now, visible),
+        )
+        known = {one.effect.text for one in gears}
+        found = gear_variants(now, visible, [one.candidate for one in result.findings], rate)
+        new = [one for one in found if one.effect.text not in known]
+        if not new or len(gears) > MOST_GEARS:
+            return visible, result
+        gears += new
+
+
 def _driven(now: Fit, drivers: Sequence[str], found: Candidate) -> Sequence[Candidate]:
     """What was found with each driver, or without its own: candidates to compare it with."""
     return see(now, with_drivers(found.variant.effect, drivers)).candidates
@@ -151,6 +169,7 @@ def _at_best(now: Fit, visible: Visible, chosen: Sequence[Candidate], place: int
 
 
 def _stands(
+    now: Fit,
     visible: Visible,
     runs: npt.NDArray[np.int64],
     rate: float,
@@ -158,13 +177,12 @@ def _stands(
     found: Candidate,
 ) -> bool:
     """Whether an effect stands out from how its size scatters from run to run, and lowers the error on runs that
-    took no part in its fit (true where there is one run)."""
+    took no part in its fit (blocks of poses where there is one run; true where it has few)."""
     families = len({one.family for one in visible.candidates if one.share > SMALLEST_SHARE})
     if p_value_against_runs(found, visible, others) * families > rate:
         return False
-    fold = runs[visible.run]
     before = np.concatenate([visible.added, *(one.columns for one in others)], axis=1)
     after = np.concatenate([before, found.columns], axis=1)
-    one = held_out_rms(visible.residual, before, fold, visible.degrees_of_freedom, 1.0)
-    two = held_out_rms(visible.residual, after, fold, visible.degrees_of_freedom, 1.0)
+    one = held_out_error(now, visible, before, runs)
+    two = held_out_error(now, visible, after, runs)
     return one is None or two is None or two < one

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from monitor.discovery.evidence import Evidence, best_of_families, orthonormal, weigh, without
 from monitor.discovery.fit import Fit
-from monitor.discovery.held_out import held_out_rms
+from monitor.discovery.held_out import held_out_error
 from monitor.discovery.refine import Refined, Searched, refine
 from monitor.discovery.scan import Finding, ScanResult, amplitudes
 from monitor.discovery.separate import Separation, separating_poses
@@ -18,7 +18,7 @@ from monitor.discovery.variants import with_drivers
 from monitor.discovery.visible import Candidate, Visible, see
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import EachRun
-from monitor.effects.shapes import Cyclic
+from monitor.effects.shapes import Cyclic, Harmonic
 from monitor.effects.words import Words, describe
 from monitor.records import Array
 
@@ -29,6 +29,8 @@ UNDECIDED = 12.0
 GRID_LOSS = 12.0
 # An effect coincides with another where so much of it is explained by the other at any size.
 COINCIDES = 0.999
+# Orders of a gear closer than this are the same: less than a turn of the joint tells no more.
+ONE_ORDER = 2.0
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,9 @@ class Missing:
     """A missing effect, in internal units (amplitude, u) and mm (everything else that is a length).
 
     ``amplitude`` is the coefficient, or the length of several (cosine and sine). ``rms_before`` and
-    ``rms_after`` are of all coordinates; the held-out ones per degree of freedom, None with one run; those of
-    days None with fewer than three days. ``separation`` holds the poses that would tell the rivals apart.
+    ``rms_after`` are of all coordinates; the held-out ones per degree of freedom (with one run of many
+    poses: of blocks of poses left out; with one of few: None); those of days None with fewer than three
+    days. ``separation`` holds the poses that would tell the rivals apart.
     """
 
     rank: int
@@ -133,13 +136,18 @@ def _amplitude(candidate: Candidate, coefficients: Array, covariance: Array) -> 
 
 
 def _name(candidate: Candidate) -> str:
-    """The effect as written; a searched pitch is part of it, a searched time constant is not."""
-    return candidate.variant.effect.text if candidate.family.endswith(":cyclic") else candidate.family
+    """The effect as written; a searched pitch or order is part of it, a searched time constant is not."""
+    searched = candidate.family.endswith((":cyclic", ":harmonic"))
+    return candidate.variant.effect.text if searched else candidate.family
 
 
 def _same_cycle(one: Candidate, other: Candidate) -> bool:
-    """Whether a candidate is the search for the pitch that the other has."""
-    found = other.variant.effect
+    """Whether a candidate is the search for the pitch, or has all but the order, that the other has."""
+    found, mine = other.variant.effect, one.variant.effect
+    if isinstance(found, ChainEffect) and isinstance(mine, ChainEffect) and found.term == mine.term:
+        orders = [part.shape.order for part in (found, mine) if isinstance(part.shape, Harmonic)]
+        if len(orders) == 2 and max(orders) > 3 and abs(orders[0] - orders[1]) < ONE_ORDER:
+            return True
     return (
         one.family.endswith(":cyclic")
         and isinstance(found, ChainEffect)
@@ -257,4 +265,4 @@ def _held_out(
     if any(isinstance(one.variant.effect.driver, EachRun) for one in chosen):
         return None
     columns = np.concatenate([visible.added, *(one.columns for one in chosen)], axis=1)
-    return held_out_rms(visible.residual, columns, fold[visible.run], visible.degrees_of_freedom, fit.sigma)
+    return held_out_error(fit, visible, columns, fold)

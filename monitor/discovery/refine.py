@@ -1,4 +1,4 @@
-"""Time constants and pitches, from the grid of the scan to the best value and its standard uncertainty."""
+"""Time constants, pitches and orders of gears, from the grid of the scan to the best value and its u."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from scipy import optimize
 
 from monitor.discovery.evidence import orthonormal, weigh, without
 from monitor.discovery.fit import Fit
+from monitor.discovery.gears import STEP as ORDER_STEP
 from monitor.discovery.scan import ScanResult, amplitudes
 from monitor.discovery.variants import TIME_CONSTANTS_S
 from monitor.discovery.visible import Candidate, Variant, Visible, see
 from monitor.effects import ChainEffect, with_time_constant
 from monitor.effects.catalogue import SCREW_LEADS_MM
 from monitor.effects.drivers import WarmUp
-from monitor.effects.shapes import Cyclic
+from monitor.effects.shapes import Cyclic, Harmonic
 from monitor.records import Array
 
 # Neighbours on the grid of time constants differ by a factor of two, on that of pitches by a two-hundredth of
@@ -65,7 +66,22 @@ def _maker(candidate: Candidate) -> tuple[str, str, float, Callable[[float], Var
             effect.shape.pitch,
             lambda pitch: replace(candidate.variant, effect=_with_pitch(effect, pitch)),
         )
+    if (
+        isinstance(effect, ChainEffect)
+        and isinstance(effect.shape, Harmonic)
+        and family.endswith(":harmonic")
+    ):
+        return (
+            "periods a turn",
+            "1",
+            float(effect.shape.order),
+            lambda order: replace(candidate.variant, effect=_with_order(effect, order)),
+        )
     return None
+
+
+def _with_order(effect: ChainEffect, order: float) -> ChainEffect:
+    return replace(effect, shape=Harmonic(order), shape_text=f"harmonic{order:.6g}")
 
 
 def _with_pitch(effect: ChainEffect, pitch: float) -> ChainEffect:
@@ -101,7 +117,11 @@ def refine(fit: Fit, visible: Visible, chosen: Sequence[Candidate], place: int) 
         found = weigh([at(float(np.exp(logarithm)))], visible.residual, others, visible.degrees_of_freedom)
         return -found[0].explained
 
-    width = np.log(GRID_FACTOR) if name == "time constant" else 0.5 * start / 400.0
+    width = 0.5 * start / 400.0
+    if name == "time constant":
+        width = np.log(GRID_FACTOR)
+    elif name == "periods a turn":
+        width = ORDER_STEP / start
     best = optimize.minimize_scalar(
         badness,
         bounds=(np.log(start) - width, np.log(start) + width),
@@ -114,6 +134,9 @@ def refine(fit: Fit, visible: Visible, chosen: Sequence[Candidate], place: int) 
     high, low = at(value * (1.0 + STEP)), at(value * (1.0 - STEP))
     slope = ((high.columns - low.columns) @ estimate / (2.0 * STEP * value))[:, None]
     u = _uncertainty(visible, now, slope, others)
+    if name == "periods a turn" and abs(round(value) - value) < 2.0 * u:
+        value = float(round(value))
+        now = at(value)
     if name == "pitch":
         near = [lead for lead in SCREW_LEADS_MM if abs(lead - value) < 2.0 * u]
         if near:

@@ -23,6 +23,9 @@ MOST_EFFECTS = 6
 # An exchange must be worth more than the noise of the comparison.
 WORTH_EXCHANGING = 1.0
 
+#: Whether a candidate may stand beside others.
+Allowed = Callable[[Sequence[Candidate], Candidate], bool]
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -61,21 +64,23 @@ def scan(
     more: Callable[[Candidate], Sequence[Candidate]] = lambda found: (),
     accept: Callable[[Sequence[Candidate], Candidate], bool] = lambda others, found: True,
     best_value: Callable[[Sequence[Candidate], int], Candidate] = lambda chosen, place: chosen[place],
+    allowed: Allowed | None = None,
+    better: Callable[[Sequence[Candidate], Candidate], bool] = lambda chosen, rival: True,
 ) -> ScanResult:
     """Find the missing effects among the candidates of which the data see anything.
 
     ``rate`` is the false discovery rate over each scan; ``most`` how many effects at most; ``more`` gives
     further candidates to compare with one that was found (its drivers); ``accept`` has the last word on a
     finding (held-out error); ``best_value`` gives the chosen one at a place with its time constant or pitch at
-    the best value, so that what the grid misses is not taken for another effect.
+    the best value, so that what the grid misses is not taken for another effect; ``allowed`` rules candidates out
+    beside others (a period that the data cannot separate from one found before); ``better`` has the last word on a
+    rival that would take the place of one of the chosen.
     """
     pool = Pool(tuple(one for one in visible.candidates if one.share > SMALLEST_SHARE))
     families = len({candidate.family for candidate in pool.candidates})
     chosen: list[Candidate] = []
     while True:
-        found = best_of_families(
-            weigh(pool, visible.residual, _stack(visible, chosen), visible.degrees_of_freedom)
-        )
+        found = best_of_families(_weighed(visible, pool, chosen, allowed))
         if not found or len(chosen) >= most:
             break
         taken = {one.family for one in chosen}
@@ -91,9 +96,18 @@ def scan(
         chosen.append(best.candidate)
         chosen[-1] = best_value(chosen, len(chosen) - 1)
         pool = pool.with_more([one for one in more(best.candidate) if one.share > SMALLEST_SHARE])
-        chosen = _merge(visible, pool, _exchange(visible, pool, chosen, best_value))
-    findings = [_finding(visible, pool, chosen, place, families) for place in range(len(chosen))]
+        chosen = _exchange(visible, pool, chosen, best_value, allowed, better)
+        chosen = _merge(visible, pool, chosen, allowed, better)
+    findings = [_finding(visible, pool, chosen, place, families, allowed) for place in range(len(chosen))]
     return ScanResult(tuple(sorted(findings, key=lambda one: -one.evidence.score)), tuple(found))
+
+
+def _weighed(
+    visible: Visible, pool: Pool, chosen: Sequence[Candidate], allowed: Allowed | None
+) -> list[Evidence]:
+    """Evidence for the candidates of a pool that are allowed beside the chosen ones, given these."""
+    found = weigh(pool, visible.residual, _stack(visible, chosen), visible.degrees_of_freedom)
+    return found if allowed is None else [one for one in found if allowed(chosen, one.candidate)]
 
 
 def _exchange(
@@ -101,14 +115,17 @@ def _exchange(
     pool: Pool,
     chosen: list[Candidate],
     best_value: Callable[[Sequence[Candidate], int], Candidate],
+    allowed: Allowed | None,
+    better: Callable[[Sequence[Candidate], Candidate], bool],
 ) -> list[Candidate]:
     """Exchange effects for better ones, given the others, until nothing improves."""
     chosen = list(chosen)
     for _ in range(MOST_EFFECTS):
         changed = False
         for place in range(len(chosen)):
-            own, others = _in_its_place(visible, pool, chosen, place)
-            if others and others[0].score > own.score + WORTH_EXCHANGING:
+            own, others = _in_its_place(visible, pool, chosen, place, allowed)
+            worth = others and others[0].score > own.score + WORTH_EXCHANGING
+            if worth and better(chosen, others[0].candidate):
                 chosen[place] = others[0].candidate
                 chosen[place] = best_value(chosen, place)
                 changed = True
@@ -117,7 +134,13 @@ def _exchange(
     return chosen
 
 
-def _merge(visible: Visible, pool: Pool, chosen: list[Candidate]) -> list[Candidate]:
+def _merge(
+    visible: Visible,
+    pool: Pool,
+    chosen: list[Candidate],
+    allowed: Allowed | None,
+    better: Callable[[Sequence[Candidate], Candidate], bool],
+) -> list[Candidate]:
     """One effect instead of two where it explains as much at its price: growth of a whole artefact may first be
     taken for that of two axes."""
     for first, second in combinations(range(len(chosen)), 2):
@@ -125,29 +148,37 @@ def _merge(visible: Visible, pool: Pool, chosen: list[Candidate]) -> list[Candid
         families = {one.family for one in chosen}
         stack, dof = _stack(visible, others), visible.degrees_of_freedom
         found = [
-            one for one in weigh(pool, visible.residual, stack, dof) if one.candidate.family not in families
+            one for one in _weighed(visible, pool, others, allowed) if one.candidate.family not in families
         ]
         more = _stack(visible, [*others, chosen[first]])
         pair = weigh([chosen[first]], visible.residual, stack, dof)[0].score
         pair += weigh([chosen[second]], visible.residual, more, dof)[0].score
-        if found and found[0].score > pair:
-            return _merge(visible, pool, [*others, found[0].candidate])
+        if found and found[0].score > pair and better(chosen, found[0].candidate):
+            return _merge(visible, pool, [*others, found[0].candidate], allowed, better)
     return chosen
 
 
 def _in_its_place(
-    visible: Visible, pool: Pool, chosen: Sequence[Candidate], place: int
+    visible: Visible, pool: Pool, chosen: Sequence[Candidate], place: int, allowed: Allowed | None
 ) -> tuple[Evidence, list[Evidence]]:
     """Evidence for the chosen effect at a place, given the other chosen ones, and for all that are not chosen."""
-    stack = _stack(visible, [one for other, one in enumerate(chosen) if other != place])
+    without_it = [one for other, one in enumerate(chosen) if other != place]
     families = {one.family for one in chosen}
-    found = best_of_families(weigh(pool, visible.residual, stack, visible.degrees_of_freedom))
+    found = best_of_families(_weighed(visible, pool, without_it, allowed))
+    stack = _stack(visible, without_it)
     own = weigh([chosen[place]], visible.residual, stack, visible.degrees_of_freedom)[0]
     return own, [one for one in found if one.candidate.family not in families]
 
 
-def _finding(visible: Visible, pool: Pool, chosen: list[Candidate], place: int, families: int) -> Finding:
-    own, others = _in_its_place(visible, pool, chosen, place)
+def _finding(
+    visible: Visible,
+    pool: Pool,
+    chosen: list[Candidate],
+    place: int,
+    families: int,
+    allowed: Allowed | None,
+) -> Finding:
+    own, others = _in_its_place(visible, pool, chosen, place, allowed)
     # The smallest of m p-values times m bounds its q-value from above, whatever their dependence.
     rivals = sorted([own, *others], key=lambda one: -one.score)
     return Finding(own, min(1.0, own.p_value * families), tuple(rivals))

@@ -8,6 +8,7 @@ from dataclasses import replace
 from monitor.discovery.visible import Variant
 from monitor.effects import ArtefactEffect, ChainEffect, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, WarmUp, parse_driver
+from monitor.effects.shapes import Compliance
 from monitor.machine import COMPONENTS, Chain
 
 # Warm-up takes from ten minutes (a small spindle) to a shift (a machine bed); neighbours differ by a factor of
@@ -51,7 +52,7 @@ def with_drivers(effect: ChainEffect | ArtefactEffect, drivers: Iterable[str]) -
 
     A driver must earn its place: beforehand the plain effect is the likelier one.
     """
-    if not isinstance(effect, ChainEffect):
+    if not isinstance(effect, ChainEffect) or isinstance(effect.shape, Compliance):
         return []
     if not isinstance(effect.driver, Always):
         bare = replace(effect, driver=Always(), driver_text="")

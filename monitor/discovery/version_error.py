@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from monitor.discovery.compare import lack_of_fit
 from monitor.discovery.fit import Fit
-from monitor.discovery.held_out import held_out_rms
+from monitor.discovery.held_out import held_out_error
 from monitor.discovery.visible import see
 
 
 @dataclass(frozen=True)
 class VersionError:
-    """Errors in mm: of all coordinates, and held out (whole runs left out, per degree of freedom; None with
-    one run), beside the repeatability and the stated standard uncertainty, its noise floors."""
+    """Errors in mm: of all coordinates, and held out (whole runs left out, per degree of freedom; blocks of
+    poses with one run of many, None with one of few), beside the repeatability and the stated
+    standard uncertainty, its noise floors."""
 
     rms: float
     held_out_rms: float | None
@@ -28,7 +31,7 @@ def version_error(fit: Fit) -> VersionError:
     test, repeatability = lack_of_fit(fit)
     return VersionError(
         rms=fit.rms,
-        held_out_rms=held_out_rms(seen.residual, seen.added, seen.run, seen.degrees_of_freedom, fit.sigma),
+        held_out_rms=held_out_error(fit, seen, seen.added, np.arange(len(fit.problem.runs))),
         repeatability=repeatability,
         stated_uncertainty=fit.sigma,
         lack_of_fit_p=None if test is None else test.p_value,

@@ -100,7 +100,7 @@ def see(fit: Fit, variants: Sequence[Variant]) -> Visible:
         raw = np.ascontiguousarray(np.moveaxis(fit.moved_by(basis), 2, 0))
         raw[np.abs(raw).max(axis=(1, 2), initial=0.0) < ROUNDING] = 0.0
         peak = float(np.sqrt(np.einsum("kna,kna->kn", raw, raw).max(initial=0.0)))
-        kept.append((variant, raw, largest_coefficient(variant.effect, basis, peak)))
+        kept.append((variant, raw, largest_coefficient(variant.effect, basis, peak, problem.largest_effect)))
     own = fit.own
     left, before = _projected(fit, [raw for _, raw, _ in kept], own.basis)
     candidates = []

@@ -63,7 +63,33 @@ def _weight(chain: Chain) -> Iterable[str]:
     for joint in chain.of_kind("rotary"):
         for component in COMPONENTS:
             yield f"E{component}{joint.name}:const@gravity"
-    yield "stem:gravity"
+
+
+def of_balls(drivers: Iterable[str]) -> tuple[str, ...]:
+    """Effects of balls on stems, for methods that touch them."""
+    return ("stem:gravity", *(f"artefact:expansion@{driver}" for driver in drivers))
+
+
+def of_tracker(
+    chain: Chain, drivers: Iterable[str], ratios: Mapping[str, float] | None = None
+) -> tuple[str, ...]:
+    """Effects that hundreds of poses, seen from outside, can show: of drives that give way, gears, read-out, tracker.
+
+    ``ratios`` are gear ratios by axis. A strain wave gear errs twice a turn of its generator, a gear pair once a
+    turn of its pinion.
+    """
+    texts = []
+    for joint in chain.joints:
+        own = COMPONENTS[joint.main + 3 * joint.turns]
+        texts.append(f"E{own}{joint.name}:lag")
+        if joint.turns:
+            texts += [f"E{own}{joint.name}:compliance@{driver}" for driver in ("gravity", "link_weights")]
+            texts += [f"E{axis}{joint.name}:compliance@gravity" for axis in "ABC" if axis != own]
+        if joint.turns and joint.name in (ratios or {}):
+            ratio = (ratios or {})[joint.name]
+            texts += [f"E{own}{joint.name}:harmonic{times * ratio:.6g}" for times in (1, 2)]
+    texts += [f"tracker:{what}@{driver}" for driver in drivers for what in ("shift", "turn")]
+    return tuple(texts)
 
 
 def drivers_of(context: Context) -> tuple[str, ...]:
@@ -82,11 +108,16 @@ def drivers_of(context: Context) -> tuple[str, ...]:
 
 
 def catalogue(
-    chain: Chain, base: Iterable[str], drivers: Iterable[str], pitches: Mapping[str, float] | None = None
+    chain: Chain,
+    base: Iterable[str],
+    drivers: Iterable[str],
+    pitches: Mapping[str, float] | None = None,
+    more: Iterable[str] | None = None,
 ) -> tuple[ChainEffect | ArtefactEffect, ...]:
     """Every effect of the catalogue that is not in ``base``, in the order of its families.
 
-    ``drivers`` are names without @; ``pitches`` the scale pitch in mm of axes whose file gives one.
+    ``drivers`` are names without @; ``pitches`` the scale pitch in mm of axes whose file gives one; ``more`` what
+    only the method can see, the balls' own effects where it is not given.
     """
     base = tuple(base)
     drivers = tuple(drivers)
@@ -97,7 +128,7 @@ def catalogue(
         *_turns(chain),
         *_heat(chain, base, drivers),
         *_weight(chain),
-        *(f"artefact:expansion@{driver}" for driver in drivers),
+        *(of_balls(drivers) if more is None else more),
     ]
     known = {parse_effect(text, chain).text for text in base}
     found: dict[str, ChainEffect | ArtefactEffect] = {}

@@ -62,6 +62,31 @@ class Context:
         return signs
 
     @cached_property
+    def moves(self) -> Array:
+        """The move (n, J) in mm and rad by which every axis came to its pose; rows at one pose share it.
+
+        Zero at the first pose of a run: nobody recorded where the axes were before.
+        """
+        moves = np.zeros_like(self.positions)
+        for run in np.unique(self.run):
+            rows = np.flatnonzero(self.run == run)
+            steps = np.diff(self.positions[rows], axis=0)
+            last = np.zeros(self.positions.shape[1])
+            for row, step in zip(rows[1:], steps, strict=True):
+                last = step if np.any(step) else last
+                moves[row] = last
+        return moves
+
+    @cached_property
+    def run_order(self) -> Array:
+        """From 0 at a run's first row to 1 at its last, by their order (n,)."""
+        order = np.zeros(len(self))
+        for run in np.unique(self.run):
+            rows = np.flatnonzero(self.run == run)
+            order[rows] = np.arange(len(rows)) / max(len(rows) - 1, 1)
+        return order
+
+    @cached_property
     def gravity(self) -> Array:
         """Unit vectors (n, J, 3) of gravity in the frame of every axis."""
         return gravity_in_joint_frames(self.chain, self.positions)
@@ -75,6 +100,21 @@ def positions_of(chain: Chain, readings: Mapping[str, Array]) -> Array:
         if joint.name in readings:
             positions[:, place] = joint.sign * readings[joint.name]
     return positions
+
+
+def _nominal(campaign: Campaign) -> Array:
+    """Where every target should be (n, 3) mm: its ball, else ``nominal_x_mm`` and so on, NaN where nothing says it."""
+    probings = campaign.probings
+    balls = {ball.id: ball.nominal for ball in campaign.artefact.balls}
+    recorded = [probings.channels.get(f"nominal_{axis}_mm") for axis in "xyz"]
+    unknown = 0.0 if any(column is not None for column in recorded) else np.nan
+    rows = np.column_stack(
+        [np.full(len(probings), unknown) if column is None else column for column in recorded]
+    )
+    for place, target in enumerate(probings.target):
+        if target in balls:
+            rows[place] = balls[target]
+    return rows
 
 
 def context_of(campaign: Campaign, chain: Chain) -> Context:
@@ -93,8 +133,6 @@ def context_of(campaign: Campaign, chain: Chain) -> Context:
         rows = probings.run == number
         start, end = probings.time[rows].min(), probings.time[rows].max()
         run_time[rows] = (probings.time[rows] - start) / (end - start) if end > start else 0.0
-    nominal = {ball.id: ball.nominal for ball in campaign.artefact.balls}
-    unknown = (np.nan, np.nan, np.nan)
     columns: dict[str, Array] = dict(probings.channels)
     for name in sorted({name for run in campaign.runs for name in run.conditions}):
         if name not in columns:
@@ -113,6 +151,6 @@ def context_of(campaign: Campaign, chain: Chain) -> Context:
         day_time=probings.time + np.array([since[int(run)] for run in probings.run]),
         run_time=run_time,
         target=probings.target,
-        nominal=np.array([nominal.get(str(target), unknown) for target in probings.target]),
+        nominal=_nominal(campaign),
         columns=columns,
     )

@@ -114,6 +114,20 @@ class RunTime:
 
 
 @dataclass(frozen=True)
+class Sequence:
+    """From 0 at a run's first reading to 1 at its last, by their order: for runs whose times were not kept."""
+
+    def labels(self, context: Context) -> tuple[str, ...]:
+        return ("",)
+
+    def columns(self, context: Context, joint: int | None) -> Array:
+        return context.run_order[:, None]
+
+    def unit(self) -> Unit:
+        return ONE
+
+
+@dataclass(frozen=True)
 class Gravity:
     """The components of gravity in the frame of the axis, as parts of its full weight."""
 
@@ -158,6 +172,8 @@ def parse_driver(text: str, joint: Joint | None = None) -> Driver:
         return WarmUp(MINUTE.to_internal(float(match.group(1))))
     if text == "run_time":
         return RunTime()
+    if text == "sequence":
+        return Sequence()
     if text == "gravity":
         return Gravity()
     if text == "each_run":
@@ -169,7 +185,7 @@ def parse_driver(text: str, joint: Joint | None = None) -> Driver:
             return made
     if column_unit(text) is None:
         raise EffectError(
-            f"there is no driver '@{text}'; there are @warmup (or @warmup45min), @run_time, @gravity, "
+            f"there is no driver '@{text}'; there are @warmup (or @warmup45min), @run_time, @sequence, @gravity, "
             "@each_run and every recorded channel, whose name ends in a unit "
             f"({', '.join('_' + suffix for suffix in COLUMN_UNITS)})"
         )

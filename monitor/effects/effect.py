@@ -16,7 +16,8 @@ import numpy as np
 from monitor.effects.artefact import ArtefactChange, parse_artefact
 from monitor.effects.context import Context
 from monitor.effects.drivers import Always, Driver, WarmUp, parse_driver
-from monitor.effects.shapes import Const, Cyclic, Poly, Shape, parse_shape
+from monitor.effects.shapes import Compliance, Const, Cyclic, Nodes, Poly, Shape, parse_shape
+from monitor.effects.weight import weight_driver
 from monitor.exceptions import EffectError
 from monitor.machine import LOCATION, MOTION, Chain, Joint, Term, parse_term
 from monitor.records import Array
@@ -129,7 +130,8 @@ class ChainEffect:
 
     def parameters(self, context: Context) -> tuple[str, ...]:
         # The gain is known by its ISO 230-1 symbol alone; that is how certificates print it.
-        name = self.term.symbol if self.is_gain else self.text
+        # So is an error at a named place: EXX(-110).
+        name = self.term.symbol if self.is_gain or isinstance(self.shape, Nodes) else self.text
         return tuple(f"{name}{s}{d}" for s in self.shape.labels for d in self.driver.labels(context))
 
     def basis(self, context: Context) -> ChainBasis:
@@ -172,7 +174,7 @@ def parse_effect(text: str, chain: Chain) -> ChainEffect | ArtefactEffect:
     """The effect that a text names on a chain; EffectError says what is wrong and what would be right."""
     body, driver_text = _split_driver(text.strip())
     head, _, rest = body.partition(":")
-    if head in ("ball", "artefact", "stem"):
+    if head in ("ball", "artefact", "stem", "shape", "tracker"):
         return ArtefactEffect(parse_artefact(body), parse_driver(driver_text), driver_text)
     term = parse_term(head, chain)
     if not rest:
@@ -189,7 +191,23 @@ def parse_effect(text: str, chain: Chain) -> ChainEffect | ArtefactEffect:
         )
     if rest.startswith("harmonic") and not joint.turns:
         raise EffectError(f"'{text}': a harmonic belongs to a rotary axis; for {joint.name} write cyclic20mm")
+    if isinstance(shape, Compliance):
+        return ChainEffect(term, joint, shape, rest, _weight(text, term, joint, driver_text), driver_text)
     return ChainEffect(term, joint, shape, rest, parse_driver(driver_text, joint), driver_text)
+
+
+def _weight(text: str, term: Term, joint: Joint, driver_text: str) -> Driver:
+    own = f"E{'ABC'[joint.main]}{joint.name}:compliance@gravity"
+    if not term.is_rotation or term.stage == LOCATION or not joint.turns:
+        example = f"write for example {own}" if joint.turns else f"{joint.name} does not turn"
+        raise EffectError(f"'{text}': a compliance is a rotation of a rotary axis under a torque; {example}")
+    driver = weight_driver(driver_text, term, joint)
+    if driver is None:
+        raise EffectError(
+            f"'{text}': a compliance answers to weights: write @gravity (a load at the flange) or @link_weights (the "
+            f"weight of every link), for example {own}"
+        )
+    return driver
 
 
 def _split_driver(text: str) -> tuple[str, str]:

@@ -8,9 +8,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from monitor.effects.artefact import BallMoved, Expansion
-from monitor.effects.drivers import Channel, EachRun, Gravity, RunTime, WarmUp
+from monitor.effects.drivers import Channel, EachRun, Gravity, RunTime, Sequence, WarmUp
 from monitor.effects.effect import ArtefactEffect, ChainEffect
-from monitor.effects.shapes import Const, Cyclic, FormulaShape, Harmonic, Poly, Reversal, Table
+from monitor.effects.shapes import (
+    Compliance,
+    Const,
+    Cyclic,
+    FormulaShape,
+    Harmonic,
+    Lag,
+    Nodes,
+    Poly,
+    Reversal,
+    Table,
+)
+from monitor.effects.tracker import TrackerShift, TrackerTurn
+from monitor.effects.weight import LinkWeights, Load
 from monitor.machine import LOCATION
 
 # The standards that define the terms and their tests.
@@ -19,6 +32,7 @@ MOTION_ROTARY = "ISO 230-1:2012 and ISO 230-7:2015 (error motions of axes of rot
 LOCATION_ERRORS = "ISO 230-1:2012 and ISO 230-7:2015 (location errors)"
 POSITIONING = "ISO 230-2:2014 (positioning of axes)"
 THERMAL = "ISO 230-3:2020 (thermal effects)"
+ROBOTS = "ISO 9283:1998 (performance of industrial robots); Mooring, Roth and Driels, Manipulator calibration, 1991"
 
 
 @dataclass(frozen=True)
@@ -63,13 +77,23 @@ def _shape(effect: ChainEffect) -> str:
         power = {1: "in proportion to", 2: "with the square of", 3: "with the cube of"}
         return f", growing {power.get(shape.order, f'with power {shape.order} of')} its position"
     if isinstance(shape, Harmonic):
-        times = {1: "once", 2: "twice", 3: "three times"}
-        return f", repeating {times.get(shape.order, f'{shape.order} times')} a turn"
+        times: dict[float, str] = {1: "once", 2: "twice", 3: "three times"}
+        return f", repeating {times.get(shape.order, f'{shape.order:g} times')} a turn"
     if isinstance(shape, Cyclic):
         return f", repeating every {shape.pitch:g} mm"
     if isinstance(shape, Reversal):
         return f", jumping when {name} reverses"
-    if isinstance(shape, Table):
+    if isinstance(shape, Lag):
+        return f", in proportion to the last move of {name}"
+    if isinstance(shape, Compliance):
+        about = (
+            "its axis" if effect.term.component - 3 == effect.joint.main else "XYZ"[effect.term.component - 3]
+        )
+        what = (
+            "a load at the flange" if isinstance(effect.driver, Load) else "the weight of all that it carries"
+        )
+        return f", in proportion to the torque of {what} about {about}"
+    if isinstance(shape, (Table, Nodes)):
         return ", of free form along its travel"
     if isinstance(shape, FormulaShape):
         return f", following {shape.text}"
@@ -82,6 +106,10 @@ def _driver(effect: ChainEffect | ArtefactEffect) -> str:
         return ", settling exponentially after the day's first start"
     if isinstance(driver, RunTime):
         return ", drifting evenly within every run"
+    if isinstance(driver, (Load, LinkWeights)):
+        return ""
+    if isinstance(driver, Sequence):
+        return ", drifting evenly from reading to reading within every run"
     if isinstance(driver, Gravity):
         return ", following the direction of gravity as the axis turns"
     if isinstance(driver, EachRun):
@@ -102,7 +130,23 @@ def _cause_and_remedy(effect: ChainEffect) -> tuple[str, str, str]:
             "record more conditions (temperatures, coolant, load, operator) with the next campaign",
             THERMAL,
         )
-    if isinstance(driver, (WarmUp, RunTime)) or (
+    if isinstance(shape, Compliance):
+        part = "drive and gearbox" if own else "bearings and arm"
+        return (
+            f"{part} of {name} give way under the weight that {name} carries",
+            f"enter the payload and its centre of mass in the control, balance or reduce the load, check the {part} of "
+            f"{name} for play, or compensate the angle by the torque",
+            ROBOTS,
+        )
+    if isinstance(shape, Lag):
+        return (
+            f"{name} was read before it had settled, or its reading trails the movement: waiting time too short, "
+            "following error, encoder filter, time offset between control and tracker",
+            f"wait longer at each pose, average readings at rest, check the following error of {name} and the clocks "
+            "of control and tracker",
+            ROBOTS,
+        )
+    if isinstance(driver, (WarmUp, RunTime, Sequence)) or (
         isinstance(driver, Channel) and driver.name.endswith("_degC")
     ):
         if joint.kind == "spindle":
@@ -177,8 +221,16 @@ def _cause_and_remedy(effect: ChainEffect) -> tuple[str, str, str]:
 
 def _harmonic(effect: ChainEffect, shape: Harmonic, own: bool) -> tuple[str, str, str]:
     name = effect.joint.name
+    if own and shape.order > 3:
+        return (
+            f"gear of {name} with {shape.order:g} errors a turn: eccentric pinion, tooth form, or the two waves of a "
+            "strain wave gear's generator",
+            f"check wear, lubrication and mounting of the gearbox of {name}, or enter a cyclic compensation "
+            "by its angle",
+            ROBOTS,
+        )
     if own:
-        source = {
+        source: dict[float, str] = {
             1: "eccentric encoder disc or worm wheel",
             2: "oval or doubly misaligned worm wheel or encoder",
         }
@@ -203,6 +255,15 @@ def _artefact(effect: ArtefactEffect) -> Words:
             "a stem came loose, or the ball was touched",
             f"tighten the stem of ball {ball} and repeat the run",
             "docs/effects.md",
+        )
+    if isinstance(effect.change, (TrackerShift, TrackerTurn)):
+        how = "shifts" if isinstance(effect.change, TrackerShift) else "turns"
+        return Words(
+            f"the frame of the tracker {how}{_driver(effect)}",
+            "the tracker's stand or the floor gives way, the tracker or the air warms up, or the robot's base moves",
+            "warm the tracker up, fix its stand and the robot's base, measure fixed reflectors in between, and measure "
+            "in shorter runs",
+            "ISO 10360-10:2021 (laser trackers); docs/effects.md",
         )
     if isinstance(effect.change, Expansion):
         return Words(

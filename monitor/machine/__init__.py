@@ -1,8 +1,8 @@
 """The machine as a serial chain: topology string, ISO 230-1 terms, tip-to-target vector and its Jacobian."""
 
 from monitor.machine.chain import Evaluation, evaluate
-from monitor.machine.gravity import gravity_in_joint_frames
-from monitor.machine.inverse import touching_positions
+from monitor.machine.gravity import gravity_in_joint_frames, torques_in_joint_frames
+from monitor.machine.inverse import refuse_untouchable, touching_positions
 from monitor.machine.terms import COMPONENTS, LOCATION, MOTION, Term, parse_term
 from monitor.machine.topology import Chain, Joint, chain_of_axes, parse_topology
 
@@ -19,5 +19,7 @@ __all__ = [
     "gravity_in_joint_frames",
     "parse_term",
     "parse_topology",
+    "refuse_untouchable",
+    "torques_in_joint_frames",
     "touching_positions",
 ]

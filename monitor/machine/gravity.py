@@ -1,4 +1,4 @@
-"""The direction of gravity as each axis feels it while the chain turns."""
+"""Gravity as each axis feels it while the chain turns: its direction, and the torques of weights further out."""
 
 from __future__ import annotations
 
@@ -25,4 +25,33 @@ def gravity_in_joint_frames(chain: Chain, positions: Array) -> Array:
                 rotation = rotation @ rotation_about(joint.direction, positions[:, place])
             found[:, place] = np.einsum("nji,j->ni", rotation, down)
             place += 1
+    return found
+
+
+def torques_in_joint_frames(chain: Chain, positions: Array, carried: int, place: Array) -> Array:
+    """Torques (n, J, 3) mm about the origin of every axis, in its frame after its own motion, of a unit weight.
+
+    The weight hangs at ``place`` (3,) mm in the frame of joint ``carried``; joints that do not carry it feel none.
+    ``positions`` (n, J); the nominal chain is used, as for the direction.
+    """
+    down = np.array(chain.gravity)
+    found = np.zeros((len(positions), len(chain.joints), 3))
+    on_tool = carried >= len(chain.work)
+    first = len(chain.work) if on_tool else 0
+    rotation = np.broadcast_to(np.eye(3), (len(positions), 3, 3))
+    origin = np.zeros((len(positions), 3))
+    frames = []
+    for at in range(first, carried + 1):
+        joint = chain.joints[at]
+        step = np.array(joint.offset)
+        if joint.turns:
+            origin = origin + rotation @ step
+            rotation = rotation @ rotation_about(joint.direction, positions[:, at])
+        else:
+            moved = step + positions[:, at, None] * np.array(joint.direction)
+            origin = origin + np.einsum("nij,nj->ni", rotation, moved)
+        frames.append((at, rotation, origin))
+    weight = origin + rotation @ place
+    for at, turned, centre in frames:
+        found[:, at] = np.einsum("nji,nj->ni", turned, np.cross(weight - centre, down))
     return found

@@ -16,18 +16,24 @@ STEPS = 5
 CLOSE_ENOUGH = 1e-9
 
 
+def refuse_untouchable(chain: Chain) -> None:
+    """DataError for a chain whose linear axes cannot bring its tip to any target."""
+    linear = chain.of_kind("linear")
+    if len(linear) < 3:
+        raise DataError(
+            f"'{chain.topology}' has {len(linear)} linear axes; a touch needs three to reach its target"
+        )
+
+
 def touching_positions(chain: Chain, positions: Array, errors: Array, target: Array, tip: Array) -> Array:
     """Positions (n, J) with the linear axes moved so that tip and target coincide.
 
     ``positions`` (n, J) gives the rotary axes and a start for the linear ones, in mm and rad; the other
     arguments are as in ``evaluate``. Raises DataError where the linear axes cannot reach the target.
     """
+    refuse_untouchable(chain)
     found = np.array(positions, dtype=float)
     linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
-    if len(linear) < 3:
-        raise DataError(
-            f"'{chain.topology}' has {len(linear)} linear axes; a touch needs three to reach its target"
-        )
     directions = np.array([chain.joints[place].direction for place in linear])
     for _ in range(STEPS):
         seen = evaluate(chain, found, errors, target, tip, jacobian=True)

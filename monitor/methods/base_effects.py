@@ -82,13 +82,17 @@ def _generic_jacobian(chain: Chain) -> tuple[Array, Array]:
 
 
 def _candidates_outside(chain: Chain) -> list[tuple[Joint, int]]:
-    """Location errors that a look from outside can find: the zeros of the joints, tilts, shifts, outermost first."""
+    """Location errors that a look from outside can find: the zeros of the joints, shifts, tilts, outermost first.
+
+    A tilt that the zero of the joint before does together with a shift is left to these two, as in Denavit and
+    Hartenberg's parameters; with a short link between them it would come out as large as the link is short.
+    """
     outwards = tuple(reversed(chain.tool))
     across = [(joint, axis) for joint in outwards for axis in range(3) if axis != joint.main]
     return [
         *((joint, 3 + joint.main) for joint in outwards if joint.turns),
-        *((joint, 3 + axis) for joint, axis in across),
         *((joint, axis) for joint, axis in across if joint.turns),
+        *((joint, 3 + axis) for joint, axis in across),
     ]
 
 

@@ -10,6 +10,7 @@ them a reading tells (``observe``), and which calibrated quantities it has besid
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -18,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.effects import Basis, ChainEffect, Context, Effect
+from monitor.effects.catalogue import of_balls
 from monitor.exceptions import DataError
 from monitor.machine import Evaluation, evaluate
 from monitor.methods.least_squares import Linearisation, Solution, solve
@@ -27,6 +29,11 @@ from monitor.records import Array
 # A wrong sign of an axis fits the readings perfectly with a gain of -2 and mirrored targets. A turn of 0.1 rad or
 # a gain of 100 mm/m is no error of a machine but another machine; real ones stay below a hundredth of that.
 LARGEST_ERROR = 0.1
+# The largest effect that a machine in use is likely to have: 50 µm at the tip, or an angle of 1 mrad. The
+# tolerances of geometric tests of machining centres (ISO 10791-1 to -3) are about 10 µm and 60 µrad. A plan that
+# leaves an uncertainty as large as that says nothing of the effect.
+LARGEST_DISPLACEMENT = 50e-3
+LARGEST_ANGLE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -95,6 +102,19 @@ class ChainProblem(ABC):
     def movable(self) -> tuple[str, ...]:
         """The targets that may come loose and stand elsewhere, each with three coordinates of its own."""
         return ()
+
+    @property
+    def largest_effect(self) -> tuple[float, float]:
+        """Displacement (mm at the tool) and angle (rad) of the largest effect that such a machine is likely to hide."""
+        return LARGEST_DISPLACEMENT, LARGEST_ANGLE
+
+    def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
+        """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
+        return of_balls(drivers)
+
+    def contradiction(self, solution: Solution) -> str | None:
+        """Why the readings cannot come from this chain, in words; None where they may."""
+        return None
 
     @property
     def largest_error(self) -> float:
@@ -271,7 +291,7 @@ def _from_several_starts(problem: ChainProblem, begin: Array) -> Solution:
 
 
 def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
-    """DataError where a location angle or a gain comes out too large to be an error."""
+    """DataError where a location angle or a gain comes out too large to be an error, or too much is left."""
     place = 0
     for effect in problem.base:
         names = effect.parameters(problem.context)
@@ -288,3 +308,6 @@ def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
                     "units, the columns and the order of the targets"
                 )
         place += len(names)
+    wrong = problem.contradiction(solution)
+    if wrong is not None:
+        raise DataError(f"the readings contradict the machine file: {wrong}")

@@ -28,7 +28,8 @@ SYMBOLS = {
     "dx_AY": "EX0A",
     "dy_AY": "EY0A",
     "dz_AY": "EZ0A",
-    "alpha_AY": "EA0A",
+    # The zero of A. A turn about A before and behind the axis do the same; our convention names the second.
+    "alpha_AY": "EA0C",
     "beta_AY": "EB0A",
     "gamma_AY": "EC0A",
     "dy_CA": "EY0C",

@@ -12,6 +12,7 @@ import numpy as np
 
 from monitor.effects import ChainEffect, context_of
 from monitor.exceptions import DataError
+from monitor.machine import refuse_untouchable
 from monitor.methods.identification import Identification
 from monitor.methods.model import Model, chain_of
 from monitor.methods.problem import ChainProblem, solve_problem
@@ -46,6 +47,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TouchProblem
     Every coordinate of a probing has the probe's stated standard uncertainty, the bar its own.
     """
     chain = chain_of(campaign.machine)
+    refuse_untouchable(chain)
     bar = campaign.artefact.scale_bar
     if bar is None:
         raise DataError(f"campaign {campaign.name} has no scale bar; samba needs [artefact.scale_bar]")

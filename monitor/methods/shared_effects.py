@@ -14,12 +14,6 @@ from monitor.methods.problem import ChainProblem
 from monitor.records import Array
 from monitor.units import MINUTE, Unit
 
-# The largest effect that a machine in use is likely to have: 50 µm at the tip, or an angle of 1 mrad. The
-# tolerances of geometric tests of machining centres (ISO 10791-1 to -3) are about 10 µm and 60 µrad. A plan that
-# leaves an uncertainty as large as that says nothing of the effect.
-LARGEST_DISPLACEMENT = 50e-3
-LARGEST_ANGLE = 1e-3
-
 UNSEEN = "what it does at this plan's probings is done by the parameters that are free in every run"
 
 
@@ -34,16 +28,17 @@ class SharedParameters:
     refused: tuple[Refusal, ...]
 
 
-def largest_coefficient(effect: Effect, basis: Basis, peak: float) -> float:
+def largest_coefficient(effect: Effect, basis: Basis, peak: float, largest: tuple[float, float]) -> float:
     """The size of the coefficients that a machine in use is likely to have at most, in internal units.
 
+    ``largest`` is the displacement in mm and the angle in rad of the largest effect;
     ``peak`` mm is the largest displacement that a unit of any coefficient causes at any probing.
     """
     if peak == 0.0:
         return 0.0
-    limit = LARGEST_DISPLACEMENT / peak
+    limit = largest[0] / peak
     if isinstance(effect, ChainEffect) and isinstance(basis, ChainBasis) and effect.term.is_rotation:
-        limit = min(limit, LARGEST_ANGLE / float(np.abs(basis.columns).max()))
+        limit = min(limit, largest[1] / float(np.abs(basis.columns).max()))
     return limit
 
 
@@ -61,7 +56,10 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
         basis = added.basis(solution.common[own])
         moved = problem.observe(basis.displacement(by_error))
         limit = largest_coefficient(
-            added.effect, basis, float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+            added.effect,
+            basis,
+            float(np.linalg.norm(moved, axis=1).max(initial=0.0)),
+            problem.largest_effect,
         )
         for one in range(place, place + added.size):
             units.append(added.effect.unit)

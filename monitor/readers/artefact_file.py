@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.faults import one_of, quoted
+from monitor.readers.l_shape_file import read_l_shape
+from monitor.readers.self_calibration_file import read_self_calibration
 from monitor.readers.toml_table import Table
-from monitor.records import Artefact, Ball, Probe, ScaleBar
+from monitor.records import Artefact, Ball, Probe, Reflector, ScaleBar
 from monitor.units import MICROMETRE
 
 POINT = "[118.0, 6.0, 178.8]"
@@ -57,11 +59,31 @@ def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:
         elif ball is not None:
             balls[ball.id] = ball
     ids = None if len(table.faults) > before else list(balls)
+    reflectors = _reflectors(table)
     bar = _scale_bar(table, ids)
+    piece = read_l_shape(table)
+    calibration = read_self_calibration(table)
     table.finish()
     if len(table.faults) > before:
         return None, ids
-    return Artefact(identity or "", tuple(balls.values()), bar), ids
+    return Artefact(identity or "", tuple(balls.values()), bar, reflectors, piece, calibration), ids
+
+
+def _reflectors(artefact: Table) -> tuple[Reflector, ...]:
+    found: dict[str, Reflector] = {}
+    for row in artefact.tables("reflectors"):
+        identity = row.text("id", required=True, example='"R1"')
+        fixed = row.raw("fixed", required=False, example="true")
+        if fixed is not None and not isinstance(fixed, bool):
+            row.fault(
+                "fixed", f"{quoted(fixed)} is neither true (beside the machine) nor false (on the tool)"
+            )
+        row.finish()
+        if identity is not None and identity in found:
+            row.fault("id", f"reflector {quoted(identity)} is listed twice; give every reflector its own id")
+        elif identity is not None:
+            found[identity] = Reflector(identity, fixed is True)
+    return tuple(found.values())
 
 
 def _ball(table: Table) -> Ball | None:

@@ -48,14 +48,14 @@ def read_probings(
     not depend on them is checked all the same.
     """
     columns = {axis.column: axis for axis in axes or ()}
-    required = (*FIRST, *columns)
+    allowed = MethodRules("") if rules is None else rules
+    required = (*FIRST, *columns, *allowed.measured_columns)
     refuse_missing(table, required, faults)
     odd = [name for name in table.columns if READING.fullmatch(name) and name not in columns]
     if axes is not None:
         for name in odd:
             told = f"the topology has no axis for {quoted(name)}; its columns are {one_of(columns)}"
             faults.add(FILE, 1, name, told)
-    allowed = MethodRules("") if rules is None else rules
     names = recorded_columns(table, [*required, *odd], faults, allowed.suffixes, allowed.plain_columns)
 
     good: Mask = np.ones(len(table), dtype=np.bool_)
@@ -69,6 +69,10 @@ def read_probings(
     channels = {name: numbers(table, name, faults, may_be_empty=True) for name in names}
     for channel in channels.values():
         good &= channel.good
+    for name in allowed.measured_columns:
+        if name in table.columns:
+            channels[name] = numbers(table, name, faults)
+            good &= channels[name].good & _within(table, name, channels[name], None, strokes, faults)
     time = numbers(table, "time_s", faults) if "time_s" in table.columns else None
     sequence = wholes(table, "sequence", faults) if "sequence" in table.columns else None
     for column in (time, sequence):

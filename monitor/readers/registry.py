@@ -17,7 +17,7 @@ from typing import TypeVar
 
 from monitor.exceptions import CampaignError, Fault, InputError
 from monitor.readers.method_rules import MethodRules
-from monitor.records import Campaign
+from monitor.records import Campaign, CurveCampaign
 
 GROUP = "monitor.readers"
 
@@ -28,13 +28,13 @@ class Reader:
 
     name: str
     recognises: Callable[[Path], bool]
-    read: Callable[[Path], Campaign]
+    read: Callable[[Path], Campaign | CurveCampaign]
 
 
 T = TypeVar("T", Reader, MethodRules)
 
 
-def read_campaign(folder: Path) -> Campaign:
+def read_campaign(folder: Path) -> Campaign | CurveCampaign:
     """The campaign of a folder, in internal units.
 
     Raises CampaignError, with every fault of the folder, if anything in it is wrong.

@@ -32,8 +32,9 @@ def error_falling(
     noise_um: float,
     title: str,
     noise_name: str = "noise floor",
+    unit: str = "µm",
 ) -> Figure:
-    """RMS residual in µm of every model version (s,): on the runs it was fitted to, and on held-out runs.
+    """RMS residual in µm, or in another ``unit``, of every model version (s,): on the fitted and on held-out runs.
 
     ``steps`` names what each version added, the base model first; the others get a plus. NaN where a
     version has no held-out error.
@@ -51,7 +52,7 @@ def error_falling(
         axes = figure.subplots()
         axes.axhspan(0.0, noise_um, color=PALE, alpha=0.45, linewidth=0, zorder=0)
         reference_line(axes, noise_um)
-        axes.text(-0.45, noise_um / 2, f"{noise_name} {noise_um:.2g} µm", va="center", fontsize=7.5)
+        axes.text(-0.45, noise_um / 2, f"{noise_name} {noise_um:.2g} {unit}", va="center", fontsize=7.5)
         axes.plot(
             at,
             held,
@@ -66,7 +67,7 @@ def error_falling(
         _name_lines(axes, fitted, held)
         for index in range(len(steps)):
             axes.annotate(
-                f"{fitted[index]:.2f}",
+                _at_height(fitted[index], unit),
                 (index, fitted[index]),
                 xytext=(0, -7),
                 textcoords="offset points",
@@ -79,7 +80,7 @@ def error_falling(
             )
             if np.isfinite(held[index]):
                 axes.annotate(
-                    f"{held[index]:.2f}",
+                    _at_height(held[index], unit),
                     (index, held[index]),
                     xytext=(0, 6),
                     textcoords="offset points",
@@ -96,9 +97,14 @@ def error_falling(
         axes.set_xticks(at, labels)
         axes.set_xlim(-0.5, max(len(steps) - 1, 1) + 0.8)
         axes.set_ylim(0.0, 1.22 * float(np.nanmax(np.concatenate([fitted, held, [noise_um]]))))
-        axes.set_ylabel("RMS residual / µm")
+        axes.set_ylabel(f"RMS residual / {unit}" if unit else "RMS residual")
         axes.set_xlabel("model, step by step", labelpad=3)
     return figure
+
+
+def _at_height(value: float, unit: str) -> str:
+    """A number beside its point: hundredths of a micrometre, three digits of anything else."""
+    return f"{value:.2f}" if unit == "µm" else f"{value:.3g}"
 
 
 def ranked_effects(

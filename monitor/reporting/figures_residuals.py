@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -92,6 +93,37 @@ def residual_bars(
     return figure
 
 
+@dataclass(frozen=True)
+class View:
+    """How residual vectors (n, 3) are drawn: ``magnify`` times enlarged, within ``reach`` mm of the ``middle`` (3,).
+
+    ``large`` (n,) marks the largest tenth, ``key`` is the length in µm of the bar that explains the arrows.
+    """
+
+    magnify: float
+    middle: Array
+    reach: float
+    large: npt.NDArray[np.bool_]
+    longest: float
+    key: float
+
+
+def view_of(place: Array, size: Array) -> View:
+    """The view of residuals (n, 3) µm at places (n, 3) mm, one scale for all three sides."""
+    length = np.linalg.norm(size, axis=1)
+    extent = float(np.max(np.ptp(place, axis=0)))
+    longest = float(np.max(length))
+    seen = longest > 0.0 and extent > 0.0
+    return View(
+        magnify=nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if seen else 1.0,
+        middle=(np.max(place, axis=0) + np.min(place, axis=0)) / 2,
+        reach=0.66 * extent or 1.0,
+        large=length >= np.quantile(length, 0.9),
+        longest=longest,
+        key=nice(longest) if longest > 0.0 else 1.0,
+    )
+
+
 def residual_vectors(
     positions_mm: npt.ArrayLike, residuals_um: npt.ArrayLike, *, title: str, frame: str = "machine frame"
 ) -> Figure:
@@ -100,13 +132,8 @@ def residual_vectors(
     The largest tenth is drawn in the accent colour, thicker. All three views share one magnification, printed below.
     """
     place, size = _points(positions_mm, residuals_um)
-    length = np.linalg.norm(size, axis=1)
-    extent = float(np.max(np.ptp(place, axis=0)))
-    longest = float(np.max(length))
-    magnify = _nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if longest > 0.0 and extent > 0.0 else 1.0
-    large = length >= np.quantile(length, 0.9)
-    middle = (np.max(place, axis=0) + np.min(place, axis=0)) / 2
-    reach = 0.66 * extent or 1.0
+    view = view_of(place, size)
+    large, magnify, middle, reach = view.large, view.magnify, view.middle, view.reach
     with style():
         figure = new_figure(PAGE_WIDTH_MM, 71.0, title)
         panels = figure.subplots(1, 3)
@@ -131,7 +158,7 @@ def residual_vectors(
             axes.set_title(f"{'XYZ'[across]}{'XYZ'[up]}")
             axes.set_xlabel(f"{'XYZ'[across]} / mm", labelpad=1)
             axes.set_ylabel(f"{'XYZ'[up]} / mm", labelpad=0)
-        key = _nice(longest) if longest > 0.0 else 1.0
+        key = view.key
         corner = (middle[0] - 0.95 * reach, middle[1] - 0.9 * reach)
         panels[0].plot(
             [corner[0], corner[0] + key * 1e-3 * magnify], [corner[1]] * 2, color=INK, linewidth=2.2
@@ -266,7 +293,7 @@ def _points(positions: npt.ArrayLike, residuals: npt.ArrayLike) -> tuple[Array, 
     return place, size
 
 
-def _nice(value: float) -> float:
+def nice(value: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that does not exceed ``value``."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))

@@ -1,9 +1,10 @@
 """Search for one change in a series: the best of steps, bends, decays and the straight line, calibrated.
 
 Few runs do not tell a change from runs that resemble each other. The statistic is therefore the gain in
-likelihood over no change at all, with the correlation of the runs free on both sides; and the p-value is the
-largest over every correlation that the series, its best change taken off, does not refute. It belongs to the
-whole search: it is simulated with the same plan and the same steps as for the data.
+likelihood over no change at all, with the correlation of the runs free on both sides (within one family: in
+their order, or by days); and the p-value is that of the strongest correlation that the series, its best change
+taken off, does not refute. It belongs to the whole search: it is simulated with the same plan and the same
+steps as for the data.
 """
 
 from __future__ import annotations
@@ -25,14 +26,15 @@ Kind = Literal["step", "slope", "trend", "transient"]
 GRID = np.arange(0.0, 0.91, 0.1)
 #: Beyond this correlation no level is claimed: some dozens of such runs have no constant mean to change from.
 HIGHEST = 0.7
-#: Day components of which the likelihood is computed, in standard deviations of a run.
-DAY_GRID = (0.5, 1.0, 2.0, 4.0)
+#: Day components of which the likelihood is computed, in standard deviations of a run. Beyond the last no level is
+#: claimed: four days of which the last differs would then say nothing, however much it differs.
+DAY_GRID = (0.5, 1.0)
 #: A correlation is refuted where the logarithm of its likelihood is so far below the highest: one-sided 97.7 % for
 #: a normal estimate. Chosen by measured rates (docs/trials-statistics.md): 1 leaves 6 % false alarms of 20 runs.
 REFUTED = 2.0
 #: Simulations until a p-value is clearly no finding: so many exceedances end them (Besag and Clifford,
-#: Biometrika 78 (1991) 301), looked at after each block.
-EXCEEDANCES, BLOCK = 20, 100
+#: Biometrika 78 (1991) 301), looked at after each block; most searches end with the first.
+EXCEEDANCES, FIRST_BLOCK, BLOCK = 20, 100, 500
 #: Time constants of a warm-up or running-in tried, as fractions of the history; a finer fit is `warm_up`'s.
 DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
 #: Fewest runs on each side of a change: one run alone is an outlier, not a change.
@@ -115,10 +117,15 @@ class Scanner:
         self.scaled = (times - times[0]) / max(float(np.ptp(times)), 1e-300)
         self.smooth = self.columns[:, : len(self.kinds) - len(self.at)] if base == "constant" else None
         shapes: list[Shape] = [FirstOrder(float(r)) for r in GRID]
+        # Places of the shapes of each family, the weakest first: that of independent runs is in both.
+        self.families = [tuple(range(len(GRID)))]
         if days is not None:
+            self.families.append((0, *range(len(GRID), len(GRID) + len(DAY_GRID))))
             shapes += [DayComponent(ratio, days, self.root) for ratio in DAY_GRID]
         self.prepared = [self._prepare(shape, basis) for shape in shapes]
-        self._null: dict[int, Array] = {}
+        # Places of the shapes for which the level is claimed.
+        self._claimed = {i for i in range(len(shapes)) if i >= len(GRID) or GRID[i] <= HIGHEST + 1e-9}
+        self._null: dict[tuple[int, int], Array] = {}
         self._seed: int | None = None
 
     def _prepare(self, shape: Shape, basis: Array) -> _Prepared:
@@ -154,11 +161,11 @@ class Scanner:
             found = steps
         return total, found**2 * prepared.inverse[:, np.newaxis]
 
-    def _deviances(self, weighted: Array) -> tuple[Array, Array]:
+    def _deviances(self, weighted: Array, places: Sequence[int]) -> tuple[Array, Array]:
         """Minus twice the residual log-likelihood by shape (s, m): of no change, and of the best candidate."""
-        plain = np.empty((len(self.prepared), weighted.shape[1]))
+        plain = np.empty((len(places), weighted.shape[1]))
         best = np.empty_like(plain)
-        for i, one in enumerate(self.prepared):
+        for i, one in enumerate(self.prepared[place] for place in places):
             total, taken = self._residual(one, weighted)
             floor = 1e-15 * total + 1e-300
             left = (np.maximum(total - taken, floor) * one.weight[:, np.newaxis]).min(axis=0)
@@ -166,50 +173,56 @@ class Scanner:
             best[i] = one.constant + self.free * np.log(left)
         return plain, best
 
-    def gain(self, weighted: Array) -> Array:
+    def _gain(self, weighted: Array, family: int) -> Array:
         """The statistic (m,) of columns (n, m) times the root of their weights."""
-        plain, best = self._deviances(weighted)
+        plain, best = self._deviances(weighted, self.families[family])
         return np.asarray(plain.min(axis=0) - best.min(axis=0))
 
-    def _simulated(self, place: int, count: int, rng: np.random.Generator) -> Array:
+    def _simulated(self, family: int, place: int, count: int, rng: np.random.Generator) -> Array:
         """The statistic of at least ``count`` series without a change, of one shape; kept and added to."""
         if self._seed is None:
             self._seed = int(rng.integers(2**63))
-        kept = self._null.get(place, np.empty(0))
+        kept = self._null.get((family, place), np.empty(0))
         while len(kept) < count:
             # Every shape sees the same noise: their p-values differ by the shape alone.
-            noise = np.random.default_rng([self._seed, len(kept)]).standard_normal((len(self.root), BLOCK))
-            kept = np.append(kept, self.gain(self.prepared[place].shape.colour(noise)))
-        self._null[place] = kept
+            size = BLOCK if len(kept) else FIRST_BLOCK
+            noise = np.random.default_rng([self._seed, len(kept)]).standard_normal((len(self.root), size))
+            kept = np.append(kept, self._gain(self.prepared[place].shape.colour(noise), family))
+        self._null[family, place] = kept
         return kept[:count]
 
-    def _p_value(self, gain: float, place: int, level: float, rng: np.random.Generator, trials: int) -> float:
-        exceeding = 0
-        for done in range(0, trials, BLOCK):
-            upto = min(done + BLOCK, trials)
-            exceeding += int((self._simulated(place, upto, rng)[done:] >= gain).sum())
+    def _p_value(
+        self, gain: float, family: int, place: int, level: float, rng: np.random.Generator, trials: int
+    ) -> float:
+        exceeding = done = 0
+        while done < trials:
+            upto = min(done + BLOCK if done else FIRST_BLOCK, trials)
+            exceeding += int((self._simulated(family, place, upto, rng)[done:] >= gain).sum())
             if exceeding >= EXCEEDANCES and exceeding / upto > 2.0 * level:
                 return exceeding / upto
+            done = upto
         return (1 + exceeding) / (trials + 1)
 
-    def _not_refuted(self, best: Array) -> Sequence[int]:
-        """Shapes that the deviances (s,) allow, the likeliest first; and every weaker one, of which they say less."""
+    def _not_refuted(self, best: Array) -> list[tuple[int, int]]:
+        """Each family that the deviances (s,) allow, with the place of its strongest shape that they allow.
+
+        The stronger the correlation, the larger the gains without a change: a weaker one has the smaller p-value.
+        """
         likely = best - best.min() <= 2.0 * REFUTED
-        kept: set[int] = set()
-        for family in (range(len(GRID)), range(len(GRID), len(best))):
-            last = max((i for i in family if likely[i]), default=-1)
-            kept |= {i for i in family if i <= last}
-        kept = {i for i in kept if i >= len(GRID) or GRID[i] <= HIGHEST + 1e-9}
-        return sorted(kept, key=lambda i: float(best[i]))
+        return [
+            (number, min(max(i for i in family if likely[i]), max(self._claimed & set(family))))
+            for number, family in enumerate(self.families)
+            if likely[list(family)].any()
+        ]
 
     def scan(self, y: Array, rng: np.random.Generator, trials: int, level: float) -> Scan:
         """The best candidate for ``y`` (n,) and its p-value from ``trials`` simulated series a shape."""
         weighted = (self.root * (y - y.mean()))[:, np.newaxis]
-        plain, best = self._deviances(weighted)
-        gain = float(plain.min() - best.min())
+        plain, best = self._deviances(weighted, range(len(self.prepared)))
+        gains = [float(plain[list(own)].min() - best[list(own)].min()) for own in self.families]
         p = 0.0
-        for place in self._not_refuted(best[:, 0]):
-            p = max(p, self._p_value(gain, place, level, rng, trials))
+        for family, place in self._not_refuted(best[:, 0]):
+            p = max(p, self._p_value(gains[family], family, place, level, rng, trials))
             if p > level:
                 break
         likeliest = self.prepared[int(best[:, 0].argmin())]

@@ -13,7 +13,7 @@ from monitor.store.analyses import (
     stored_analyses,
 )
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
-from monitor.store.campaigns import Imported, import_campaign, load_campaign
+from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import described_machines, list_campaigns, list_machines, list_runs
 from monitor.store.certificates import (
     StoredCertificate,
@@ -24,6 +24,7 @@ from monitor.store.certificates import (
     save_certificate,
 )
 from monitor.store.connection import Database
+from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.events import list_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
@@ -56,6 +57,7 @@ __all__ = [
     "StoredSelection",
     "Verification",
     "clear_refusals",
+    "curve_names",
     "described_machines",
     "export_tables",
     "find_certificate",
@@ -63,6 +65,8 @@ __all__ = [
     "fleet_sums",
     "identification_by_number",
     "import_campaign",
+    "import_curve",
+    "is_curve",
     "list_analyses",
     "list_backups",
     "list_campaigns",
@@ -77,6 +81,7 @@ __all__ = [
     "load_analysis",
     "load_campaign",
     "load_certificate",
+    "load_curve",
     "load_identification",
     "load_model",
     "machine_history",

@@ -10,23 +10,29 @@ import numpy as np
 
 from monitor import __version__
 from monitor.exceptions import CampaignError, DataError, Fault
-from monitor.records import Campaign, Run, SourceFile
+from monitor.records import Campaign, CurveCampaign, Run, SourceFile
 from monitor.store import audit, probings, record_json
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
+from monitor.store.curves import curve_content, insert_curve, is_curve, load_curve
 
 
 @dataclass(frozen=True)
 class Imported:
-    """What an import did: "imported", or "unchanged" where the same content was there already."""
+    """What an import did: "imported", or "unchanged" where the same content was there already.
+
+    ``rows`` is the number of rows of a curve, None for the campaign of a machine.
+    """
 
     campaign: str
     state: Literal["imported", "unchanged"]
     runs: int
     probings: int
 
+    rows: int | None = None
+
     def __str__(self) -> str:
-        size = f"{self.runs} runs, {self.probings} probings"
+        size = f"{self.runs} runs, {self.probings} probings" if self.rows is None else f"{self.rows} rows"
         if self.state == "imported":
             return f"{self.campaign}: imported, {size}"
         return f"{self.campaign}: was imported before with the same content, nothing changed ({size})"
@@ -81,14 +87,38 @@ def import_campaign(db: Database, campaign: Campaign) -> Imported:
     return done
 
 
+def import_curve(db: Database, curve: CurveCampaign) -> Imported:
+    """Keep a curve and the bytes of its files, or say that the same is there already. Raises as ``import_campaign``."""
+    content = curve_content(curve)
+    with db.transaction():
+        known = db.rows(
+            "SELECT campaign_id, content_sha256, imported_at FROM campaign WHERE campaign = ?", [curve.name]
+        )
+        if known:
+            faults = _differences(db, curve, content, *known[0])
+            if faults:
+                raise CampaignError(curve.name, faults)
+            return Imported(curve.name, "unchanged", 0, 0, len(curve))
+        insert_curve(db, db.next_number("campaign", "campaign_id"), curve, content)
+        audit.record(db, "import", "campaign", curve.name, content)
+    return Imported(curve.name, "imported", 0, 0, len(curve))
+
+
 def load_campaign(db: Database, name: str) -> Campaign:
-    """The campaign as it was imported. Raises NotFoundError listing what is there."""
+    """The campaign as it was imported. Raises NotFoundError listing what is there, DataError for a curve."""
+    if is_curve(db, name):
+        raise DataError(
+            f"campaign {name} is a curve, not a machine: it can be identified, compared and explained "
+            "(monitor identify, compare, explain, model)"
+        )
     campaign, _ = _load(db, name)
     return campaign
 
 
 def stored_content(db: Database, name: str) -> str:
     """The content hash of a campaign, computed anew from everything that is stored of it."""
+    if is_curve(db, name):
+        return curve_content(load_curve(db, name))
     return _content(*_load(db, name))
 
 
@@ -123,7 +153,12 @@ def _content(campaign: Campaign, rows: probings.PrintedProbings) -> str:
 
 
 def _differences(
-    db: Database, campaign: Campaign, content: str, campaign_id: int, stored: str, imported_at: datetime
+    db: Database,
+    campaign: Campaign | CurveCampaign,
+    content: str,
+    campaign_id: int,
+    stored: str,
+    imported_at: datetime,
 ) -> list[Fault]:
     """What differs from the campaign of the same name; empty where the content is the same.
 

@@ -26,7 +26,7 @@ WITH chosen AS (
       AND ($version IS NULL OR i.model_version = $version)
     GROUP BY i.campaign_id
 )
-SELECT h.identification_id, c.campaign, r.run, r.started_at, r.utc_offset_s, r.day, r.warm_up, r.conditions
+SELECT h.identification_id, c.campaign, r.run, r.started_at, r.utc_offset_s, r.day, r.warm_up, r.conditions, c.method
 FROM chosen AS h JOIN campaign AS c USING (campaign_id) JOIN run AS r USING (campaign_id)
 WHERE r.started_at >= $since OR $since IS NULL
 ORDER BY r.started_at, h.identification_id, r.run
@@ -52,13 +52,15 @@ GROUP BY ALL ORDER BY ALL
 class MachineHistory:
     """n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
 
-    ``started_at`` keeps the shop's offset; ``values`` and ``u`` (n, p) are NaN where a parameter was refused;
-    ``conditions`` name to (n,): those of the runs and the means over each run of the recorded channels, in the unit
-    that the name ends in, NaN where not recorded. ``tolerances`` are those of the machine's latest campaign.
+    ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
+    are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
+    the recorded channels, in the unit that the name ends in, NaN where not recorded. ``tolerances`` are those of the
+    machine's latest campaign.
     """
 
     machine: str
     campaign: npt.NDArray[np.str_]
+    method: npt.NDArray[np.str_]
     run: npt.NDArray[np.int64]
     started_at: tuple[datetime, ...]
     day: npt.NDArray[np.int64]
@@ -99,6 +101,7 @@ def machine_history(
     return MachineHistory(
         machine=machine,
         campaign=campaign,
+        method=np.array([row[8] for row in rows], dtype=np.str_),
         run=run,
         started_at=tuple(
             row[3].replace(tzinfo=UTC).astimezone(timezone(timedelta(seconds=row[4]))) for row in rows

@@ -10,17 +10,19 @@ from typing import Any
 
 from monitor.exceptions import CampaignError, InputError, NotFoundError, StoreError
 from monitor.readers import names_in, read_campaign
-from monitor.records import Campaign
+from monitor.records import Campaign, CurveCampaign
 from monitor.store import (
     Database,
     Imported,
     clear_refusals,
     import_campaign,
+    import_curve,
     list_campaigns,
     list_runs,
     load_campaign,
     record_refusal,
 )
+from monitor.workflow.curve_base import check_base
 
 Document = dict[str, Any]
 
@@ -49,6 +51,7 @@ def import_folders(
                 "state": imported.state,
                 "runs": imported.runs,
                 "probings": imported.probings,
+                "rows": imported.rows,
                 "message": str(imported),
             }
         )
@@ -59,7 +62,12 @@ def _import(db: Database, folder: Path) -> Imported:
     """Import one folder, which settles earlier refusals of it or of its campaign, or record that it was refused."""
     place = _whole(folder)
     try:
-        imported = import_campaign(db, read_campaign(folder))
+        found = read_campaign(folder)
+        if isinstance(found, CurveCampaign):
+            check_base(found)
+            imported = import_curve(db, found)
+        else:
+            imported = import_campaign(db, found)
     except StoreError:
         # Nothing is wrong with the folder; and where the database cannot be written nothing can be recorded.
         raise

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -64,6 +64,16 @@ def day_means(series: Recorded) -> tuple[Array, Array, Array | None, Array]:
     return t[order], y[order], u[order] if u.max() > ALIKE * u.min() else None, series.t[first[order]]
 
 
+class _Plan(NamedTuple):
+    """What is searched at once; ``days`` are None where the values are means of days."""
+
+    t: Array
+    begins: Array
+    u: Array | None
+    days: npt.NDArray[np.str_] | None
+    values: dict[str, Array]
+
+
 def search_changes(
     every: Sequence[Recorded], events: Sequence[float], *, false_alarm: float, seed: int
 ) -> Mapping[str, tuple[History | None, str | None]]:
@@ -74,32 +84,35 @@ def search_changes(
     share of ``false_alarm``, the probability of any finding where there is nothing to find. The ``at`` of a
     change is the start of its run, or of the first run of its day.
     """
-    searches: dict[tuple[bytes, bytes], tuple[Array, Array, Array | None, dict[str, Array]]] = {}
+    searches: dict[tuple[bytes, ...], _Plan] = {}
     for series in every:
         if len(np.unique(series.days)) >= DAYS_FOR_MEANS:
             t, y, u, begins = day_means(series)
+            days = None
         else:
             t, y, begins, u = series.t, series.values, series.t, weights_of(series)
             u = u if u is not None and u.max() > ALIKE * u.min() else None
-        key = (t.tobytes(), b"" if u is None else u.tobytes())
-        searches.setdefault(key, (t, begins, u, {}))[3][series.name] = y
+            days = series.days
+        key = tuple(b"" if one is None else one.tobytes() for one in (t, u, days))
+        searches.setdefault(key, _Plan(t, begins, u, days, {})).values[series.name] = y
     found: dict[str, tuple[History | None, str | None]] = {}
-    for t, begins, u, values in searches.values():
+    for plan in searches.values():
+        t, values, u = plan.t, plan.values, plan.u
         pieces = len({0, *np.searchsorted(t, np.asarray(events, dtype=np.float64)).tolist()} - {len(t)})
         try:
             history = find_changes(
                 values, t, rng=np.random.default_rng([seed, len(t)]), events=sorted(events),
-                u=None if u is None else dict.fromkeys(values, u),
+                u=None if u is None else dict.fromkeys(values, u), days=plan.days,
                 false_alarm=false_alarm * len(values) / len(every),
-                # Twice as many trials as the level of one parameter in one piece needs at least.
-                trials=max(TRIALS, ceil(2 * len(every) * pieces / false_alarm)),
+                # Five times as many trials as the level of one parameter in one piece needs at least.
+                trials=max(TRIALS, ceil(5 * len(every) * pieces / false_alarm)),
             )  # fmt: skip
         except DataError as error:
             found |= dict.fromkeys(values, (None, f"no search for changes: {error}"))
             continue
         for name in values:
             changes, trends = (
-                tuple(_at_first_run(one, begins) for one in part if one.parameter == name)
+                tuple(_at_first_run(one, plan.begins) for one in part if one.parameter == name)
                 for part in (history.changes, history.trends)
             )
             found[name] = (replace(history, changes=changes, trends=trends), None)

@@ -9,16 +9,18 @@ import numpy as np
 
 from monitor.discovery import Comparison, Explanation, Fit, Missing, explain, fit, version_error
 from monitor.discovery import compare as compare_fit
-from monitor.discovery.compare import Part
+from monitor.discovery.compare import SOMETHING_IS_MISSING, Part
 from monitor.discovery.steps import Step
 from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import method_named
 from monitor.methods.shared_effects import shared_parameters
 from monitor.records import Campaign
-from monitor.store import Database, StoredModel, load_campaign, model_history, save_analysis
+from monitor.store import Database, StoredModel, is_curve, load_campaign, model_history, save_analysis
 from monitor.units import DEGREE, MICROMETRE, Unit
+from monitor.workflow import curves
 from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.models import as_model, label, resolve
+from monitor.workflow.residuals_against import picture_documents
 
 Document = dict[str, Any]
 
@@ -180,6 +182,12 @@ def explanation_document(found: Explanation) -> Document:
         "not_recorded": dict(found.refused),
     }
     document["answer"] = _answer(document)
+    # Where nothing is missing there is nothing to picture.
+    document |= (
+        picture_documents(found, missing[0]["effect"] if missing else None)
+        if document["verdict"] == SOMETHING_IS_MISSING
+        else {"residual_map": None, "residual_against": None}
+    )
     return document
 
 
@@ -257,11 +265,18 @@ def latest_campaign(db: Database, model: StoredModel) -> str:
     )
 
 
-def history(db: Database, model: str, campaign: str | None = None) -> list[Document]:
-    """The error falling: every version from the base on, fitted to one campaign."""
+def history(
+    db: Database, model: str, campaign: str | None = None, *, before: datetime | None = None
+) -> list[Document]:
+    """The error falling: every version from the base on, fitted to one campaign.
+
+    Runs that began at or after ``before`` (local time without a zone) take no part.
+    """
     stored = resolve(db, model)
     name = campaign or latest_campaign(db, stored)
-    loaded = load_campaign(db, name)
+    if is_curve(db, name):
+        return curves.history(db, stored, name)
+    loaded = runs_before(load_campaign(db, name), before)
     steps = []
     for version in model_history(db, stored.name, stored.version):
         found = fit(method_named(loaded.method).problem_of(loaded, as_model(version)))

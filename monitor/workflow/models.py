@@ -9,13 +9,26 @@ from __future__ import annotations
 from typing import Any
 
 from monitor.effects import parse_effect
+from monitor.effects.curve import inputs_of, parse_curve_effect
+from monitor.effects.curve_words import describe_curve
 from monitor.effects.words import describe
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods import METHODS
 from monitor.methods.base_effects import base_effects
+from monitor.methods.curve import NAME as CURVE
+from monitor.methods.curve import problem_of
 from monitor.methods.model import Model, chain_of
-from monitor.store import Database, StoredModel, described_machines, list_models, load_model, save_model
+from monitor.store import (
+    Database,
+    StoredModel,
+    curve_names,
+    described_machines,
+    list_models,
+    load_curve,
+    load_model,
+    save_model,
+)
 
 Document = dict[str, Any]
 
@@ -28,13 +41,14 @@ def resolve(db: Database, name: str | None, method: str = "samba") -> StoredMode
     try:
         return load_model(db, wanted, int(version) if version else None)
     except NotFoundError as error:
-        if wanted in METHODS and not version.strip("1"):
+        own = (*METHODS, CURVE)
+        if wanted in own and not version.strip("1"):
             # The method's own model needs nobody to make it.
             return save_model(db, wanted, (), note="the method's own model")
         if list_models(db).empty:
-            if wanted in METHODS:
+            if wanted in own:
                 raise NotFoundError(f"model '{wanted}' has no version {version}; it has 1") from error
-            raise NotFoundError(f"there is no model '{wanted}'; there are {', '.join(METHODS)}") from error
+            raise NotFoundError(f"there is no model '{wanted}'; there are {', '.join(own)}") from error
         raise
 
 
@@ -69,7 +83,7 @@ def _label_of(parent: tuple[str, int]) -> str:
 
 def list_(db: Database) -> Document:
     """All models with their versions."""
-    for method in METHODS:
+    for method in (*METHODS, *([CURVE] if curve_names(db) else [])):
         resolve(db, method)
     frame = list_models(db)
     return {
@@ -84,6 +98,8 @@ def show(db: Database, name: str) -> Document:
     """A model, its added effects in words, and its base effects on every machine that is there."""
     stored = resolve(db, name)
     method = _method_of(db, stored)
+    if method == CURVE:
+        return {**_document(stored), **_curve_words(db, stored)}
     base: dict[str, list[str]] = {}
     words: dict[str, str] = {}
     for machine in described_machines(db):
@@ -101,14 +117,18 @@ def show(db: Database, name: str) -> Document:
     return {**_document(stored), "base": base, "meaning": words}
 
 
-def add(db: Database, effect: str, to: str, as_: str | None = None, note: str = "") -> StoredModel:
+def add(
+    db: Database, effect: str, to: str, as_: str | None = None, note: str = "", campaign: str | None = None
+) -> StoredModel:
     """A new version with one more effect; its parent is the old one.
 
-    The effect must exist on one of the machines that are there. Raises EffectError, NotFoundError.
+    The effect must exist on one of the machines that are there, or for a curve in its ``campaign``, else in one of
+    the curves that are there. Raises EffectError, NotFoundError.
     """
     parent = resolve(db, to)
-    text = _known(db, effect)
-    if _is_base(db, text, _method_of(db, parent)):
+    method = _method_of(db, parent)
+    text = _known_to_curves(db, effect, campaign) if method == CURVE else _known(db, effect)
+    if method != CURVE and _is_base(db, text, method):
         raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
     if text in parent.effects:
         raise InputError(
@@ -139,11 +159,52 @@ def _name(as_: str | None, parent: StoredModel) -> str:
     return as_
 
 
+def is_curve_model(db: Database, stored: StoredModel) -> bool:
+    """Whether a model descends from that of curves."""
+    return _method_of(db, stored) == CURVE
+
+
+def _known_to_curves(db: Database, effect: str, campaign: str | None) -> str:
+    """The effect in its own words, if the curve named, or any curve, has its columns and not the effect itself."""
+    names = curve_names(db) if campaign is None else (campaign,)
+    if not names:
+        raise NotFoundError("there is no curve yet that could have an effect; import a campaign of one first")
+    fault: InputError | None = None
+    for name in names:
+        curve = load_curve(db, name)
+        try:
+            text = parse_curve_effect(effect, inputs_of(curve)).text
+            problem_of(curve, Model(name, added=(text,)))
+            return text
+        except InputError as error:
+            fault = fault or error
+    assert fault is not None
+    raise fault
+
+
+def _curve_words(db: Database, stored: StoredModel) -> Document:
+    """The base of every curve, and what the added effects mean for the first that has them."""
+    base: dict[str, list[str]] = {}
+    words: dict[str, str] = {}
+    for name in curve_names(db):
+        curve = load_curve(db, name)
+        base[name] = [curve.base]
+        for text in stored.effects:
+            try:
+                found = parse_curve_effect(text, inputs_of(curve))
+            except InputError:
+                continue
+            unit = curve.units.get(found.column, "")
+            clock = found.column == curve.time
+            words.setdefault(text, describe_curve(found, curve.response, unit, clock=clock).meaning)
+    return {"base": base, "meaning": words}
+
+
 def _method_of(db: Database, stored: StoredModel) -> str:
     """The method that a model descends from."""
     while stored.parent is not None:
         stored = load_model(db, *stored.parent)
-    return stored.name if stored.name in METHODS else next(iter(METHODS))
+    return stored.name if stored.name in (*METHODS, CURVE) else next(iter(METHODS))
 
 
 def _base_of(method: str, chain: Chain) -> tuple[str, ...]:

@@ -45,9 +45,9 @@ class Piece:
 def block(
     top: tuple[float, float, float] = (0.0, -200.0, 170.0),
     half: float = 50.0,
-    along: Sequence[float] = (-30.0, -10.0, 10.0, 30.0),
+    along: Sequence[float] = (-34.0, -12.0, 12.0, 34.0),
     height: float = 160.0,
-    grid: float = 33.0,
+    grid: float = 35.0,
 ) -> list[Feature]:
     """The paper's block: four points on each side face at one height, twelve round the top face, 28 in all."""
     x0, y0, z0 = top

@@ -6,9 +6,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-from monitor.cli import output
+from monitor.cli import curve_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.store import is_curve
 from monitor.workflow.comparison import compare
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
@@ -26,6 +27,8 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options) as db, output.working("comparing"), db.transaction():
+        if is_curve(db, options.campaign):
+            return curve_output.compare(db, options)
         found, fitted = compare(db, options.campaign, options.model)
         if options.figures is not None:
             from monitor.workflow.figures import comparison_figures

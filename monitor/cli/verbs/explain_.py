@@ -6,10 +6,11 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-from monitor.cli import output
+from monitor.cli import curve_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.cli.verbs.compare_ import summary
+from monitor.store import is_curve
 from monitor.workflow.comparison import explain_campaign, fitted
 
 EXAMPLE = "monitor explain hidden-spindle-growth --figures figures"
@@ -30,6 +31,8 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options) as db, output.working("searching"), db.transaction():
+        if is_curve(db, options.campaign):
+            return curve_output.explain(db, options)
         found, explanation = explain_campaign(db, options.campaign, options.model, options.rate)
         if options.figures is not None:
             from monitor.workflow.figures import comparison_figures, explanation_figures

@@ -5,11 +5,14 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
-from monitor.cli import output
+from monitor.cli import curve_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.workflow import campaigns
+from monitor.exceptions import InputError
+from monitor.store import is_curve
+from monitor.workflow import campaigns, curves
 from monitor.workflow.identification import identify
+from monitor.workflow.stepwise import steps
 
 EXAMPLE = "monitor identify five-days"
 # A screen holds so many runs beside the names of the parameters.
@@ -19,14 +22,28 @@ SHOWN_RUNS = 6
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", nargs="?", metavar="CAMPAIGN")
-    parser.add_argument("--model", metavar="NAME", help="a model, or a version of it: NAME@2 (default samba)")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="this run alone")
+    parser.add_argument(
+        "--stepwise",
+        action="store_true",
+        help="for l-shape: one run step by step as well, beside the fit of all at once, and why they differ",
+    )
 
 
 def run(options: Namespace) -> int:
+    if options.stepwise:
+        return _stepwise(options)
     with opened(options) as db, output.working("identifying"), db.transaction():
         names = campaigns.chosen(db, options.campaign)
-        found = [identify(db, name, options.model, options.number) for name in names]
+        found = [
+            (curves.identify if is_curve(db, name) else identify)(db, name, options.model, options.number)
+            for name in names
+        ]
     if options.json:
         output.document(found[0] if options.campaign is not None else {"identifications": found})
         return 0
@@ -35,8 +52,47 @@ def run(options: Namespace) -> int:
     return 0
 
 
+def _stepwise(options: Namespace) -> int:
+    if options.campaign is None:
+        raise InputError("--stepwise shows one run: name its campaign")
+    with opened(options) as db, output.working("identifying step by step"):
+        found = steps(db, options.campaign, options.model, options.number)
+    if options.json:
+        output.document(found)
+        return 0
+    rows = []
+    for name, one in found["stepwise"].items():
+        once = one["at_once"]
+        rows.append(
+            [
+                name,
+                one["unit"],
+                output.rounded(one["stepwise"], one["u_stepwise"]),
+                output.two_digits(one["u_stepwise"]),
+                "-" if once is None else output.rounded(once, one["u_at_once"]),
+                "-" if once is None else output.two_digits(one["u_at_once"]),
+                "-" if once is None else output.rounded(one["difference_by_method"], one["u_stepwise"]),
+                "" if one["agrees"] else "differs",
+                one["why"],
+            ]
+        )
+    output.table(
+        f"{found['campaign']}, run {found['run']}: step by step and all at once",
+        ["parameter", "unit", "stepwise", "u", "at once", "u", "by method", "", "what tells them apart"],
+        rows,
+        left=2,
+    )
+    output.say(
+        "by method: what of the difference remains without noise; 'differs': the rest exceeds 2 u of it"
+    )
+    return 0
+
+
 def show(found: dict[str, Any]) -> None:
     """The parameters of the runs, newest last, and what was refused."""
+    if found["method"] == "curve":
+        curve_output.coefficients(found)
+        return
     runs = found["runs"][-SHOWN_RUNS:]
     names = list(dict.fromkeys(name for one in runs for name in one["parameters"]))
     rows = []

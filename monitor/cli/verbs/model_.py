@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from monitor.cli import output
+from monitor.cli import curve_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common, told
 from monitor.exceptions import NotFoundError
@@ -75,7 +75,8 @@ def _show(options: Namespace) -> int:
         return 0
     output.say(f"{found['model']}" + (f", from {found['parent']}" if found["parent"] else ""))
     for machine, effects in found["base"].items():
-        output.say(f"  free in every run of {machine}: {' '.join(effects)}")
+        told = "base of" if "~" in effects[0] else "free in every run of"
+        output.say(f"  {told} {machine}: {' '.join(effects)}")
     for effect in found["effects"]:
         output.say(
             f"  shared by all runs: {effect}: {found['meaning'].get(effect, 'no machine here has it')}"
@@ -86,7 +87,7 @@ def _show(options: Namespace) -> int:
 def _add(options: Namespace) -> int:
     # One transaction: a campaign that is not there leaves no model behind.
     with opened(options) as db, output.working("fitting"), db.transaction():
-        made = models.add(db, options.effect, options.to, options.as_, options.note)
+        made = models.add(db, options.effect, options.to, options.as_, options.note, options.campaign)
         document = models.show(db, f"{made.name}@{made.version}")
         try:
             document["history"] = comparison.history(db, f"{made.name}@{made.version}", options.campaign)
@@ -124,9 +125,14 @@ def _history(options: Namespace) -> int:
         steps = comparison.history(db, options.name, options.campaign)
     files = []
     if options.figures is not None:
-        from monitor.workflow.figures import history_figure
+        if steps[0].get("method") == "curve":
+            from monitor.workflow.curve_figures import curve_history_figure
 
-        files = history_figure(steps, options.figures)
+            files = curve_history_figure(steps, options.figures)
+        else:
+            from monitor.workflow.figures import history_figure
+
+            files = history_figure(steps, options.figures)
     if options.json:
         output.document(steps)
         return 0
@@ -137,6 +143,9 @@ def _history(options: Namespace) -> int:
 
 
 def _steps(steps: list[comparison.Document]) -> None:
+    if steps[0].get("method") == "curve":
+        curve_output.steps(steps)
+        return
     rows = [
         [
             one["model"],

@@ -55,7 +55,7 @@ def read(folder: Path) -> Campaign:
             table,
             None if top is None else part.axes,
             {} if top is None else part.strokes,
-            balls if rules is not None and rules.targets_are_balls else None,
+            _targets(rules, balls, artefact),
             None if runs is None or _has_lost_a_run(runs_table, runs) else runs.lines,
             rules,
             faults,
@@ -77,6 +77,17 @@ def read(folder: Path) -> Campaign:
     assert runs is not None
     assert probings is not None
     return Campaign(name, method, part.machine, probe, artefact, runs.runs, probings.probings, tuple(files))
+
+
+def _targets(
+    rules: MethodRules | None, balls: list[str] | None, artefact: Artefact | None
+) -> list[str] | None:
+    """The names that a target may have; None where they are free or not known."""
+    if rules is not None and rules.targets_are_balls:
+        return balls
+    if rules is not None and rules.targets_are_reflectors and artefact is not None and artefact.reflectors:
+        return [reflector.id for reflector in artefact.reflectors]
+    return None
 
 
 def _refuse_other_format(top: Table) -> None:
@@ -104,6 +115,14 @@ def _artefact_fits(top: Table, artefact: Artefact | None, rules: MethodRules | N
     bar = artefact.scale_bar
     if rules.needs_scale_bar and bar is None:
         told = f"the table [artefact.scale_bar] is missing; the method {rules.name} needs a calibrated bar"
+        top.fault("artefact", told)
+        return False
+    if rules.needs_self_calibration and artefact.self_calibration is None:
+        told = f"the table [artefact.self_calibration] is missing; the method {rules.name} needs its nodes"
+        top.fault("artefact", told)
+        return False
+    if rules.needs_l_shape and artefact.l_shape is None:
+        told = f"the table [artefact.l_shape] is missing; the method {rules.name} needs its modules and placements"
         top.fault("artefact", told)
         return False
     ends = () if bar is None else bar.balls

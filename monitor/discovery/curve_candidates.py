@@ -1,0 +1,311 @@
+"""What a curve may lack: every effect that its columns allow, as candidates for the same scan that machines have.
+
+A polynomial is tried as the part of its power that the lower ones cannot do (orthogonal over the measured
+rows), so that neither origin nor unit of the input matters and a line is not taken for a parabola.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+from scipy import optimize
+
+from monitor.discovery.evidence import orthonormal, weigh, without
+from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Variant, Visible
+from monitor.effects import ChainEffect
+from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, curve_columns, group_names
+from monitor.effects.curve_words import CALENDAR
+from monitor.methods.curve import CurveFit, CurveProblem, grid
+from monitor.records import Array
+from monitor.statistics.noise import Noise
+
+POWERS = (1, 2, 3)
+#: Numbers in all candidates together: 160 MB. Beyond, only the values that explain most by themselves are kept;
+#: the search over all of them is still paid for.
+MOST_NUMBERS = 20_000_000
+#: Periods looked at for one input; a series of 4000 rows has as many, a longer one is not searched below
+#: range / 2000.
+MOST_PERIODS = 6000
+#: A calendar period is looked for from so many cycles on.
+FEWEST_CYCLES = 1.5
+#: Two periods of one input are told apart from a whole cycle over its range on (Rayleigh's criterion).
+APART = 1.0
+
+
+@dataclass(frozen=True)
+class CurveVariant(Variant):
+    """A variant of an effect of a curve. The scan itself reads family, tries and odds only."""
+
+    @property
+    def curve(self) -> CurveEffect:
+        """The effect."""
+        return cast(CurveEffect, self.effect)
+
+
+def variant(effect: CurveEffect, tries: int = 1, family: str | None = None) -> CurveVariant:
+    """An effect as the scan takes it."""
+    return CurveVariant(family or effect.family, cast(ChainEffect, effect), tries)
+
+
+def effect_of(candidate: Candidate) -> CurveEffect:
+    """The effect of a candidate of a curve."""
+    assert isinstance(candidate.variant, CurveVariant)
+    return candidate.variant.curve
+
+
+def tries_of(effect: CurveEffect, values: Array) -> list[int]:
+    """What the search for each value costs: the inverse of its probability beforehand.
+
+    Periods are as likely between 5 and 10 as between 50 and 100 (even in the logarithm), constants and places all
+    the same.
+    """
+    if effect.shape != "sin":
+        return [len(values)] * len(values)
+    total = float(np.sum(values))
+    return [int(np.ceil(total / value)) for value in values]
+
+
+def catalogue(problem: CurveProblem) -> Iterator[CurveEffect]:
+    """Every effect that the columns name; those that the model has already are left out."""
+    known = {effect.family for effect in problem.effects if effect.shape != "sin"}
+    has = {(effect.column, power) for effect in problem.effects for power in range(1, effect.order + 1)}
+    clock = problem.curve.time or SEQUENCE
+    for name in problem.inputs.numbers:
+        if name == SEQUENCE and (clock != SEQUENCE or rows_are_sorted(problem)):
+            continue
+        for power in POWERS:
+            if (name, power) not in has:
+                yield CurveEffect(name, "drift" if name == clock and power == 1 else f"poly{power}")
+        if name == clock:
+            yield from _calendar(problem, name)
+        yield from (
+            CurveEffect(name, shape, free=True) for shape in SEARCHED if f"{name}:{shape}" not in known
+        )
+    for name in problem.inputs.groups:
+        if f"{name}:group" not in known:
+            yield CurveEffect(name, "group")
+
+
+def _calendar(problem: CurveProblem, clock: str) -> Iterator[CurveEffect]:
+    """The periods that nobody needs to search: those of the calendar that the rows can show."""
+    x = np.unique(problem.inputs.numbers[clock])
+    known = {effect.text for effect in problem.effects}
+    for length, _, _ in CALENDAR.get(problem.inputs.units.get(clock, ""), ()):
+        effect = CurveEffect(clock, "sin", length)
+        enough = (x[-1] - x[0]) / length >= FEWEST_CYCLES and len(x) >= 2 * (x[-1] - x[0]) / length
+        if enough and effect.text not in known:
+            yield effect
+
+
+def rows_are_sorted(problem: CurveProblem) -> bool:
+    """Whether the order of the rows follows the inputs, so that it says nothing of time: an input that only rises or
+    falls and repeats values, or labels in blocks within blocks."""
+    for name, values in problem.inputs.numbers.items():
+        steps = np.diff(values)
+        if name != SEQUENCE and (steps == 0).any() and ((steps >= 0).all() or (steps <= 0).all()):
+            return True
+    blocks = np.zeros(len(problem.curve), dtype=np.int64)
+    nested = 0
+    for labels in problem.inputs.groups.values():
+        both = [f"{block} {label}" for block, label in zip(blocks, labels, strict=True)]
+        changes = 1 + sum(one != other for one, other in pairwise(both))
+        if changes == len(set(both)) and len(set(both)) > len(np.unique(blocks)):
+            blocks = np.unique(both, return_inverse=True)[1]
+            nested += 1
+    return nested > 1
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A fitted curve as the scan sees it: rows with weight in the order of time, whitened by ``noise``.
+
+    ``design`` (m, c) are the whitened columns of the model and ``basis`` spans them; ``measured`` (m,) is the
+    whitened response.
+    """
+
+    fit: CurveFit
+    noise: Noise
+    measured: Array
+    design: Array
+    basis: Array
+
+    def whitened(self, columns: Array) -> Array:
+        """Columns (n, k) of all rows as the scan sees them, the model not yet taken out."""
+        return self.noise.whiten(columns[self.fit.problem.order])[0]
+
+    def candidate(self, effect: CurveEffect, tries: int = 1, family: str | None = None) -> Candidate:
+        """One candidate, the model taken out of its columns."""
+        return self.candidates([effect], [tries], [family])[0]
+
+    def candidates(
+        self,
+        effects: Sequence[CurveEffect],
+        tries: Sequence[int],
+        families: Sequence[str | None] | None = None,
+    ) -> list[Candidate]:
+        """Several candidates at once, the model taken out of their columns."""
+        raw = [self.columns(effect) for effect in effects]
+        if not raw:
+            return []
+        white = self.whitened(np.concatenate(raw, axis=1))
+        left = without(self.basis, white)
+        before, after = np.linalg.norm(white, axis=0), np.linalg.norm(left, axis=0)
+        share = after / np.where(before == 0, 1.0, before)
+        left[:, share <= SMALLEST_SHARE] = 0.0
+        made, place = [], 0
+        for number, effect in enumerate(effects):
+            own = slice(place, place + raw[number].shape[1])
+            place = own.stop
+            family = None if families is None else families[number]
+            made.append(
+                Candidate(
+                    variant(effect, tries[number], family),
+                    left[:, own],
+                    np.zeros((0, 3, own.stop - own.start)),
+                    float(share[own].max(initial=0.0)),
+                    np.inf,
+                )
+            )
+        return made
+
+    def columns(self, effect: CurveEffect, value: float | None = None) -> Array:
+        """Columns (n, k) of an effect; of a polynomial the part that the lower powers cannot do."""
+        if not effect.order:
+            return curve_columns(effect, self.fit.problem.inputs, value)
+        x = self.fit.problem.inputs.numbers[effect.column]
+        kept = x[self.fit.problem.order]
+        middle, half = (kept.max() + kept.min()) / 2.0, (kept.max() - kept.min()) / 2.0 or 1.0
+        powers = ((x - middle) / half)[:, None] ** np.arange(effect.order + 1)
+        lower, own = powers[:, :-1], powers[:, -1:]
+        rows = self.fit.problem.order
+        return np.asarray(own - lower @ np.linalg.lstsq(lower[rows], own[rows], rcond=1e-12)[0])
+
+
+def scene_of(fit: CurveFit, noise: Noise) -> Scene:
+    """A fit as the scan sees it."""
+    rows = fit.problem.order
+    white = noise.whiten(np.column_stack([fit.problem.curve.measured, fit.design])[rows])[0]
+    return Scene(fit, noise, white[:, 0], white[:, 1:], orthonormal_to_full_precision(white[:, 1:]))
+
+
+def orthonormal_to_full_precision(columns: Array) -> Array:
+    """An orthonormal basis (m, r) of columns, to full precision: calendar years to the third power."""
+    scale = np.linalg.norm(columns, axis=0)
+    u, values, _ = np.linalg.svd(columns / np.where(scale == 0, 1.0, scale), full_matrices=False)
+    return np.asarray(u[:, values > 1e-12 * max(values.max(initial=0.0), 1e-300)])
+
+
+def see(scene: Scene) -> Visible:
+    """All candidates, and the residual that they may explain."""
+    problem = scene.fit.problem
+    residual = without(scene.basis, scene.measured[:, None])[:, 0]
+    candidates: list[Candidate] = []
+    refused: list[tuple[str, str]] = []
+    room = MOST_NUMBERS // max(len(residual), 1) // 2
+    for effect in catalogue(problem):
+        if effect.free:
+            values = grid(effect, problem.inputs)[:MOST_PERIODS]
+            if len(values) == 0:
+                refused.append((effect.text, f"{effect.column} takes too few values to search it"))
+                continue
+            costs = dict(zip(values.tolist(), tries_of(effect, values), strict=True))
+            if len(values) > room // len(problem.inputs.numbers):
+                values = _promising(scene, residual, effect, values, room // len(problem.inputs.numbers))
+            searched = values.tolist()
+            candidates += scene.candidates(
+                [effect.at(value) for value in searched], [costs[value] for value in searched]
+            )
+        elif effect.order and len(np.unique(problem.inputs.numbers[effect.column])) <= effect.order:
+            refused.append((effect.text, f"{effect.column} takes too few values"))
+        elif effect.shape == "group" and not _groups_say_something(problem, effect):
+            refused.append(
+                (effect.text, f"{effect.column} has one label, or a label of its own in nearly every row")
+            )
+        else:
+            candidates.append(scene.candidate(effect))
+    return Visible(
+        residual=residual,
+        added=np.zeros((len(residual), 0)),
+        run=np.zeros(len(residual), dtype=np.int64),
+        degrees_of_freedom=len(residual) - scene.basis.shape[1],
+        candidates=tuple(candidates),
+        refused=tuple(refused),
+    )
+
+
+def _groups_say_something(problem: CurveProblem, effect: CurveEffect) -> bool:
+    labels = problem.inputs.groups[effect.column]
+    return 1 < len(group_names(labels)) <= len(labels) / 2
+
+
+def _promising(scene: Scene, residual: Array, effect: CurveEffect, values: Array, most: int) -> Array:
+    """The values that explain most of the residual, each by itself."""
+    explained = np.empty(len(values))
+    for place, value in enumerate(values):
+        left = without(scene.basis, scene.whitened(scene.columns(effect, float(value))))
+        own = orthonormal(left)
+        explained[place] = float(np.sum((own.T @ residual) ** 2))
+    return values[np.sort(np.argsort(-explained)[:most])]
+
+
+def separable(problem: CurveProblem) -> Callable[[Sequence[Candidate], Candidate], bool]:
+    """Whether a period lies far enough from those in the model and those chosen before."""
+    spans = {name: float(np.ptp(values)) for name, values in problem.inputs.numbers.items()}
+    known = [(one.column, 1.0 / one.value) for one in problem.effects if one.shape == "sin" and one.value]
+
+    def apart(chosen: Sequence[Candidate], one: Candidate) -> bool:
+        effect = effect_of(one)
+        if effect.shape != "sin" or effect.value is None:
+            return True
+        rate, least = 1.0 / effect.value, APART / spans[effect.column]
+        others = [effect_of(other) for other in chosen]
+        taken = [
+            (other.column, 1.0 / other.value) for other in others if other.shape == "sin" and other.value
+        ]
+        return all(
+            abs(other - rate) >= least for column, other in (*known, *taken) if column == effect.column
+        )
+
+    return apart
+
+
+def at_best(scene: Scene, visible: Visible, chosen: Sequence[Candidate], place: int) -> Candidate:
+    """The candidate at ``place`` with its searched value at its best, the other chosen ones fitted along.
+
+    Its family then holds the value, so that a second period of the same input can be found after it.
+    """
+    candidate = chosen[place]
+    effect = effect_of(candidate)
+    if not effect.free or effect.shape == "step" or effect.value is None:
+        return candidate if not effect.free else _named(candidate, effect)
+    others = np.concatenate(
+        [visible.added, *(one.columns for other, one in enumerate(chosen) if other != place)], axis=1
+    )
+    tries = candidate.variant.tries
+
+    def badness(rate: float) -> float:
+        one = scene.candidate(effect.at(1.0 / rate), tries)
+        found = weigh([one], visible.residual, others, visible.degrees_of_freedom)
+        return -found[0].explained
+
+    rate = 1.0 / effect.value
+    x = scene.fit.problem.inputs.numbers[effect.column]
+    width = 1.0 / (3.0 * float(np.ptp(x))) if effect.shape == "sin" else 0.35 * abs(rate)
+    low, high = (
+        (rate - width, rate + width)
+        if effect.shape != "sin"
+        else (max(rate - width, 0.3 * rate), rate + width)
+    )
+    best = optimize.minimize_scalar(
+        badness, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * width, "maxiter": 40}
+    )
+    better = effect.at(1.0 / float(best.x)) if best.fun <= badness(rate) else effect
+    return _named(scene.candidate(better, tries), better)
+
+
+def _named(candidate: Candidate, effect: CurveEffect) -> Candidate:
+    return replace(candidate, variant=variant(effect, candidate.variant.tries, effect.text))

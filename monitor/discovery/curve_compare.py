@@ -1,0 +1,133 @@
+"""A curve's model against its rows: how large the residual is, how large it should be, and where it is too large.
+
+Rows with equal inputs are repeats: their scatter is pure error, and lack of fit is tested against it (Draper and
+Smith, Applied regression analysis, section 2.1; NIST/SEMATECH e-Handbook 4.6.1.5). Without repeats the first
+step of the search for a missing effect is the test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from monitor.discovery.compare import (
+    EXPLAINED,
+    LACK_OF_FIT_LEVEL,
+    SOMETHING_IS_MISSING,
+    STATEMENT_TOLERANCE,
+    LackOfFit,
+    Part,
+    split,
+)
+from monitor.discovery.curve_explain import explain_curve
+from monitor.effects.curve import SEQUENCE
+from monitor.methods.curve import CurveFit
+from monitor.statistics.noise import Assessed, assess
+
+# A breakdown by an input shows where it fails in so many parts of equal numbers of rows.
+PARTS = 5
+
+
+@dataclass(frozen=True)
+class CurveComparison:
+    """A model against a curve, everything in the unit of the response.
+
+    ``repeatability`` is the standard deviation of repeats (None without), ``expected_rms`` what the stated
+    uncertainty would leave (None without), ``noise`` how neighbouring rows resemble each other under the model.
+    """
+
+    fit: CurveFit
+    lack_of_fit: LackOfFit | None
+    repeatability: float | None
+    expected_rms: float | None
+    excess_p_value: float | None
+    noise: Assessed
+    verdict: str
+    by: Mapping[str, Mapping[str, Part]]
+
+
+def places_of(fit: CurveFit) -> npt.NDArray[np.int64]:
+    """The place (n,) of every row: the same number for rows that agree in every column that the model uses."""
+    inputs = fit.problem.inputs
+    used = {effect.column for effect in fit.effects}
+    if any(effect.shape == "formula" for effect in fit.effects):
+        used |= {name for name in inputs.numbers if name != SEQUENCE}
+    place = np.zeros(inputs.count, dtype=np.int64)
+    for name in sorted(used):
+        values = inputs.numbers.get(name, inputs.groups.get(name))
+        if values is not None:
+            own = np.unique(values, return_inverse=True)[1]
+            place = np.unique(place * (own.max() + 1) + own, return_inverse=True)[1]
+    return np.asarray(place, dtype=np.int64)
+
+
+def lack_of_fit(fit: CurveFit) -> tuple[LackOfFit | None, float | None]:
+    """F of lack of fit over pure error, and the repeatability; None where no row was repeated."""
+    kept = ~fit.problem.left_out
+    scatter, lack, repeated = split(fit.residual[kept, None], places_of(fit)[kept])
+    own = fit.degrees_of_freedom - repeated
+    if repeated < 1:
+        return None, None
+    repeatability = float(np.sqrt(scatter / repeated))
+    if own < 1 or scatter <= 0.0:
+        return None, repeatability
+    f = (lack / own) / (scatter / repeated)
+    return LackOfFit(
+        float(f), float(stats.f.sf(f, own, repeated)), float(own), float(repeated)
+    ), repeatability
+
+
+def _part(residual: npt.NDArray[np.float64]) -> Part:
+    return Part(float(np.sqrt(np.mean(residual**2))), float(np.abs(residual).max()), len(residual))
+
+
+def _breakdown(fit: CurveFit) -> dict[str, dict[str, Part]]:
+    kept, inputs = ~fit.problem.left_out, fit.problem.inputs
+    found: dict[str, dict[str, Part]] = {}
+    for name, values in inputs.numbers.items():
+        edges = np.unique(np.quantile(values[kept], np.linspace(0.0, 1.0, PARTS + 1)))
+        parts = {}
+        for number, (low, high) in enumerate(pairwise(edges)):
+            last = number == len(edges) - 2
+            inside = kept & (values >= low) & ((values <= high) if last else (values < high))
+            if inside.any():
+                parts[f"{low:.6g} to {high:.6g}"] = _part(fit.residual[inside])
+        if len(parts) > 1:
+            found[name] = parts
+    for name, labels in inputs.groups.items():
+        found[name] = {
+            str(label): _part(fit.residual[kept & (labels == label)])
+            for label in dict.fromkeys(labels[kept].tolist())
+        }
+    return found
+
+
+def compare_curve(fit: CurveFit, *, rate: float = 0.01) -> CurveComparison:
+    """Compare a fitted model with its curve."""
+    problem, rows = fit.problem, fit.problem.order
+    test, repeatability = lack_of_fit(fit)
+    stated = problem.curve.standard_uncertainty
+    expected = excess = None
+    if stated is not None:
+        expected = stated * float(np.sqrt(fit.degrees_of_freedom / len(rows)))
+        excess = float(stats.chi2.sf(fit.sum_of_squares / stated**2, fit.degrees_of_freedom))
+    missing = test is not None and test.p_value < LACK_OF_FIT_LEVEL
+    if stated is not None and excess is not None:
+        missing |= fit.deviation > STATEMENT_TOLERANCE * stated and excess < LACK_OF_FIT_LEVEL
+    if test is None and not missing:
+        missing = bool(explain_curve(problem, rate=rate, most=1).missing)
+    return CurveComparison(
+        fit=fit,
+        lack_of_fit=test,
+        repeatability=repeatability,
+        expected_rms=expected,
+        excess_p_value=excess,
+        noise=assess(problem.curve.measured[rows], fit.design[rows]),
+        verdict=SOMETHING_IS_MISSING if missing else EXPLAINED,
+        by=_breakdown(fit),
+    )

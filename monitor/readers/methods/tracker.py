@@ -1,0 +1,50 @@
+"""Tracker: reflectors on the tool, and beside the machine, measured from outside at given joint readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from monitor.exceptions import Fault
+from monitor.readers.faults import quoted
+from monitor.readers.method_rules import CHANNELS_ONLY, MethodRules, Plan
+
+#: The frame has six unknowns and a reflector three; fewer poses than this cannot even give these.
+FEWEST_POSES = 4
+
+
+def check(plan: Plan) -> Iterable[Fault]:
+    """Faults of the plan: a run without a reflector on the tool, or with too few poses of it."""
+    fixed = {reflector.id for reflector in plan.artefact.reflectors if reflector.fixed}
+    probings = plan.probings
+    on_tool = ~np.isin(probings.target, sorted(fixed))
+    joints = np.column_stack([values for _, values in sorted(probings.readings.items())])
+    for run in plan.runs:
+        rows = probings.run == run
+        line = int(plan.lines[np.flatnonzero(rows)[0]])
+        poses = len(np.unique(joints[rows & on_tool], axis=0))
+        if not np.any(rows & on_tool):
+            told = "no reflector on the tool was measured; measure one or more besides the fixed ones"
+            yield Fault(plan.file, line, "target", f"run {run}: {told}")
+        elif poses < FEWEST_POSES:
+            yield Fault(
+                plan.file,
+                line,
+                "target",
+                f"run {run}: {poses} pose{'s' * (poses != 1)} of the tool; frame and reflector alone take "
+                f"{FEWEST_POSES} or more, and the errors of a robot some tens",
+            )
+    for name in sorted(fixed - set(probings.target.tolist())):
+        yield Fault(
+            "campaign.toml", None, "artefact.reflectors", f"reflector {quoted(name)} was never measured"
+        )
+
+
+RULES = MethodRules(
+    "tracker",
+    targets_are_reflectors=True,
+    suffixes=CHANNELS_ONLY,
+    measured_columns=("tracker_x_mm", "tracker_y_mm", "tracker_z_mm"),
+    check=check,
+)
