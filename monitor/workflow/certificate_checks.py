@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from monitor import __version__
 from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.certificate import CertificateRecord
@@ -117,14 +119,12 @@ def _claimed(db: Database, content: bytes) -> str:
             stored = load_certificate(db, number).pdf
         except NotFoundError:
             continue
-        differing = [
-            place for place, pair in enumerate(zip(content, stored, strict=False)) if pair[0] != pair[1]
-        ]
-        if len(content) != len(stored):
-            differing.append(min(len(content), len(stored)))
+        common = min(len(content), len(stored))
+        both = (np.frombuffer(one[:common], dtype=np.uint8) for one in (content, stored))
+        first = next(iter(np.flatnonzero(np.not_equal(*both))), common)
         return (
             f"it bears the number {number}, but differs from the document of that certificate from byte "
-            f"{differing[0]} on ({len(content)} bytes, where the genuine one has {len(stored)})"
+            f"{first} on ({len(content)} bytes, where the genuine one has {len(stored)})"
         )
     return "altered, or not from here"
 

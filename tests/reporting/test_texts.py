@@ -112,6 +112,17 @@ def test_what_a_page_marks_stays_and_what_a_user_writes_is_escaped() -> None:
             "with this plan EXX and EYY cannot be told apart; probe more indexations",
             "mit diesem Messplan nicht voneinander zu trennen: EXX und EYY; mehr Stellungen der Drehachsen antasten",
         ),
+        (
+            "with this plan EXX at 9 places cannot be told apart from lattice; lay the piece in the XY and the YZ "
+            "plane too",
+            "mit diesem Messplan nicht zu trennen: EXX an 9 Stellen von lattice; das Stück auch in die Ebene XY und YZ "
+            "legen",
+        ),
+        (
+            "with this plan EX0J1 cannot be told apart from tip z: J1, J2 stood still throughout; move them too",
+            "mit diesem Messplan nicht zu trennen: EX0J1 von Tasterspitze z: J1, J2 standen durchweg still; auch diese "
+            "Achsen bewegen",
+        ),
         ("a sentence that nobody translated", "a sentence that nobody translated"),
     ],
 )  # fmt: skip
