@@ -123,13 +123,18 @@ def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, 
     )
     touched = int((campaign.probings.run == run.run).sum())
     balls = len(campaign.artefact.balls)
+    plan = (
+        texts("record.plan_of", probings=touched, balls=balls)
+        if balls
+        else texts("record.plan_alone", probings=touched)
+    )
     return (
         Condition(texts("record.run"), start if offset else None),
         Condition(
             texts("record.machine"), texts("record.warming_up" if run.warm_up else "record.not_warming_up")
         ),
         *recorded,
-        Condition(texts("record.plan"), texts("record.plan_of", probings=touched, balls=balls)),
+        Condition(texts("record.plan"), plan),
         Condition(texts("record.artefact"), campaign.artefact.id),
     )
 

@@ -21,18 +21,33 @@ _UNITS = {
     "µm": r"\micro\metre",
     "µrad": r"\micro\radian",
     "mm": r"\milli\metre",
+    "m": r"\metre",
     "rad": r"\radian",
-    "µm/m": r"\micro\metre\per\metre",
-    "µrad/m": r"\micro\radian\per\metre",
+    "°": r"\degree",
+    "K": r"\kelvin",
+    "°C": r"\degreecelsius",
+    "s": r"\second",
+    "min": r"\minute",
+    "h": r"\hour",
+    "hPa": r"\hecto\pascal",
+    "%": r"\percent",
     "1": r"\one",
 }
+_POWERS = {"²": "2", "³": "3", "⁴": "4", "⁵": "5", "⁶": "6", "⁷": "7", "⁸": "8", "⁹": "9"}
 
 
 def unit_of(name: str) -> str:
-    """A display unit in the notation of D-SI. Raises InputError for one that has none here."""
-    if name not in _UNITS:
-        raise InputError(f"unit {name} has no D-SI notation here; there are {', '.join(_UNITS)}")
-    return _UNITS[name]
+    """A display unit such as ``µm/m²`` in the notation of D-SI. Raises InputError for one that has none here."""
+    return r"\per".join(_power_of(part, name) for part in name.split("/"))
+
+
+def _power_of(part: str, name: str) -> str:
+    base = part.rstrip("".join(_POWERS))
+    if base not in _UNITS or len(part) > len(base) + 1:
+        raise InputError(
+            f"unit {name} has no D-SI notation here; there are {', '.join(_UNITS)} and their powers"
+        )
+    return _UNITS[base] + (rf"\tothe{{{_POWERS[part[-1]]}}}" if part != base else "")
 
 
 def add(parent: ET.Element, tag: str, text: str | None = None, space: str = DCC) -> ET.Element:

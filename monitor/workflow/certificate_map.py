@@ -19,6 +19,12 @@ def volumetric_result(found: Evaluated, state: str) -> VolumetricResult:
     linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
     if len(linear) != 3:
         raise InputError(f"the map is printed for three linear axes; '{chain.topology}' has {len(linear)}")
+    flat = [name for name, (first, last) in mapped.ranges.items() if not last > first]
+    if flat:
+        raise InputError(
+            f"the map is printed over a volume, but the campaign stood still along {' and '.join(flat)}: say the "
+            "strokes in [machine.axes] of its campaign.toml, or leave the map out"
+        )
     k = error.factor(p)
     each = mapped.points**3  # the first pose: rotary axes at zero
     signs = np.array([chain.joints[place].sign for place in linear])

@@ -193,3 +193,16 @@ def test_d_si_2_1_the_volumetric_error_has_its_expanded_uncertainty(make_record:
     (printed,) = made.volumetric
     lengths = (printed.largest, printed.rms, printed.mean)
     assert found == [(one.value_um, one.expanded_um, printed.k) for one in lengths]
+
+
+@pytest.mark.parametrize(
+    ("name", "notation"),
+    [
+        ("µm", r"\micro\metre"),
+        ("µrad/m", r"\micro\radian\per\metre"),
+        ("µm/m²", r"\micro\metre\per\metre\tothe{2}"),
+        ("µm/m/K", r"\micro\metre\per\metre\per\kelvin"),
+    ],
+)
+def test_d_si_2_1_units(name: str, notation: str) -> None:
+    assert unit_of(name) == notation
