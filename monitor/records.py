@@ -325,3 +325,26 @@ class CurveCampaign:
     def measured(self) -> Array:
         """The response (n,)."""
         return self.columns[self.response]
+
+
+@dataclass(frozen=True)
+class LinearAxisErrors:
+    """Standard uncertainties of what is left of one linear axis's errors, in mm and mm/mm.
+
+    ``proportional`` is positioning in proportion to the travel, ``positioning`` the rest of it, ``straightness`` each
+    of the two directions across the travel; ``squareness`` to another axis, by the name of that axis.
+    """
+
+    proportional: float = 0.0
+    positioning: float = 0.0
+    straightness: float = 0.0
+    squareness: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LinearAxes:
+    """Errors of the linear axes by name. What is not proportional is independent at nodes a distance apart that lies,
+    unknown, between ``node_spacing`` (mm), with straight lines between them."""
+
+    axes: Mapping[str, LinearAxisErrors]
+    node_spacing: tuple[float, float]

@@ -42,10 +42,10 @@ def no_check(plan: Plan) -> Iterable[Fault]:
 class MethodRules:
     """The rules of one method.
 
-    ``needs_...`` and ``targets_are_balls`` say what the artefact
-    must hold, ``targets_are_reflectors`` that targets are the listed reflectors where any is listed; ``suffixes`` are the units
-    that a recorded column may end in, ``plain_columns`` columns that are allowed besides, ``measured_columns`` those
-    that must be there with a number in every row; ``check`` judges the plan.
+    ``needs_...`` and ``targets_are_balls`` say what the artefact must hold, ``targets_are_reflectors`` that targets
+    are the listed reflectors where any is listed; ``suffixes`` are the units that a recorded column may end in,
+    ``plain_columns`` columns that are allowed besides, ``measured_columns`` those that must be there with a number
+    in every row; ``check`` judges the plan.
     """
 
     name: str

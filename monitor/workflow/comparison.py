@@ -26,6 +26,10 @@ Document = dict[str, Any]
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.
 SEED = 20260302
+ONE_RUN = (
+    "with one run nobody can say what varies from run to run, what stepped between runs, or how well a reading "
+    "repeats; measure the same plan again"
+)
 
 
 def _um(length: float | None) -> float | None:
@@ -74,6 +78,7 @@ def compare(db: Database, campaign: str, model: str | None = None) -> tuple[Docu
     """Compare a model with a campaign; the document is stored. The fit serves the figures."""
     loaded, stored, found = fitted(db, campaign, model)
     document = comparison_document(compare_fit(found, campaign, label(stored)))
+    document["target_word"] = found.problem.target_word
     save_analysis(
         db, "comparison", document, method=loaded.method, campaign=campaign,
         model=stored.name, model_version=stored.version,
@@ -180,6 +185,9 @@ def explanation_document(found: Explanation) -> Document:
         "changes": changes,
         "blind_spots": list(found.blind),
         "not_recorded": dict(found.refused),
+        "target_word": problem.target_word,
+        "held_out": "runs" if len(problem.runs) > 1 else "blocks of poses",
+        "undecided": [ONE_RUN] if len(problem.runs) == 1 else [],
     }
     document["answer"] = _answer(document)
     # Where nothing is missing there is nothing to picture.
@@ -212,7 +220,7 @@ def _answer(document: Document) -> str:
         count = len(document["suspect_data"])
         parts.append(f"{count} bad point{'s were' if count > 1 else ' was'} left out.")
     for change in document["changes"]:
-        what = f"ball {change['target']}" if "target" in change else change["parameter"]
+        what = f"{document['target_word']} {change['target']}" if "target" in change else change["parameter"]
         verb = "moved" if "target" in change else "stepped"
         parts.append(f"{what} {verb} by {change['size']:.1f} {change['unit']} at run {change['run']}.")
     return " ".join(parts)
