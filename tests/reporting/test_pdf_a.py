@@ -33,6 +33,7 @@ LIFTED = {
     "1.2.9": "embedded files (6.8)",
     "1.4": "cross reference streams (6.1.4 follows ISO 32000-1)",
     "1.4.7": "embedded files in the name tree (6.8)",
+    "2.2.1": "transparency groups, here of a hatched bar (6.2.10, blended in the colours of the output intent)",
     "3.1.11": "no CIDSet in a font subset (6.2.11.4.2: optional, complete where present)",
 }
 
