@@ -44,8 +44,8 @@ class MethodRules:
 
     ``needs_...`` and ``targets_are_balls`` say what the artefact must hold, ``targets_are_reflectors`` that targets
     are the listed reflectors where any is listed; ``suffixes`` are the units that a recorded column may end in,
-    ``plain_columns`` columns that are allowed besides, ``measured_columns`` those that must be there with a number
-    in every row; ``check`` judges the plan.
+    ``plain_columns`` columns that are allowed besides, ``measured_columns`` those that must be there with a number in
+    every row; ``check`` judges the plan.
     """
 
     name: str

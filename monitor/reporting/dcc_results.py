@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -38,16 +39,16 @@ _POWERS = {"²": "2", "³": "3", "⁴": "4", "⁵": "5", "⁶": "6", "⁷": "7",
 
 def unit_of(name: str) -> str:
     """A display unit such as ``µm/m²`` in the notation of D-SI. Raises InputError for one that has none here."""
-    return r"\per".join(_power_of(part, name) for part in name.split("/"))
+    return r"\per".join(_power_of(factor, name) for factor in name.split("/"))
 
 
-def _power_of(part: str, name: str) -> str:
-    base = part.rstrip("".join(_POWERS))
-    if base not in _UNITS or len(part) > len(base) + 1:
+def _power_of(factor: str, name: str) -> str:
+    stem, power = re.fullmatch(rf"(.*?)([{''.join(_POWERS)}]|\^[0-9])?", factor).groups()  # type: ignore[union-attr]
+    if stem not in _UNITS:
         raise InputError(
-            f"unit {name} has no D-SI notation here; there are {', '.join(_UNITS)} and their powers"
+            f"unit {name} has no D-SI notation here; there are {', '.join(_UNITS)}, their powers and quotients"
         )
-    return _UNITS[base] + (rf"\tothe{{{_POWERS[part[-1]]}}}" if part != base else "")
+    return _UNITS[stem] + ("" if power is None else rf"\tothe{{{_POWERS.get(power, power[-1])}}}")
 
 
 def add(parent: ET.Element, tag: str, text: str | None = None, space: str = DCC) -> ET.Element:

@@ -19,6 +19,11 @@ from monitor.records import Array
 from monitor.statistics.checks import as_vector
 
 
+#: Standard deviation of the estimated correlation times the root of the number of values: simulated 1.33 for 10 values,
+#: 1.2 for 20 (Bartlett's first order, J. R. Stat. Soc. Suppl. 8 (1946) 27, says at most 1).
+SCATTER = 1.25
+
+
 @dataclass(frozen=True)
 class MonotoneTrend:
     """``s`` counts rising less falling pairs; ``autocorrelation`` is that of lag 1, 0 where none is seen.
@@ -76,8 +81,7 @@ def mann_kendall(values: npt.ArrayLike, times: npt.ArrayLike) -> MonotoneTrend:
     slope = stats.theilslopes(y, t)[0]
     ranks = stats.rankdata(y - slope * t)
     seen = lag_one(np.asarray(ranks), fitted=2)
-    # The standard deviation of an estimated lag-1 correlation is at most 1/sqrt(n) to first order (Bartlett 1946).
-    r = float(np.clip(seen + 1.0 / np.sqrt(n), 0.0, 0.95))
+    r = float(np.clip(seen + SCATTER / np.sqrt(n), 0.0, 0.95))
     lags = np.arange(1, n)
     inflation = 1.0 + 2.0 * float(((1.0 - lags / n) * r**lags).sum())
     tau = s / (n * (n - 1) / 2.0)

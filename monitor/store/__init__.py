@@ -7,6 +7,7 @@ its unit. Only this room imports duckdb.
 
 from monitor.store.analyses import (
     StoredAnalysis,
+    latest_documents,
     list_analyses,
     load_analysis,
     save_analysis,
@@ -28,7 +29,7 @@ from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.events import list_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
-from monitor.store.history import MachineHistory, machine_history, unidentified_campaigns
+from monitor.store.history import MachineHistory, latest_tolerances, machine_history, unidentified_campaigns
 from monitor.store.identifications import (
     identification_by_number,
     list_identifications,
@@ -67,6 +68,8 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "latest_documents",
+    "latest_tolerances",
     "list_analyses",
     "list_backups",
     "list_campaigns",

@@ -38,6 +38,26 @@ FROM parameter_value AS v
 WHERE v.identification_id IN ({marks}) AND v.value IS NOT NULL
 """
 
+_TOLERANCES = """
+WITH latest AS (
+    SELECT c.machine, arg_max(c.campaign_id, (r.latest, c.campaign_id)) AS campaign_id
+    FROM campaign AS c
+    LEFT JOIN (
+        SELECT campaign_id, max(started_at) AS latest FROM run
+        WHERE $machine IS NULL OR campaign_id IN (SELECT campaign_id FROM campaign WHERE machine = $machine)
+        GROUP BY campaign_id
+    ) AS r USING (campaign_id)
+    WHERE $machine IS NULL OR c.machine = $machine
+    GROUP BY c.machine
+)
+SELECT machine, parameter, CAST(machine_description -> 'tolerances' ->> parameter AS DOUBLE) AS tolerance
+FROM (
+    SELECT l.machine, c.machine_description, unnest(json_keys(c.machine_description, '$.tolerances')) AS parameter
+    FROM latest AS l JOIN campaign AS c USING (campaign_id)
+)
+ORDER BY ALL
+"""
+
 _CHANNELS = """
 SELECT c.campaign, p.run, e.key AS channel, avg(e.value) AS value
 FROM (SELECT campaign_id, run, unnest(map_entries(channels)) AS e FROM probing
@@ -113,7 +133,7 @@ def machine_history(
         values=values,
         u=u,
         conditions=_conditions(db, machine, [row[7] for row in rows], campaign, run),
-        tolerances=_tolerances(db, machine),
+        tolerances={name: limit for (_, name), limit in latest_tolerances(db, machine).items()},
     )
 
 
@@ -129,8 +149,10 @@ def unidentified_campaigns(
             LEFT JOIN identification AS i ON i.campaign_id = c.campaign_id
                 AND (i.model = $model OR $model IS NULL AND i.model = i.method)
                 AND ($version IS NULL OR i.model_version = $version)
-            LEFT JOIN (SELECT campaign_id, count(*) AS runs FROM run GROUP BY campaign_id) AS r
-                ON r.campaign_id = c.campaign_id
+            LEFT JOIN (
+                SELECT campaign_id, count(*) AS runs FROM run
+                WHERE campaign_id IN (SELECT campaign_id FROM campaign WHERE machine = $machine) GROUP BY campaign_id
+            ) AS r ON r.campaign_id = c.campaign_id
             WHERE c.machine = $machine
             GROUP BY c.campaign_id, c.campaign, r.runs
             HAVING coalesce(max(i.run_count), 0) < r.runs
@@ -187,11 +209,9 @@ def _conditions(
     return found
 
 
-def _tolerances(db: Database, machine: str) -> dict[str, float]:
-    return dict(
-        db.rows(
-            "SELECT t.parameter, t.tolerance FROM v_tolerances AS t JOIN v_machines AS m "
-            "ON m.machine = t.machine AND m.latest_campaign = t.campaign WHERE t.machine = ? ORDER BY ALL",
-            [machine],
-        )
-    )
+def latest_tolerances(db: Database, machine: str | None = None) -> dict[tuple[str, str], float]:
+    """Limits of the absolute value by machine and parameter, in display units, as each latest campaign states them."""
+    return {
+        (name, parameter): float(limit)
+        for name, parameter, limit in db.rows(_TOLERANCES, {"machine": machine})
+    }

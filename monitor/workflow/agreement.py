@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from monitor.exceptions import NotFoundError
 from monitor.statistics.normalised_error import K, normalised_error, result_of_runs
-from monitor.store import Database, MachineHistory, load_analysis
+from monitor.store import Database, MachineHistory, latest_documents
 
 Document = dict[str, Any]
 
@@ -35,13 +34,8 @@ Evaluated = Mapping[str, Mapping[str, float]]
 
 def evaluated(db: Database, campaigns: Sequence[str]) -> Evaluated:
     """Standard uncertainties, in display units, of the latest `monitor uncertainty` of each campaign that has one."""
-    found = {}
-    for campaign in campaigns:
-        try:
-            found[campaign] = load_analysis(db, "uncertainty", campaign=campaign).document["guf"]["u"]
-        except NotFoundError:
-            continue
-    return found
+    found = latest_documents(db, "uncertainty", campaigns)
+    return {campaign: document["guf"]["u"] for campaign, document in found.items()}
 
 
 def agreement(

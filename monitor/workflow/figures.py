@@ -12,18 +12,15 @@ from monitor.effects import ChainEffect
 from monitor.exceptions import DataError, InputError
 from monitor.records import Array
 from monitor.reporting.figure_style import save
+from monitor.reporting.figures_drivers import predicted_against_measured, residual_against_driver
 from monitor.reporting.figures_models import error_falling, ranked_effects
 from monitor.reporting.figures_parameters import parameters_by_run
-from monitor.reporting.figures_residuals import (
-    predicted_against_measured,
-    residual_against_driver,
-    residual_bars,
-    residual_vectors,
-)
+from monitor.reporting.figures_residuals import residual_bars, residual_vectors
 from monitor.reporting.numbers import round_result
 from monitor.store import StoredIdentification
 from monitor.units import MICROMETRE
 from monitor.workflow.residuals import drivers_followed, in_machine_frame, mean_over_runs
+from monitor.workflow.residuals_against import against_effect
 
 Document = dict[str, Any]
 ENDINGS = (".svg", ".png")
@@ -108,6 +105,7 @@ def explanation_figures(document: Document, found: Explanation, folder: Path) ->
         "missing-effects",
     )
     files += _saved(_falling(document), folder, "error-falling")
+    files += _failing(found, missing[0]["effect"], folder)
     pair = _predicted(found, missing[0]["effect"])
     if pair is not None:
         files += _saved(
@@ -117,6 +115,28 @@ def explanation_figures(document: Document, found: Explanation, folder: Path) ->
             folder,
             "predicted-against-measured",
         )
+    return files
+
+
+def _failing(found: Explanation, effect: str, folder: Path) -> list[str]:
+    """Where the model fails, and what is missing: the residual against what drives the effect, before and after."""
+    files = []
+    final, before = found.final, found.comparison.vectors
+    if before.shape[1] == 3:
+        places, vectors = mean_over_runs(final, *in_machine_frame(final, before))
+        title = "What the model leaves, mean over the runs, over the workspace"
+        files += _saved(residual_vectors(places, vectors, title=title), folder, "residual-vectors")
+    against = against_effect(found, effect)
+    if against is not None:
+        files += _saved(
+            residual_against_driver(
+                against.at, against.before, title=f"{effect} is missing: the residual along {against.along} follows it",
+                driver_name=against.driver, residual_name=f"residual along {against.along} / µm", group=against.groups,
+                after_um=against.after,
+            ),
+            folder,
+            "missing-effect-before-after",
+        )  # fmt: skip
     return files
 
 

@@ -211,9 +211,9 @@ def warming(
 ) -> tuple[Document | None, str | None]:
     """Warm-up of the latest campaign that was begun cold or hot: time constant and when the machine is stable."""
     # A campaign with runs while warming up has seen the whole of it; its other runs say where it ends.
-    for name in dict.fromkeys(campaigns[::-1].tolist()):
+    for name in dict.fromkeys(campaigns[warm][::-1].tolist()):
         inside = campaigns == name
-        if warm[inside].any() and inside.sum() >= 6:
+        if inside.sum() >= 6:
             own = series.part(inside)
             hours = (own.t - own.t[0]) * 24.0
             try:

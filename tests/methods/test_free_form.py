@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -11,32 +10,6 @@ from scipy import stats
 
 from monitor.exceptions import DataError
 from monitor.methods import free_form
-from monitor.readers import read_campaign
-
-
-@pytest.fixture(scope="session")
-def sim(simulator):
-    from simulator import free_form as module
-
-    return module
-
-
-@pytest.fixture
-def made(sim, tmp_path):
-    """A simulated campaign, read from its folder, and its truth."""
-    folders = itertools.count()
-
-    def make(layout, angles, seed=1, noise_um=1.38, runs=1, topology="w C A b Y X Z (C1) t", scale=1.0):
-        rng = np.random.default_rng(seed)
-        truth = sim.draw_truth(layout, angles, rng, scale)
-        told = [sim.probe(layout, angles, truth, rng, noise_um, topology) for _ in range(runs)]
-        folder = tmp_path / str(next(folders))
-        sim.write_folder(
-            folder, "simulated", layout, told, truth.length * 1e3, (), topology, sim.PROBING_U_UM
-        )
-        return truth, read_campaign(folder)
-
-    return make
 
 
 def with_conditions(campaign, conditions):

@@ -11,12 +11,14 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
 
 from .chain import branch_matrix, carried, read_topology
 
+JAPAN = timezone(timedelta(hours=9))
 PROBING_U_UM = 1.38  # section 6
 CASE_1_ANGLES = (0.0, 75.0, 130.0, 210.0)  # Eq. (19)
 CASE_2_ANGLES = (0.0, 31.0, 83.0, 137.0, 191.0, 227.0, 257.0, 313.0)  # Eq. (20)
@@ -271,9 +273,8 @@ def write_folder(
         out.writerow(["run", "started_at", "day", "warm_up", "ambient_degC"])
         for k in range(len(runs)):
             day, place = divmod(k, runs_a_day)
-            minutes = 8 * 60 + 180 * place
-            out.writerow([k + 1, f"2026-04-{6 + day:02d}T{minutes // 60:02d}:{minutes % 60:02d}:00+09:00",
-                          day + 1, "false", f"{21.0 + 0.1 * place:.1f}"])  # fmt: skip
+            at = datetime(2026, 4, 6, 8, tzinfo=JAPAN) + timedelta(days=day, hours=3 * place)
+            out.writerow([k + 1, at.isoformat(), day + 1, "false", f"{21.0 + 0.1 * place:.1f}"])
     axes = [a for a in read_topology(topology).axes if a.name not in ("X", "Y", "C")]
     with (folder / "probings.csv").open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file, lineterminator="\n")

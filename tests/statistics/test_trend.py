@@ -89,6 +89,18 @@ def test_slope_interval_covers(rate_agrees):
     assert rate_agrees(hits, 500, 0.95)
 
 
+def test_what_happens_within_a_day_is_no_drift_of_years():
+    # 24 weekly days of three runs, then one long day in which the machine warms up by 1.5: no drift. A slope common
+    # to hours and weeks would be 1.1 a day (400 a year) with a day component of 70.
+    rng = np.random.default_rng(12)
+    day = np.concatenate([np.repeat(np.arange(24), 3), np.full(44, 24)])
+    hours = np.concatenate([np.tile(np.arange(3.0), 24), np.linspace(0.0, 23.0, 44)])
+    y = 0.2 * rng.normal(size=len(day)) + np.where(day == 24, 1.5 * hours / 23.0 - 0.75, 0.0)
+    result = trend(y, 7.0 * day + hours / 24.0, days=day)
+    assert abs(result.slope) < 3 * result.u_slope < 0.01
+    assert result.between < 0.3
+
+
 def first_order(rng, n, r):
     e = rng.normal(size=n)
     e[0] /= np.sqrt(1 - r * r)
