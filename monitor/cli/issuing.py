@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
+from monitor.readers import read_linear_axes
 from monitor.reporting.signing import FileKey, Key, TokenKey
 from monitor.workflow.certificate_results import METHODS
 from monitor.workflow.conformity import RULES
@@ -28,6 +29,10 @@ def add_issuing(parser: ArgumentParser) -> None:
         "--date", type=date.fromisoformat, metavar="YYYY-MM-DD", help="of issue; default: today"
     )
     parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--linear-axes", type=Path, metavar="FILE",
+        help="errors of the linear axes (TOML), for methods that take these axes as known",
+    )  # fmt: skip
     parser.add_argument(
         "--method", choices=METHODS, default="guf",
         help="state the GUM framework's result, or the stored Monte Carlo result (default guf)",
@@ -77,6 +82,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "number": options.number,
         "issued_on": options.date,
         "model": options.model,
+        "linear_axes": None if options.linear_axes is None else read_linear_axes(options.linear_axes),
         "method": options.method,
         "conformity": options.conformity,
         "with_map": options.map,

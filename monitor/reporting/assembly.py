@@ -123,10 +123,11 @@ def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, 
     )
     touched = int((campaign.probings.run == run.run).sum())
     balls = len(campaign.artefact.balls)
+    targets = len(set(campaign.probings.target[campaign.probings.run == run.run].tolist()))
     plan = (
         texts("record.plan_of", probings=touched, balls=balls)
         if balls
-        else texts("record.plan_alone", probings=touched)
+        else texts("record.plan_of_targets", probings=touched, targets=targets)
     )
     return (
         Condition(texts("record.run"), start if offset else None),

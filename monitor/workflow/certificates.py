@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from monitor import __version__
 from monitor.exceptions import InputError
-from monitor.records import Campaign
+from monitor.records import Campaign, LinearAxes
 from monitor.reporting.assembly import certificate_record
 from monitor.reporting.certificate import CertificateRecord, Replaced
 from monitor.reporting.documents import to_document
@@ -41,14 +41,15 @@ Document = dict[str, Any]
 class Wishes:
     """What a certificate states besides the results, and how it is closed.
 
-    ``method``: guf, or mcm for the stored Monte Carlo result. ``conformity`` names a decision rule; its statement
-    replaces the laboratory's word on conformity. ``with_map`` adds the volumetric error. ``key`` signs it. ``fonts``
-    are files with letters that DejaVu Sans lacks.
-    ``replaces`` is the number of the certificate that this one amends, for a ``reason``: it says so on paper
-    (ISO/IEC 17025:2017, 7.8.8.3), and the old one is marked with it.
+    ``linear_axes`` are those of `monitor uncertainty`, for a method that takes these axes as known. ``method``: guf,
+    or mcm for the stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the
+    laboratory's word on conformity. ``with_map`` adds the volumetric error. ``key`` signs it. ``fonts`` are files with
+    letters that DejaVu Sans lacks. ``replaces`` is the number of the certificate that this one amends, for a
+    ``reason``: it says so on paper (ISO/IEC 17025:2017, 7.8.8.3), and the old one is marked with it.
     """
 
     model: str | None = None
+    linear_axes: LinearAxes | None = None
     method: str = "guf"
     draft: bool = False
     conformity: str | None = None
@@ -90,7 +91,7 @@ def issue(
     replaced = None
     if wanted.replaces is not None:
         replaced = _replaced(db, wanted.replaces, wanted.reason, wanted.draft, loaded)
-    found = evaluate(db, campaign, run, model=wanted.model, method="guf")
+    found = evaluate(db, campaign, run, model=wanted.model, method="guf", linear_axes=wanted.linear_axes)
     chosen = number or next_number(db, day.year)
     path = path_of(out, chosen)
     keep_issued(db, path)
@@ -98,6 +99,8 @@ def issue(
     record = _record(stated, found, monte_carlo, wanted, number=chosen, issued_on=day)
     record = dataclasses.replace(record, replaces=replaced)
     inputs = {**_inputs(found, monte_carlo), "fonts": font_hashes(wanted.fonts)}
+    if wanted.linear_axes is not None:
+        inputs["linear_axes_mm"] = dataclasses.asdict(wanted.linear_axes)
     pdf = certificate_pdf(record, wanted.fonts, inputs)
     if wanted.key is not None:
         pdf = sign(pdf, wanted.key)

@@ -123,6 +123,12 @@ def test_what_a_page_marks_stays_and_what_a_user_writes_is_escaped() -> None:
             "mit diesem Messplan nicht zu trennen: EX0J1 von Tasterspitze z: J1, J2 standen durchweg still; auch diese "
             "Achsen bewegen",
         ),
+        (
+            "all 9 runs, 8 degrees of freedom; errors of the linear axes and the stylus tip are no part of u: the method "
+            "takes them as known",
+            "alle 9 Läufe, 8 Freiheitsgrade; nicht in u enthalten sind Abweichungen von Linearachsen und Tasterspitze: "
+            "das Verfahren nimmt sie als bekannt an",
+        ),
         ("a sentence that nobody translated", "a sentence that nobody translated"),
     ],
 )  # fmt: skip
