@@ -124,8 +124,8 @@ def test_what_a_page_marks_stays_and_what_a_user_writes_is_escaped() -> None:
             "Achsen bewegen",
         ),
         (
-            "all 9 runs, 8 degrees of freedom; errors of the linear axes and the stylus tip are no part of u: the method "
-            "takes them as known",
+            "all 9 runs, 8 degrees of freedom; errors of the linear axes and the stylus tip are no part of u: the "
+            "method takes them as known",
             "alle 9 Läufe, 8 Freiheitsgrade; nicht in u enthalten sind Abweichungen von Linearachsen und Tasterspitze: "
             "das Verfahren nimmt sie als bekannt an",
         ),
