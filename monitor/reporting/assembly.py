@@ -115,9 +115,15 @@ def _conditions(campaign: Campaign, run: Run) -> tuple[Condition, ...]:
         ),
         Condition("machine", state),
         *recorded,
-        Condition("plan", f"{touched} probings of {len(campaign.artefact.balls)} balls"),
+        Condition("plan", f"{touched} probings of {_targets(campaign, run)}"),
         Condition("artefact", campaign.artefact.id),
     )
+
+
+def _targets(campaign: Campaign, run: Run) -> str:
+    if campaign.artefact.balls:
+        return f"{len(campaign.artefact.balls)} balls"
+    return f"{len(set(campaign.probings.target[campaign.probings.run == run.run].tolist()))} targets"
 
 
 def _in_words(name: str) -> str:

@@ -65,9 +65,10 @@ def residual_bars(
                 bar.set_hatch("////" if mark else "")
                 bar.set_edgecolor("white" if mark else BLUE)
                 bar.set_linewidth(0.0)
-            step = max(
-                1, math.ceil(len(labels) / max(4, 30 * len(labels) / sum(counts) * width_mm / PAGE_WIDTH_MM))
-            )
+            # Thirty short labels fit across a page; long ones take their width, some 1.5 mm a letter.
+            room = min(1.0, 5.7 / (1.5 + 1.5 * max(map(len, labels), default=1)))
+            fitting = 30 * len(labels) / sum(counts) * width_mm / PAGE_WIDTH_MM * room
+            step = max(1, math.ceil(len(labels) / max(2 if room < 1.0 else 4, fitting)))
             axes.set_xticks(np.arange(len(labels))[::step], list(labels)[::step])
             axes.set_xlabel(f"by {kind}", labelpad=2)
             axes.grid(axis="y", color=PALE, linewidth=0.4)

@@ -9,6 +9,7 @@ from typing import Any
 
 from monitor import __version__
 from monitor.exceptions import InputError, NotFoundError
+from monitor.records import LinearAxes
 from monitor.reporting.assembly import certificate_record
 from monitor.reporting.documents import to_document
 from monitor.reporting.laboratory import read_laboratory
@@ -55,18 +56,20 @@ def issue(
     passphrase: str | None = None,
     replaces: str | None = None,
     reason: str = "",
+    linear_axes: LinearAxes | None = None,
 ) -> Document:
     """Issue a certificate for one run: PDF in ``out`` (a folder or a file), record and document in the database.
 
     ``conformity`` names a decision rule where a statement of conformity is wanted; it replaces the laboratory's
     word on conformity. ``key`` is a PKCS#12 file that signs it, opened by ``passphrase``.
+    ``linear_axes`` are those of `monitor uncertainty`, for a method that takes these axes as known.
     ``replaces`` is the number of the certificate that this one amends, for a ``reason``: it says so on paper
     (ISO/IEC 17025:2017, 7.8.8.3), and the old one is marked with it. Raises
     IncompleteCertificateError with the list of what the laboratory's file and the campaign leave open, InputError
     where the campaign states no tolerances or the key does not open.
     """
     stated = read_laboratory(laboratory)
-    found = evaluate(db, campaign, run, model=model, method="guf")
+    found = evaluate(db, campaign, run, model=model, method="guf", linear_axes=linear_axes)
     day = issued_on or date.today()
     measured = next(one.started_at.date() for one in found.campaign.runs if one.run == run)
     if day < measured:
@@ -90,6 +93,8 @@ def issue(
     path = path_of(out, chosen)
     keep_issued(db, path)
     inputs = _inputs(found)
+    if linear_axes is not None:
+        inputs["linear_axes_mm"] = dataclasses.asdict(linear_axes)
     pdf = certificate_pdf(record, inputs=inputs)
     if key is not None:
         pdf = sign(pdf, key, passphrase)

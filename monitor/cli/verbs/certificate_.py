@@ -10,6 +10,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common, told
 from monitor.exceptions import InputError
+from monitor.readers import read_linear_axes
 from monitor.workflow import certificate_checks, certificates
 from monitor.workflow.conformity import RULES
 
@@ -30,6 +31,10 @@ def options(parser: ArgumentParser) -> None:
         "--date", type=date.fromisoformat, metavar="YYYY-MM-DD", help="of issue; default: today"
     )
     issued.add_argument("--model", metavar="NAME")
+    issued.add_argument(
+        "--linear-axes", type=Path, metavar="FILE",
+        help="errors of the linear axes (TOML), for methods that take these axes as known",
+    )  # fmt: skip
     issued.add_argument("--draft", action="store_true", help="a draft, to be looked at")
     issued.add_argument(
         "--conformity",
@@ -100,6 +105,7 @@ def _issue(options: Namespace) -> int:
         found = certificates.issue(
             db, options.campaign, options.number_of_run, options.laboratory, out=options.out, number=options.number,
             issued_on=options.date, model=options.model, draft=options.draft,
+            linear_axes=None if options.linear_axes is None else read_linear_axes(options.linear_axes),
             conformity=options.conformity, key=options.sign, passphrase=_passphrase(options.passphrase_file),
             replaces=options.replaces, reason=options.reason,
         )  # fmt: skip
