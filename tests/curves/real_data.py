@@ -113,29 +113,31 @@ def section(told: Told) -> list[str]:
 HEAD = """# Tried on real measurements
 
 Public measurement series of NIST, read from the published files in `tests/references` and put through `import`,
-`explain`, `model add` and `model history` like any campaign ([method curve](campaign-format.md#curves)). Nobody here made
-these data. The page is written by `tests/curves/real_data.py` (`make real-data`); a test holds it against what comes out
-now. How often the search is wrong on simulated curves: [trials-curve.md](trials-curve.md).
+`explain`, `model add` and `model history` like any campaign ([method curve](campaign-format.md#curves)). Nobody here
+made these data. The page is written by `tests/curves/real_data.py` (`make real-data`); a test holds it against what
+comes out now. How often the search is wrong on simulated curves: [trials-curve.md](trials-curve.md).
 
 In every table step 0 is the base model; each further step adds one effect that the search found, the most convincing
 first. Held-out errors are those of rows that took no part in the fit.
 """
 
-TAIL = """## What to know of these series
-
-- **lew**: the sine printed in the handbook is not the least-squares optimum (frequency 0.302596, residual standard
-  deviation 155.85); the optimum is 0.301807 with 134.066, and that is what one period comes to with all rows (step 1). Row
-  158 is probably a misprint (300 for -300): it is named, the file is left as it is. The further periods lie around the
-  first one: the amplitude changes along the series. They show once the first rows, which do not fit them, are left out.
-- **dziuba1**: neighbouring readings of the resistor resemble each other, so the evidence for the yearly cycle is far
-  smaller than independent rows would make it, and a curvature of the drift, which slow noise explains as well, is not told.
-- **mlco2mon**: a curvature of the rise is known to be there; against the slow noise these rows do not show it.
-- **mpc62** has one probe, and its values agree with each other within their repeatability, so nothing is told. The probe
-  bias shows in the gauge study with five probes (mpc61), the day effect in mpc633.
-- **enso**: the periods agree with the certified values of the StRD, 44.311 and 26.888 months. They count as found because
-  the rows are independent once both are in the model; with one of them alone correlated noise would be as likely.
-- **loadcell**: the file is sorted by load, so the order of its rows says nothing of time and is not an input.
-"""
+NOTES = (
+    "**lew**: the sine printed in the handbook is not the least-squares optimum (frequency 0.302596, residual standard "
+    "deviation 155.85); the optimum is 0.301807 with 134.066, and that is what one period comes to with all rows "
+    "(step 1). Row 158 is probably a misprint (300 for -300): it is named, the file is left as it is. During the first "
+    "twenty rows the beam moved out of step with the rest: the picture shows it. The further periods lie around the "
+    "first one: its amplitude changes along the series.",
+    "**dziuba1**: neighbouring readings of the resistor resemble each other, so the evidence for the yearly cycle is "
+    "far smaller than independent rows would make it, and a curvature of the drift, which slow noise explains as well, "
+    "is not told.",
+    "**mlco2mon**: a curvature of the rise is known to be there; against the slow noise these rows do not show it.",
+    "**mpc62** has one probe, and its values agree with each other within their repeatability, so nothing is told. The "
+    "probe bias shows in the gauge study with five probes (mpc61), the day effect in mpc633.",
+    "**enso**: the periods agree with the certified values of the StRD, 44.311 and 26.888 months. They count as found "
+    "because the rows are independent once both are in the model; with one of them alone correlated noise would be as "
+    "likely.",
+    "**loadcell**: the file is sorted by load, so the order of its rows says nothing of time and is not an input.",
+)
 
 
 def page(found: dict[str, Told]) -> str:
@@ -143,7 +145,10 @@ def page(found: dict[str, Told]) -> str:
     lines = [HEAD]
     for told in found.values():
         lines += section(told)
-    return "\n".join([*lines, TAIL])
+    lines += ["## What to know of these series", ""]
+    for note in NOTES:
+        lines += textwrap.wrap(f"- {note}", 118, subsequent_indent="  ")
+    return "\n".join(lines) + "\n"
 
 
 def main() -> int:
