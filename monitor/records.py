@@ -130,6 +130,30 @@ class ScaleBar:
 
 
 @dataclass(frozen=True)
+class KnownError:
+    """An error that was measured by other means: ``EXX(110)``, its value and standard uncertainty in mm."""
+
+    parameter: str
+    value: float
+    standard_uncertainty: float
+    certificate: str
+
+
+@dataclass(frozen=True)
+class SelfCalibration:
+    """How the errors of a self-calibration are tabulated, and what fixes the frame that no reading fixes.
+
+    ``nodes`` maps a linear axis to the readings in mm at which its errors are unknowns. ``conditions`` are the
+    boundary conditions, each a parameter that is zero by choice (``EYX(0)``) or a word of the method; empty
+    means the method's own. ``length`` is the one error that has to be known, for the unit of length.
+    """
+
+    nodes: Mapping[str, tuple[float, ...]]
+    length: KnownError
+    conditions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Reflector:
     """A reflector that a tracker looks at: on the tool, or ``fixed`` beside the machine."""
 
@@ -138,13 +162,56 @@ class Reflector:
 
 
 @dataclass(frozen=True)
+class Module:
+    """A module of an L-shaped piece: calibrated ``centre`` (2,) mm and ``tilt`` (2,) rad along the arms."""
+
+    id: str
+    centre: tuple[float, float]
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How the piece lies: its arms along the two axes of ``plane``; ``corner`` (3,) mm are the readings of X, Y and Z
+    with which the sensor stands over the first module."""
+
+    plane: str
+    corner: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LShape:
+    """An L-shaped standard piece and the optics that it is scanned with.
+
+    ``focal_length`` of the autocollimator and ``paraboloid``, the radius of curvature at the vertex of the modules'
+    paraboloids, in mm; standard uncertainties of the modules' calibration in mm and rad. The module whose centre is
+    nearest to the piece's origin is the ``reference`` to which the others were calibrated.
+    """
+
+    focal_length: float
+    paraboloid: float
+    place_uncertainty: float
+    tilt_uncertainty: float
+    modules: tuple[Module, ...]
+    placements: tuple[Placement, ...]
+
+    @property
+    def reference(self) -> int:
+        """Place of the reference module."""
+        return min(range(len(self.modules)), key=lambda place: sum(c**2 for c in self.modules[place].centre))
+
+
+@dataclass(frozen=True)
 class Artefact:
-    """The balls, and the scale bar where the method needs one; the reflectors where the file lists them."""
+    """The balls; the scale bar where the method needs one; the reflectors where the file lists them; the tables and
+    conditions of a self-calibration."""
 
     id: str
     balls: tuple[Ball, ...]
     scale_bar: ScaleBar | None = None
     reflectors: tuple[Reflector, ...] = ()
+    l_shape: LShape | None = None
+    self_calibration: SelfCalibration | None = None
 
 
 @dataclass(frozen=True)
@@ -258,3 +325,26 @@ class CurveCampaign:
     def measured(self) -> Array:
         """The response (n,)."""
         return self.columns[self.response]
+
+
+@dataclass(frozen=True)
+class LinearAxisErrors:
+    """Standard uncertainties of what is left of one linear axis's errors, in mm and mm/mm.
+
+    ``proportional`` is positioning in proportion to the travel, ``positioning`` the rest of it, ``straightness`` each
+    of the two directions across the travel; ``squareness`` to another axis, by the name of that axis.
+    """
+
+    proportional: float = 0.0
+    positioning: float = 0.0
+    straightness: float = 0.0
+    squareness: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LinearAxes:
+    """Errors of the linear axes by name. What is not proportional is independent at nodes a distance apart that lies,
+    unknown, between ``node_spacing`` (mm), with straight lines between them."""
+
+    axes: Mapping[str, LinearAxisErrors]
+    node_spacing: tuple[float, float]

@@ -139,8 +139,8 @@ def _as_reading(fit: Fit, row: int, vector: Array) -> tuple[str, float]:
     directions = np.array(
         [np.array(chain.joints[place].direction) * chain.joints[place].sign for place in linear]
     )
-    slopes = np.einsum("rac,ac->ra", fit.by_error[row][:, linear, MOTION, :3], directions)
-    off = np.linalg.pinv(slopes) @ vector
+    shifts = np.einsum("nrac,ac->nra", fit.by_error[:, :, linear, MOTION, :3], directions)
+    off = np.linalg.pinv(fit.problem.observe(shifts)[row]) @ vector
     most = int(np.abs(off).argmax())
     return chain.joints[linear[most]].name.lower(), float(off[most])
 

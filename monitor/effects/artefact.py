@@ -107,12 +107,47 @@ class StemGravity:
         return shifts
 
 
+@dataclass(frozen=True)
+class WorkpieceShape:
+    """Every point of the workpiece lies off its nominal place, along the normal of the surface there."""
+
+    text: str = "shape"
+    unit: Unit = MICROMETRE
+
+    def labels(self, context: Context) -> tuple[str, ...]:
+        return tuple(f"({target})" for target in dict.fromkeys(context.target.tolist()))
+
+    def shifts(self, context: Context) -> Array:
+        own = context.target[:, None] == np.array(list(dict.fromkeys(context.target.tolist())))
+        shifts: Array = normals_of(context)[:, :, None] * own[:, None, :]
+        return shifts
+
+
+def normals_of(context: Context) -> Array:
+    """Unit normals (n, 3) of the surface at every probing, in the frame of the last work axis.
+
+    A component that was not recorded is zero. Raises EffectError where none was, or where one is empty.
+    """
+    columns = [context.columns.get(f"normal_{axis}") for axis in "xyz"]
+    if all(column is None for column in columns):
+        raise EffectError("'shape' needs the normal of the surface: the columns normal_x, normal_y, normal_z")
+    zero = np.zeros(len(context))
+    normals = np.column_stack([zero if column is None else column for column in columns])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    if not np.all(length > 0.0):
+        raise EffectError("'shape' needs the normal of the surface at every probing; some have none")
+    unit: Array = normals / length
+    return unit
+
+
 def parse_artefact(body: str) -> ArtefactChange:
     """The change that a text names; EffectError lists what there is."""
     if body == "artefact:expansion":
         return Expansion()
     if body == "stem:gravity":
         return StemGravity()
+    if body == "shape":
+        return WorkpieceShape()
     if body == "tracker:shift":
         return TrackerShift()
     if body == "tracker:turn":
@@ -128,5 +163,5 @@ def parse_artefact(body: str) -> ArtefactChange:
         )
     raise EffectError(
         f"there is no effect '{body}' of the artefact; there are ball:2:moved(run 7, sequence 23), "
-        "artefact:expansion@ambient_degC, stem:gravity, tracker:shift@run_time and tracker:turn@run_time"
+        "artefact:expansion@ambient_degC, stem:gravity, shape, tracker:shift@run_time and tracker:turn@run_time"
     )

@@ -102,6 +102,21 @@ def positions_of(chain: Chain, readings: Mapping[str, Array]) -> Array:
     return positions
 
 
+def _nominal(campaign: Campaign) -> Array:
+    """Where every target should be (n, 3) mm: its ball, else ``nominal_x_mm`` and so on, NaN where nothing says it."""
+    probings = campaign.probings
+    balls = {ball.id: ball.nominal for ball in campaign.artefact.balls}
+    recorded = [probings.channels.get(f"nominal_{axis}_mm") for axis in "xyz"]
+    unknown = 0.0 if any(column is not None for column in recorded) else np.nan
+    rows = np.column_stack(
+        [np.full(len(probings), unknown) if column is None else column for column in recorded]
+    )
+    for place, target in enumerate(probings.target):
+        if target in balls:
+            rows[place] = balls[target]
+    return rows
+
+
 def context_of(campaign: Campaign, chain: Chain) -> Context:
     """The context of all probings of a campaign, in file order."""
     probings = campaign.probings
@@ -118,8 +133,6 @@ def context_of(campaign: Campaign, chain: Chain) -> Context:
         rows = probings.run == number
         start, end = probings.time[rows].min(), probings.time[rows].max()
         run_time[rows] = (probings.time[rows] - start) / (end - start) if end > start else 0.0
-    nominal = {ball.id: ball.nominal for ball in campaign.artefact.balls}
-    unknown = (np.nan, np.nan, np.nan)
     columns: dict[str, Array] = dict(probings.channels)
     for name in sorted({name for run in campaign.runs for name in run.conditions}):
         if name not in columns:
@@ -138,6 +151,6 @@ def context_of(campaign: Campaign, chain: Chain) -> Context:
         day_time=probings.time + np.array([since[int(run)] for run in probings.run]),
         run_time=run_time,
         target=probings.target,
-        nominal=np.array([nominal.get(str(target), unknown) for target in probings.target]),
+        nominal=_nominal(campaign),
         columns=columns,
     )

@@ -16,7 +16,7 @@ import numpy as np
 from monitor.effects.artefact import ArtefactChange, parse_artefact
 from monitor.effects.context import Context
 from monitor.effects.drivers import Always, Driver, WarmUp, parse_driver
-from monitor.effects.shapes import Compliance, Const, Cyclic, Poly, Shape, parse_shape
+from monitor.effects.shapes import Compliance, Const, Cyclic, Nodes, Poly, Shape, parse_shape
 from monitor.effects.weight import weight_driver
 from monitor.exceptions import EffectError
 from monitor.machine import LOCATION, MOTION, Chain, Joint, Term, parse_term
@@ -130,7 +130,8 @@ class ChainEffect:
 
     def parameters(self, context: Context) -> tuple[str, ...]:
         # The gain is known by its ISO 230-1 symbol alone; that is how certificates print it.
-        name = self.term.symbol if self.is_gain else self.text
+        # So is an error at a named place: EXX(-110).
+        name = self.term.symbol if self.is_gain or isinstance(self.shape, Nodes) else self.text
         return tuple(f"{name}{s}{d}" for s in self.shape.labels for d in self.driver.labels(context))
 
     def basis(self, context: Context) -> ChainBasis:
@@ -173,7 +174,7 @@ def parse_effect(text: str, chain: Chain) -> ChainEffect | ArtefactEffect:
     """The effect that a text names on a chain; EffectError says what is wrong and what would be right."""
     body, driver_text = _split_driver(text.strip())
     head, _, rest = body.partition(":")
-    if head in ("ball", "artefact", "stem", "tracker"):
+    if head in ("ball", "artefact", "stem", "shape", "tracker"):
         return ArtefactEffect(parse_artefact(body), parse_driver(driver_text), driver_text)
     term = parse_term(head, chain)
     if not rest:

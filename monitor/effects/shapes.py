@@ -8,7 +8,7 @@ the entry point group ``monitor.shapes``.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -20,7 +20,7 @@ from monitor.effects.registry import plug_ins
 from monitor.exceptions import EffectError
 from monitor.machine import Joint
 from monitor.records import Array
-from monitor.units import METRE, RADIAN, Unit
+from monitor.units import DEGREE, METRE, RADIAN, Unit
 
 # Hats of `table`: seven nodes over the visited range resolve a guideway error of a third of the stroke and
 # leave four touches a node with 15 indexations of 4 balls.
@@ -184,6 +184,62 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Nodes:
+    """Hat functions on nodes that the user names: readings of the axis in mm or degrees, in rising order.
+
+    Each is a coefficient of its own, called by its place, but for those that are ``held`` at zero (written with
+    an exclamation mark). Beyond the last node the error stays as it is there.
+    """
+
+    places: tuple[tuple[float, bool], ...]
+    pattern: ClassVar[str] = r"table\((?P<places>[^)]*)\)"
+
+    @property
+    def readings(self) -> tuple[float, ...]:
+        """Where the nodes stand, held ones too."""
+        return tuple(place for place, _ in self.places)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return tuple(f"({place:.9g})" for place, held in self.places if not held)
+
+    def columns(self, context: Context, joint: int) -> Array:
+        axis = context.chain.joints[joint]
+        reading = axis.sign * context.positions[:, joint] / (DEGREE.factor if axis.turns else 1.0)
+        free = [number for number, (_, held) in enumerate(self.places) if not held]
+        hats = np.eye(len(self.places))
+        return np.column_stack(
+            [np.interp(reading, self.readings, hats[number]) for number in free]
+            or [np.zeros((len(reading), 0))]
+        )
+
+    def unit(self, base: Unit, joint: Joint) -> Unit:
+        return base
+
+
+def parse_places(text: str) -> tuple[tuple[float, bool], ...]:
+    """The nodes of ``-110,0!,110``; EffectError where they are no numbers in rising order."""
+    try:
+        places = tuple(
+            (float(word.strip().removesuffix("!")), word.strip()[-1] == "!") for word in text.split(",")
+        )
+    except (ValueError, IndexError):
+        places = ()
+    readings = [place for place, _ in places]
+    if not readings or not np.all(np.isfinite(readings)) or np.any(np.diff(readings) <= 0.0):
+        raise EffectError(
+            f"the nodes of table({text}) must be numbers in rising order, for example table(-100,0,100)"
+        )
+    return places
+
+
+def nodes_text(readings: Iterable[float], held: Iterable[float] = ()) -> str:
+    """The shape as written: ``table(-110,0!,110)``."""
+    fixed = set(held)
+    return f"table({','.join(f'{place:.9g}' + '!' * (place in fixed) for place in readings)})"
+
+
+@dataclass(frozen=True)
 class FormulaShape:
     """A formula of recorded columns, typed by the user; the coefficient multiplies it."""
 
@@ -201,13 +257,16 @@ class FormulaShape:
         return base
 
 
-BUILT_IN: tuple[type, ...] = (Const, Poly, Harmonic, Cyclic, Reversal, Lag, Compliance, Table, FormulaShape)
+BUILT_IN: tuple[type, ...] = (
+    Const, Poly, Harmonic, Cyclic, Reversal, Lag, Compliance, Table, Nodes, FormulaShape,
+)  # fmt: skip
 
 # How the groups of a built-in pattern are read; those of a plug-in arrive as text.
 READ: dict[str, Callable[[str], Any]] = {
     "order": lambda text: float(text) if "." in text else int(text),
     "nodes": int,
     "pitch": float,
+    "places": parse_places,
 }
 
 
@@ -224,5 +283,6 @@ def parse_shape(text: str) -> Shape:
             return made
     raise EffectError(
         f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic9999, cyclic20mm (any "
-        "pitch), reversal, lag, compliance, table (or table9 for nine nodes, up to table99) and formula(...)"
+        "pitch), reversal, lag, compliance, table (or table9 for nine nodes, up to table99; table(-100,0,100) for your "
+        "own nodes) and formula(...)"
     )

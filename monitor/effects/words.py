@@ -17,6 +17,7 @@ from monitor.effects.shapes import (
     FormulaShape,
     Harmonic,
     Lag,
+    Nodes,
     Poly,
     Reversal,
     Table,
@@ -92,7 +93,7 @@ def _shape(effect: ChainEffect) -> str:
             "a load at the flange" if isinstance(effect.driver, Load) else "the weight of all that it carries"
         )
         return f", in proportion to the torque of {what} about {about}"
-    if isinstance(shape, Table):
+    if isinstance(shape, (Table, Nodes)):
         return ", of free form along its travel"
     if isinstance(shape, FormulaShape):
         return f", following {shape.text}"

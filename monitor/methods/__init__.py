@@ -9,9 +9,11 @@ from __future__ import annotations
 from types import ModuleType
 
 from monitor.exceptions import DataError
-from monitor.methods import rotary_probing, samba, tracker
+from monitor.methods import free_form, l_shape, rotary_probing, samba, tracker
 
-METHODS: dict[str, ModuleType] = {module.NAME: module for module in (samba, rotary_probing, tracker)}
+METHODS: dict[str, ModuleType] = {
+    module.NAME: module for module in (samba, rotary_probing, free_form, tracker, l_shape)
+}
 
 
 def method_named(name: str) -> ModuleType:

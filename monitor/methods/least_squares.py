@@ -26,6 +26,9 @@ COMMON_RANK_TOLERANCE = 1e-3
 # Steps are measured in standard deviations of the whitened residuals; a hundred-millionth is far below any
 # digit that is printed.
 STEP_TOLERANCE = 1e-8
+# Where a stated uncertainty is a billionth of the readings, rounding alone is a larger step than that. Steps below a
+# hundred-thousandth that have stopped shrinking are rounding.
+ROUNDING = 1e-5
 MOST_ITERATIONS = 50
 MOST_HALVINGS = 12
 # A member of a null vector is named where its share exceeds this part of the largest.
@@ -119,8 +122,11 @@ def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, comm
     """
     now = linearise(local, common)
     cost = float(np.sum(now.residual**2))
+    space, spanned = eliminate(now.local), now.local
+    before = np.inf
     for iteration in range(1, MOST_ITERATIONS + 1):
-        space = eliminate(now.local)
+        if now.local is not spanned:
+            space, spanned = eliminate(now.local), now.local
         whole = np.concatenate([now.common, now.residual[..., None]], axis=-1)
         left = project_out(space.basis, whole)
         step_common, covariance, free = _common_step(left[..., :-1], now.common, left[..., -1])
@@ -137,8 +143,9 @@ def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, comm
             factor /= 2.0
         local, common = local + factor * step_local, common + factor * step_common
         now, cost = trial, trial_cost
-        if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)):
-            return _solution(local, common, now, covariance, free, iteration)
+        if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
+            return _solution(local, common, now, space, covariance, free, iteration)
+        before = size
     raise DataError(
         f"the identification did not converge in {MOST_ITERATIONS} steps: the readings contradict the machine file; "
         "check the axis signs, the topology and the order of the targets"
@@ -149,11 +156,12 @@ def _solution(
     local: Array,
     common: Array,
     now: Linearisation,
+    space: _Elimination,
     covariance: Array,
     free: npt.NDArray[np.bool_],
     iterations: int,
 ) -> Solution:
-    space = eliminate(now.local)
+    # The last step was a hundred-thousandth of a standard deviation or less: the space before it is that after it.
     own = space.inverse @ np.swapaxes(space.inverse, -1, -2)
     reaction = space.inverse @ (np.swapaxes(space.basis, -1, -2) @ now.common)
     own = own + reaction @ covariance @ np.swapaxes(reaction, -1, -2)

@@ -104,6 +104,11 @@ class ChainProblem(ABC):
         return ()
 
     @property
+    def target_word(self) -> str:
+        """What a target is called."""
+        return "ball"
+
+    @property
     def largest_effect(self) -> tuple[float, float]:
         """Displacement (mm at the tool) and angle (rad) of the largest effect that such a machine is likely to hide."""
         return LARGEST_DISPLACEMENT, LARGEST_ANGLE

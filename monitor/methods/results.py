@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from monitor.records import Array, Campaign
 
 #: What a plan would have to do for parameters that one run cannot separate: problem, parameters, run to words.
 Advice = Callable[[ChainProblem, tuple[str, ...], int], str]
+
+#: So many places of one table are named one by one.
+MOST_PLACES = 3
 
 
 def _groups(null_space: Array, names: tuple[str, ...]) -> list[tuple[str, ...]]:
@@ -39,6 +42,16 @@ def _groups(null_space: Array, names: tuple[str, ...]) -> list[tuple[str, ...]]:
     return groups
 
 
+def _told(names: Sequence[str]) -> str:
+    """Names in words; those of many places of one thing, ``EYX(-88)``, as one."""
+    heads = [name.partition("(")[0] if name.endswith(")") else name for name in names]
+    words = []
+    for head in dict.fromkeys(heads):
+        its = [name for name, own in zip(names, heads, strict=True) if own == head]
+        words += its if len(its) <= MOST_PLACES else [f"{head} at {len(its)} places"]
+    return " and ".join(words)
+
+
 def refusals(problem: ChainProblem, null_space: Array, run: int, advice: Advice) -> tuple[Refusal, ...]:
     """What one run cannot separate, by its null space, the reported parameters first, and why."""
     reported = problem.base_names
@@ -48,7 +61,7 @@ def refusals(problem: ChainProblem, null_space: Array, run: int, advice: Advice)
         if not inside:
             continue
         others = [name for name in group if name not in inside]
-        with_what = f"{' and '.join(inside)} cannot be told apart" if len(inside) > 1 else inside[0]
+        with_what = f"{_told(inside)} cannot be told apart" if len(inside) > 1 else inside[0]
         if others:
             with_what += f"{' from' if len(inside) > 1 else ' cannot be told apart from'} {', '.join(others)}"
         found.append(Refusal(inside, f"with this plan {with_what}{advice(problem, inside, run)}"))

@@ -44,6 +44,8 @@ def largest_coefficient(effect: Effect, basis: Basis, peak: float, largest: tupl
 
 def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParameters:
     """The common unknowns of a solution: time constants in seconds, and no number for what the plan barely sees."""
+    if not problem.shared:
+        return SharedParameters((), (), np.zeros(0), np.zeros((0, 0)), ())
     estimate = solution.common.copy()
     covariance = solution.common_covariance.copy()
     units: list[Unit] = []

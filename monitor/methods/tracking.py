@@ -63,6 +63,11 @@ class TrackingProblem(ChainProblem):
         return LARGEST_TURN
 
     @property
+    def target_word(self) -> str:
+        """A reflector."""
+        return "reflector"
+
+    @property
     def largest_effect(self) -> tuple[float, float]:
         """Displacement in mm and angle in rad that a robot may hide."""
         return LARGEST_DISPLACEMENT, LARGEST_ANGLE

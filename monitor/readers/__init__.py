@@ -6,6 +6,7 @@ are one file in ``methods``; plug-ins come through the entry points of the group
 """
 
 from monitor.readers.folder_names import names_in
+from monitor.readers.linear_axes import read_linear_axes
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, method_rules, read_campaign, readers
 from monitor.readers.writer import write_campaign
@@ -17,6 +18,7 @@ __all__ = [
     "method_rules",
     "names_in",
     "read_campaign",
+    "read_linear_axes",
     "readers",
     "write_campaign",
 ]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.faults import one_of, quoted
+from monitor.readers.l_shape_file import read_l_shape
+from monitor.readers.self_calibration_file import read_self_calibration
 from monitor.readers.toml_table import Table
 from monitor.records import Artefact, Ball, Probe, Reflector, ScaleBar
 from monitor.units import MICROMETRE
@@ -59,10 +61,12 @@ def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:
     ids = None if len(table.faults) > before else list(balls)
     reflectors = _reflectors(table)
     bar = _scale_bar(table, ids)
+    piece = read_l_shape(table)
+    calibration = read_self_calibration(table)
     table.finish()
     if len(table.faults) > before:
         return None, ids
-    return Artefact(identity or "", tuple(balls.values()), bar, reflectors), ids
+    return Artefact(identity or "", tuple(balls.values()), bar, reflectors, piece, calibration), ids
 
 
 def _reflectors(artefact: Table) -> tuple[Reflector, ...]:

@@ -7,8 +7,17 @@ from collections.abc import Iterator
 
 from monitor.readers.axes import axes_of_machine
 from monitor.readers.decimals import decimal_in
-from monitor.records import Artefact, Campaign, ChainAxis, Machine, Probe
-from monitor.units import MICROMETRE
+from monitor.records import (
+    Artefact,
+    Campaign,
+    ChainAxis,
+    LShape,
+    Machine,
+    Probe,
+    ScaleBar,
+    SelfCalibration,
+)
+from monitor.units import MICROMETRE, MICRORADIAN
 
 
 def campaign_toml(campaign: Campaign) -> str:
@@ -87,7 +96,12 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
         yield from ("", "[[artefact.reflectors]]", f"id = {_text(reflector.id)}")
         if reflector.fixed:
             yield "fixed = true"
-    bar = artefact.scale_bar
+    yield from _scale_bar(artefact.scale_bar)
+    yield from _l_shape(artefact.l_shape)
+    yield from _self_calibration(artefact.self_calibration)
+
+
+def _scale_bar(bar: ScaleBar | None) -> Iterator[str]:
     if bar is None:
         return
     yield from ("", "[artefact.scale_bar]", f"balls = [{_text(bar.balls[0])}, {_text(bar.balls[1])}]")
@@ -98,6 +112,38 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
         yield f"expansion_coefficient_per_K = {float(bar.expansion_coefficient)!r}"
     if bar.reference_temperature is not None:
         yield f"reference_temperature_degC = {float(bar.reference_temperature)!r}"
+
+
+def _self_calibration(made: SelfCalibration | None) -> Iterator[str]:
+    if made is None:
+        return
+    yield from ("", "[artefact.self_calibration]")
+    if made.conditions:
+        yield f"conditions = [{', '.join(map(_text, made.conditions))}]"
+    yield from ("", "[artefact.self_calibration.nodes_mm]")
+    yield from (f"{_text(axis)} = {_numbers(places)}" for axis, places in made.nodes.items())
+    length = made.length
+    yield from ("", "[artefact.self_calibration.length]", f"parameter = {_text(length.parameter)}")
+    yield f"error_um = {decimal_in(MICROMETRE)(length.value)}"
+    yield f"standard_uncertainty_um = {decimal_in(MICROMETRE)(length.standard_uncertainty)}"
+    yield f"certificate = {_text(length.certificate)}"
+
+
+def _l_shape(piece: LShape | None) -> Iterator[str]:
+    if piece is None:
+        return
+    length, angle = decimal_in(MICROMETRE), decimal_in(MICRORADIAN)
+    yield from ("", "[artefact.l_shape]", f"focal_length_mm = {float(piece.focal_length)!r}")
+    yield f"paraboloid_mm = {float(piece.paraboloid)!r}"
+    yield f"place_standard_uncertainty_um = {length(piece.place_uncertainty)}"
+    yield f"tilt_standard_uncertainty_urad = {angle(piece.tilt_uncertainty)}"
+    for module in piece.modules:
+        yield from ("", "[[artefact.l_shape.modules]]", f"id = {_text(module.id)}")
+        yield f"centre_mm = {_numbers(module.centre)}"
+        yield f"tilt_urad = [{', '.join(map(angle, module.tilt))}]"
+    for placement in piece.placements:
+        yield from ("", "[[artefact.l_shape.placements]]", f"plane = {_text(placement.plane)}")
+        yield f"corner_mm = {_numbers(placement.corner)}"
 
 
 def _numbers(values: tuple[float, ...]) -> str:

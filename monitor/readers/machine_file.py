@@ -130,6 +130,10 @@ def _stroke(table: Table, axis: Axis) -> tuple[float, float] | None:
     return low, high
 
 
+#: The limit of the volumetric error, the longest error vector over the strokes, beside those of the terms.
+VOLUMETRIC = "volumetric"
+
+
 def _tolerances(machine: Table, axes: tuple[Axis, ...] | None) -> dict[str, float]:
     table = machine.table("tolerances")
     tolerances: dict[str, float] = {}
@@ -137,11 +141,15 @@ def _tolerances(machine: Table, axes: tuple[Axis, ...] | None) -> dict[str, floa
         return tolerances
     for name in table.data:
         match = TERM.fullmatch(name)
-        if match is None:
+        if name == VOLUMETRIC:
+            limit = table.number(name, positive=True, unit="µm", example="50.0")
+            if limit is not None:
+                tolerances[name] = limit
+        elif match is None:
             table.fault(
                 name,
                 f"{quoted(name)} is not the name of a term; write it as in ISO 230-1, "
-                "such as EC0Y (location) or EXX (motion)",
+                f"such as EC0Y (location) or EXX (motion), or {VOLUMETRIC}",
             )
         elif axes is not None and match[3] not in {axis.name for axis in axes}:
             table.fault(

@@ -42,14 +42,16 @@ def no_check(plan: Plan) -> Iterable[Fault]:
 class MethodRules:
     """The rules of one method.
 
-    ``needs_scale_bar`` and ``targets_are_balls`` say what the artefact must hold, ``targets_are_reflectors`` that
-    targets are the listed reflectors where any is listed; ``suffixes`` are the units that a recorded column may
-    end in, ``plain_columns`` columns that are allowed besides, ``measured_columns`` those that must be there with a
-    number in every row; ``check`` judges the plan.
+    ``needs_...`` and ``targets_are_balls`` say what the artefact must hold, ``targets_are_reflectors`` that targets
+    are the listed reflectors where any is listed; ``suffixes`` are the units that a recorded column may end in,
+    ``plain_columns`` columns that are allowed besides, ``measured_columns`` those that must be there with a number in
+    every row; ``check`` judges the plan.
     """
 
     name: str
     needs_scale_bar: bool = False
+    needs_self_calibration: bool = False
+    needs_l_shape: bool = False
     targets_are_balls: bool = False
     targets_are_reflectors: bool = False
     suffixes: tuple[str, ...] = tuple(COLUMN_UNITS)

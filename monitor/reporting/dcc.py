@@ -29,16 +29,21 @@ SI = "https://ptb.de/si"
 SCHEMA_VERSION = "3.2.1"
 _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
-#: Display unit: the same in the notation of D-SI (PTB, SmartCom D-SI metadata model, 2.1).
+#: A unit of a quotient: the same in the notation of D-SI (PTB, SmartCom D-SI metadata model, 2.1).
 _UNITS = {
     "µm": r"\micro\metre",
     "µrad": r"\micro\radian",
     "mm": r"\milli\metre",
+    "m": r"\metre",
     "rad": r"\radian",
-    "µm/m": r"\micro\metre\per\metre",
-    "µrad/m": r"\micro\radian\per\metre",
+    "K": r"\kelvin",
+    "°C": r"\degreecelsius",
+    "s": r"\second",
+    "min": r"\minute",
+    "h": r"\hour",
     "1": r"\one",
 }
+_POWERS = {"²": "2", "³": "3"}
 #: The schema's word for a verdict (stringConformityStatementStatusType).
 _STATUS = {
     "pass": "pass",
@@ -74,9 +79,16 @@ def dcc_xml(record: CertificateRecord, language: str = "en") -> bytes:
 
 def unit_of(name: str) -> str:
     """A display unit in the notation of D-SI. Raises InputError for one that has none here."""
-    if name not in _UNITS:
-        raise InputError(f"unit {name} has no D-SI notation here; there are {', '.join(_UNITS)}")
-    return _UNITS[name]
+    written = []
+    for place, factor in enumerate(name.split("/")):
+        stem, power = re.fullmatch(r"(.*?)(²|³|\^[0-9])?", factor).groups()  # type: ignore[union-attr]
+        if stem not in _UNITS:
+            raise InputError(
+                f"unit {name} has no D-SI notation here; there are {', '.join(_UNITS)}, their powers and quotients"
+            )
+        raised = "" if power is None else rf"\tothe{{{_POWERS.get(power, power.lstrip('^'))}}}"
+        written.append((r"\per" if place else "") + _UNITS[stem] + raised)
+    return "".join(written)
 
 
 def _add(parent: ET.Element, tag: str, text: str | None = None, space: str = DCC) -> ET.Element:

@@ -1,9 +1,10 @@
-"""Figures of what the model leaves: by group, over the workspace, against a driver, against a prediction."""
+"""Figures of what the model leaves: by group and over the workspace."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +14,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.figure_style import (
     BLUE,
-    FAINT,
     INK,
-    MID,
     ORANGE,
     PAGE_WIDTH_MM,
     PALE,
@@ -23,7 +22,6 @@ from monitor.reporting.figure_style import (
     new_figure,
     reference_line,
     style,
-    zero_line,
 )
 
 #: A residual's arrow: the longest is this part of the workspace's longest edge.
@@ -86,6 +84,37 @@ def residual_bars(
     return figure
 
 
+@dataclass(frozen=True)
+class View:
+    """How residual vectors (n, 3) are drawn: ``magnify`` times enlarged, within ``reach`` mm of the ``middle`` (3,).
+
+    ``large`` (n,) marks the largest tenth, ``key`` is the length in µm of the bar that explains the arrows.
+    """
+
+    magnify: float
+    middle: Array
+    reach: float
+    large: npt.NDArray[np.bool_]
+    longest: float
+    key: float
+
+
+def view_of(place: Array, size: Array) -> View:
+    """The view of residuals (n, 3) µm at places (n, 3) mm, one scale for all three sides."""
+    length = np.linalg.norm(size, axis=1)
+    extent = float(np.max(np.ptp(place, axis=0)))
+    longest = float(np.max(length))
+    seen = longest > 0.0 and extent > 0.0
+    return View(
+        magnify=nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if seen else 1.0,
+        middle=(np.max(place, axis=0) + np.min(place, axis=0)) / 2,
+        reach=0.66 * extent or 1.0,
+        large=length >= np.quantile(length, 0.9),
+        longest=longest,
+        key=nice(longest) if longest > 0.0 else 1.0,
+    )
+
+
 def residual_vectors(
     positions_mm: npt.ArrayLike, residuals_um: npt.ArrayLike, *, title: str, frame: str = "machine frame"
 ) -> Figure:
@@ -94,13 +123,8 @@ def residual_vectors(
     The largest tenth is drawn in the accent colour, thicker. All three views share one magnification, printed below.
     """
     place, size = _points(positions_mm, residuals_um)
-    length = np.linalg.norm(size, axis=1)
-    extent = float(np.max(np.ptp(place, axis=0)))
-    longest = float(np.max(length))
-    magnify = _nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if longest > 0.0 and extent > 0.0 else 1.0
-    large = length >= np.quantile(length, 0.9)
-    middle = (np.max(place, axis=0) + np.min(place, axis=0)) / 2
-    reach = 0.66 * extent or 1.0
+    view = view_of(place, size)
+    large, magnify, middle, reach = view.large, view.magnify, view.middle, view.reach
     with style():
         figure = new_figure(PAGE_WIDTH_MM, 71.0, title)
         panels = figure.subplots(1, 3)
@@ -125,7 +149,7 @@ def residual_vectors(
             axes.set_title(f"{'XYZ'[across]}{'XYZ'[up]}")
             axes.set_xlabel(f"{'XYZ'[across]} / mm", labelpad=1)
             axes.set_ylabel(f"{'XYZ'[up]} / mm", labelpad=0)
-        key = _nice(longest) if longest > 0.0 else 1.0
+        key = view.key
         corner = (middle[0] - 0.95 * reach, middle[1] - 0.9 * reach)
         panels[0].plot(
             [corner[0], corner[0] + key * 1e-3 * magnify], [corner[1]] * 2, color=INK, linewidth=2.2
@@ -145,112 +169,6 @@ def residual_vectors(
     return figure
 
 
-def residual_against_driver(
-    driver: npt.ArrayLike,
-    residual_um: npt.ArrayLike,
-    *,
-    title: str,
-    driver_name: str,
-    residual_name: str = "residual / µm",
-    group: npt.ArrayLike | None = None,
-    bins: int = 8,
-) -> Figure:
-    """Residuals (n,) µm against a driver (n,), with the mean of each group and ± 1 standard error of it.
-
-    ``group`` (n,) assigns the groups; without it the driver is cut into ``bins`` of equal numbers of points.
-    The means are drawn to guide the eye and are no stored result.
-    """
-    x, y = np.asarray(driver, dtype=np.float64), np.asarray(residual_um, dtype=np.float64)
-    if x.shape != y.shape or x.ndim != 1:
-        raise DataError(f"driver and residual_um must have one shape (n,), but have {x.shape} and {y.shape}")
-    keep = np.isfinite(x) & np.isfinite(y)
-    x, y = x[keep], y[keep]
-    labels = _equal_parts(x, bins) if group is None else np.asarray(group)[keep]
-    with style():
-        figure = new_figure(0.72 * PAGE_WIDTH_MM, 78.0, title)
-        axes = figure.subplots()
-        zero_line(axes)
-        axes.scatter(x, y, s=6, color=MID, alpha=0.45, linewidths=0, zorder=1)
-        centres, means, errors = [], [], []
-        for label in dict.fromkeys(labels.tolist()):
-            inside = labels == label
-            centres.append(float(np.mean(x[inside])))
-            means.append(float(np.mean(y[inside])))
-            count = int(inside.sum())
-            errors.append(float(np.std(y[inside], ddof=1)) / math.sqrt(count) if count > 1 else 0.0)
-        order = np.argsort(centres)
-        axes.errorbar(
-            np.array(centres)[order],
-            np.array(means)[order],
-            yerr=np.array(errors)[order],
-            fmt="o-",
-            color=ORANGE,
-            markeredgecolor=INK,
-            markeredgewidth=0.6,
-            markersize=5,
-            linewidth=1.2,
-            capsize=2.5,
-            zorder=3,
-        )
-        caption(figure, "grey: single probings; circles: means of groups, ± 1 standard error")
-        axes.set_xlabel(driver_name)
-        axes.set_ylabel(residual_name)
-    return figure
-
-
-def predicted_against_measured(
-    predicted_um: npt.ArrayLike, measured_um: npt.ArrayLike, *, title: str, noise_um: float | None = None
-) -> Figure:
-    """What an effect predicts (n,) against the residual measured without it (n,), both in µm.
-
-    Points on the line of equality are explained; ``noise_um`` draws a band of ± 2 standard deviations.
-    """
-    x, y = np.asarray(predicted_um, dtype=np.float64), np.asarray(measured_um, dtype=np.float64)
-    if x.shape != y.shape or x.ndim != 1 or not len(x):
-        raise DataError(
-            f"predicted_um and measured_um must have one shape (n,), but have {x.shape} and {y.shape}"
-        )
-    reach = 1.08 * max(float(np.max(np.abs(x))), float(np.max(np.abs(y)))) or 1.0
-    with style():
-        figure = new_figure(0.6 * PAGE_WIDTH_MM, 0.6 * PAGE_WIDTH_MM, title)
-        axes = figure.subplots()
-        ends = np.array([-reach, reach])
-        if noise_um is not None:
-            axes.fill_between(
-                ends, ends - 2 * noise_um, ends + 2 * noise_um, color=FAINT, linewidth=0, zorder=0
-            )
-        axes.plot(ends, ends, color=INK, linewidth=0.9, zorder=2)
-        zero_line(axes)
-        zero_line(axes, vertical=True)
-        axes.scatter(x, y, s=9, color=BLUE, alpha=0.6, linewidths=0, zorder=3)
-        axes.annotate(
-            "fully explained",
-            (0.97 * reach, 0.97 * reach),
-            xytext=(-4, -12),
-            textcoords="offset points",
-            ha="right",
-            va="top",
-            fontsize=7,
-            rotation=45,
-            rotation_mode="anchor",
-        )
-        if noise_um is not None:
-            axes.text(
-                0.02,
-                0.98,
-                f"band: ± 2 × {noise_um:.2g} µm of noise",
-                transform=axes.transAxes,
-                va="top",
-                fontsize=7,
-            )
-        axes.set_xlim(-reach, reach)
-        axes.set_ylim(-reach, reach)
-        axes.set_aspect("equal")
-        axes.set_xlabel("predicted by the effect / µm")
-        axes.set_ylabel("measured residual without it / µm")
-    return figure
-
-
 def _points(positions: npt.ArrayLike, residuals: npt.ArrayLike) -> tuple[Array, Array]:
     place, size = np.asarray(positions, dtype=np.float64), np.asarray(residuals, dtype=np.float64)
     if place.ndim != 2 or place.shape != size.shape or place.shape[1] != 3 or not len(place):
@@ -260,12 +178,7 @@ def _points(positions: npt.ArrayLike, residuals: npt.ArrayLike) -> tuple[Array, 
     return place, size
 
 
-def _nice(value: float) -> float:
+def nice(value: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that does not exceed ``value``."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))
-
-
-def _equal_parts(values: Array, parts: int) -> npt.NDArray[np.int64]:
-    edges = np.quantile(values, np.linspace(0.0, 1.0, parts + 1)[1:-1])
-    return np.asarray(np.searchsorted(edges, values, side="right"), dtype=np.int64)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Literal
 
+from monitor.reporting.health_comparison import ModelHealth
+
 State = Literal[
     "out of tolerance",
     "may be out of tolerance",
@@ -47,13 +49,14 @@ class History:
 
 @dataclass(frozen=True)
 class Drift:
-    """A drift per year with its standard uncertainty; when the limit is reached (None: no sign of it).
+    """A drift per year, its standard uncertainty and 95 % interval; when the limit is reached (None: no sign of it).
 
     ``crosses_between`` are the ends of the interval of that time, None where open.
     """
 
     per_year: float
     u_per_year: float
+    between: tuple[float, float]
     p_value: float
     crosses_at: date | None
     crosses_between: tuple[date | None, date | None]
@@ -105,38 +108,21 @@ class ConditionRange:
 
 
 @dataclass(frozen=True)
-class MissingEffect:
-    """An effect that the model lacks, its cause and what to do."""
+class RefusedImport:
+    """A folder that was refused this week, with its first faults; ``imported_at`` (UTC) where it came in well since."""
 
-    effect: str
-    meaning: str
-    cause: str
-    remedy: str
-    peak_um: float | None
-    rms_before_um: float | None
-    rms_after_um: float | None
-    not_ruled_out: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ModelHealth:
-    """Model against measurement; ``runs`` says in words which runs were compared."""
-
-    campaign: str
-    runs: str
-    model: str
-    verdict: str
-    answer: str
-    rms_um: float
-    repeatability_um: float | None
-    lack_of_fit_f: float | None
-    lack_of_fit_p: float | None
-    missing: tuple[MissingEffect, ...]
+    at: datetime
+    folder: str
+    campaign: str | None
+    machine: str | None
+    fault_count: int
+    faults: tuple[str, ...]
+    imported_at: datetime | None
 
 
 @dataclass(frozen=True)
 class DataQuality:
-    """What the data are worth: counts, bad points, what the plan cannot see, what got no number."""
+    """What the data are worth: counts, bad points, what the plan cannot see, what got no number, what never came in."""
 
     runs: int
     probings: int
@@ -145,6 +131,7 @@ class DataQuality:
     refused: tuple[tuple[str, str], ...]
     blind_spots: tuple[str, ...]
     remarks: tuple[str, ...]
+    refused_imports: tuple[RefusedImport, ...]
 
 
 @dataclass(frozen=True)
@@ -210,7 +197,10 @@ class FleetRow:
 
 @dataclass(frozen=True)
 class Fleet:
-    """The first page: the week, when the report was made, and the machines by urgency."""
+    """The first page: the week, when the report was made, and the machines by urgency.
+
+    ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known.
+    """
 
     week: str
     first_day: date
@@ -219,6 +209,7 @@ class Fleet:
     software: str
     risk: float
     rows: tuple[FleetRow, ...]
+    refused_imports: tuple[RefusedImport, ...] = ()
 
 
 def fleet_row(health: MachineHealth) -> FleetRow:

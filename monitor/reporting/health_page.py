@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 from monitor.reporting.health import (
@@ -18,12 +17,11 @@ from monitor.reporting.health import (
     VolumetricMap,
     fleet_row,
 )
-from monitor.reporting.health_words import in_words
+from monitor.reporting.health_pictures import PrintedPictures, printed_pictures
+from monitor.reporting.health_refusals import PrintedRefusal, printed_refusal
+from monitor.reporting.health_words import day, in_words, micrometres, p_in_words, percent, plain
 from monitor.reporting.numbers import (
-    decimal_of,
     round_result,
-    round_to_place,
-    round_uncertainty,
     written,
 )
 from monitor.reporting.sparkline import sparkline
@@ -40,12 +38,12 @@ SIGNS = {
     "no change seen": "✓",
 }
 #: Blind spots named on the page; the rest are counted (all stand in the JSON).
-_BLIND_SHOWN = 8
+_BLIND_SHOWN = 4
 #: Changes and events named on the page, the latest first.
 _CHANGES_SHOWN = 12
 #: Poses of the rotary axes named for the volumetric error, the worst first.
-_POSES_SHOWN = 4
-#: A drift is printed below this probability of seeing it where there is none.
+_POSES_SHOWN = 3
+#: A drift is set in bold below this probability of seeing it where there is none.
 _DRIFT_P = 0.001
 
 
@@ -77,6 +75,7 @@ class ParameterLine:
     out: str
     beyond: bool
     drift: str
+    drifts: bool
     unit: str
     picture: str
 
@@ -89,6 +88,7 @@ class PrintedMachine:
     head: FleetLine
     meaning: str
     lines: tuple[ParameterLine, ...]
+    no_trend: str
     changes: tuple[tuple[str, str, bool], ...]
     more_changes: int
     conditions: tuple[tuple[str, str], ...]
@@ -96,6 +96,8 @@ class PrintedMachine:
     map: tuple[tuple[str, str], ...]
     blind: str
     refused: tuple[tuple[str, str], ...]
+    imports: tuple[PrintedRefusal, ...]
+    pictures: PrintedPictures
 
 
 def fleet_context(fleet: Fleet) -> dict[str, Any]:
@@ -106,13 +108,14 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         "made_at": f"{fleet.made_at:%Y-%m-%d %H:%M}",
         "made_iso": fleet.made_at.isoformat() + "Z",
         "software": fleet.software,
-        "risk": _probability(fleet.risk),
+        "risk": percent(fleet.risk),
         "lines": [_line(row) for row in fleet.rows],
         "legend": [
             (SIGNS[state], state, words)
             for state, words in STATES.items()
             if state in {row.state for row in fleet.rows}
         ],
+        "imports": [printed_refusal(one) for one in fleet.refused_imports],
         "alarms": sum(row.state in ALARMS for row in fleet.rows),
         "measured": sum(row.state != "not measured" for row in fleet.rows),
     }
@@ -133,12 +136,17 @@ def _page(health: MachineHealth) -> PrintedMachine:
         head=_line(fleet_row(health)),
         meaning=STATES[health.state],
         lines=tuple(_parameter(one) for one in health.parameters),
+        no_trend=(
+            ""
+            if any(one.drift for one in health.parameters)
+            else "No trend a year: the history is too short for one."
+        ),
         changes=tuple((_span(one), _sentence(one), one.this_week) for one in shown),
         more_changes=len(health.changes) - len(shown),
         conditions=tuple(
             (
                 one.name,
-                f"{_plain(one.lowest)} to {_plain(one.highest)}, mean {_plain(one.mean)} {one.unit}".strip(),
+                f"{plain(one.lowest)} to {plain(one.highest)}, mean {plain(one.mean)} {one.unit}".strip(),
             )
             for one in health.conditions
         ),
@@ -146,6 +154,8 @@ def _page(health: MachineHealth) -> PrintedMachine:
         map=_map(health.map),
         blind=", ".join(blind[:_BLIND_SHOWN]) + more if blind else "",
         refused=health.quality.refused,
+        imports=tuple(printed_refusal(one) for one in health.quality.refused_imports),
+        pictures=printed_pictures(health.model),
     )
 
 
@@ -158,8 +168,8 @@ def _line(row: FleetRow) -> FleetLine:
         state=row.state,
         alarm=row.state in ALARMS,
         changed=row.changed,
-        since="" if row.since is None else _day(row.since),
-        out="" if row.probability_out is None else _probability(row.probability_out),
+        since="" if row.since is None else day(row.since),
+        out="" if row.probability_out is None else percent(row.probability_out),
         next_check=row.next_check,
     )
 
@@ -167,24 +177,36 @@ def _line(row: FleetRow) -> FleetLine:
 def _parameter(one: ParameterHealth) -> ParameterLine:
     rounded = round_result(one.estimate, one.expanded)
     factor = one.expanded / one.u
-    drift = ""
-    if one.drift is not None and one.drift.p_value < _DRIFT_P:
-        slope, u = in_words(one.drift.per_year, one.drift.u_per_year)
-        drift = f"{slope} {one.unit} a year (u = {u} {one.unit} a year)"
-        if one.drift.crosses_at is not None:
-            drift += f", reaches the tolerance about {one.drift.crosses_at}"
+    drift = _drift(one)
     return ParameterLine(
         name=one.name,
         description=one.description,
         estimate=written(rounded.estimate),
         expanded=written(rounded.uncertainty),
-        tolerance="" if one.tolerance is None else "± " + _plain(one.tolerance),
-        out="" if one.probability_out is None else _probability(one.probability_out),
+        tolerance="" if one.tolerance is None else "± " + plain(one.tolerance),
+        out="" if one.probability_out is None else percent(one.probability_out),
         beyond=one.tolerance is not None and abs(one.estimate) > one.tolerance,
         drift=drift,
+        drifts=one.drift is not None and one.drift.p_value < _DRIFT_P,
         unit=one.unit,
         picture=sparkline(one, factor),
     )
+
+
+def _drift(one: ParameterHealth) -> str:
+    """The drift a year with its interval, and when the tolerance is reached where there is a sign of it."""
+    if one.drift is None:
+        return ""
+    u = one.drift.u_per_year
+    slope, low, high = (
+        in_words(value, u, sign=True)[0] for value in (one.drift.per_year, *one.drift.between)
+    )
+    words = f"trend {slope} {one.unit} a year ({low} to {high})"
+    if one.drift.crosses_at is not None:
+        first, last = one.drift.crosses_between
+        ends = f", between {first or 'now'} and {last or 'never'}" if first or last else ""
+        words += f"; reaches the tolerance about {one.drift.crosses_at}{ends}"
+    return words
 
 
 def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
@@ -192,11 +214,11 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
     if model is None:
         return ()
     lines = [("model", model.model), ("compared with", model.runs), ("verdict", model.verdict)]
-    lines.append(("what it leaves", f"{_um(model.rms_um)} (root mean square of all coordinates)"))
+    lines.append(("what it leaves", f"{micrometres(model.rms_um)} rms of all coordinates"))
     if model.repeatability_um is not None:
-        lines.append(("repeatability", _um(model.repeatability_um)))
+        lines.append(("repeatability", micrometres(model.repeatability_um)))
     if model.lack_of_fit_p is not None and model.lack_of_fit_f is not None:
-        lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {_p_value(model.lack_of_fit_p)}"))
+        lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {p_in_words(model.lack_of_fit_p)}"))
     return tuple(lines)
 
 
@@ -206,46 +228,24 @@ def _map(found: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
     worst = round_result(found.worst_um, found.expanded_um)
     lines = [
         ("worst", f"{written(worst.estimate)} µm (U = {written(worst.uncertainty)} µm) at {found.worst_at}"),
-        ("root mean square", f"{_plain(float(f'{found.rms_um:.3g}'))} µm over {found.region}"),
+        ("root mean square", f"{plain(float(f'{found.rms_um:.3g}'))} µm over {found.region}"),
     ]
     by = sorted(found.by_pose, key=lambda one: -one.worst_um)[:_POSES_SHOWN]
     if by:
         words = "; ".join(f"{one.pose}: {one.worst_um:.1f} µm ({one.rms_um:.1f} µm)" for one in by)
-        lines.append(("largest (rms) by pose", words))
+        lines.append(("by pose", f"at most (rms) {words}"))
     return tuple(lines)
 
 
 def _span(change: Change) -> str:
     if change.after is None or change.after == change.at:
-        return _day(change.at)
-    return f"{_day(change.after)} to {_day(change.at)}"
+        return day(change.at)
+    return f"{day(change.after)} to {day(change.at)}"
 
 
 def _sentence(change: Change) -> str:
-    return change.what if change.p_value is None else f"{change.what} (p {_p_value(change.p_value)})"
-
-
-def _day(moment: datetime) -> str:
-    return f"{moment:%Y-%m-%d}"
-
-
-def _p_value(p: float) -> str:
-    return "< 0.0001" if p < 1e-4 else f"= {p:.2g}"
-
-
-def _probability(p: float) -> str:
-    """A probability in percent; what is nearly sure is not printed as sure."""
-    if p < 0.001:
-        return "< 0.1 %"
-    if p > 0.999:
-        return "> 99.9 %"
-    percent = round_uncertainty(100.0 * p) if p < 0.1 else round_to_place(100.0 * p, decimal_of(1.0))
-    return f"{written(percent)}\N{NO-BREAK SPACE}%"
-
-
-def _um(value: float) -> str:
-    return f"{value:.2f}\N{NO-BREAK SPACE}µm"
-
-
-def _plain(value: float) -> str:
-    return written(decimal_of(float(f"{value:.4g}")))
+    return (
+        change.what
+        if change.p_value is None
+        else f"{change.what} (p\N{NO-BREAK SPACE}{p_in_words(change.p_value)})"
+    )

@@ -21,6 +21,7 @@ from monitor.statistics.fdr import FalseDiscoveries, control_false_discoveries
 from monitor.statistics.forecast import Backtest, Crossing, Forecast, backtest, forecast, predict
 from monitor.statistics.groups import Selection, group_by, select_runs
 from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
+from monitor.statistics.joint_forecast import LengthForecast, forecast_longest, residual_correlation
 from monitor.statistics.means import AnalysisOfVariance, GroupTest, anova, kruskal_wallis, welch_anova
 from monitor.statistics.monotone import MonotoneTrend, mann_kendall
 from monitor.statistics.multivariate import VectorTest, box_m, manova
@@ -48,6 +49,7 @@ __all__ = [
     "Histogram",
     "History",
     "Homogeneity",
+    "LengthForecast",
     "MonotoneTrend",
     "Normality",
     "Pooling",
@@ -68,6 +70,7 @@ __all__ = [
     "ewma_chart",
     "find_changes",
     "forecast",
+    "forecast_longest",
     "group_by",
     "homogeneity",
     "individuals_chart",
@@ -84,6 +87,7 @@ __all__ = [
     "pool",
     "predict",
     "reference_period",
+    "residual_correlation",
     "select_runs",
     "t_squared_chart",
     "trend",

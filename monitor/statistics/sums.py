@@ -7,6 +7,7 @@ on the means; the textbook formula (sum of squares less squared sum) loses all d
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +76,10 @@ class GroupedSums:
 
 
 def label_groups(groups: npt.ArrayLike, n: int) -> tuple[tuple[str, ...], npt.NDArray[np.intp]]:
-    """Distinct labels in sorted order, as text, and the index (n,) of each run's label."""
+    """Distinct labels in order, as text, and the index (n,) of each run's label.
+
+    Numbers rise, also those in texts: day 2 before day 10, ``below 4`` before ``4 to 6`` before ``above 6``.
+    """
     array = np.asarray(groups)
     if array.shape != (n,):
         raise DataError(f"groups has shape {array.shape}; ({n},) is needed, one label for each run.")
@@ -83,7 +87,27 @@ def label_groups(groups: npt.ArrayLike, n: int) -> tuple[tuple[str, ...], npt.ND
         at = int(np.flatnonzero(~np.isfinite(array))[0])
         raise DataError(f"groups[{at}] is {array[at]}; every run needs a label.")
     distinct, index = np.unique(array, return_inverse=True)
-    return tuple(str(label) for label in distinct), index.astype(np.intp)
+    if array.dtype.kind not in "UO":
+        return tuple(str(label) for label in distinct), index.astype(np.intp)
+    texts = [str(label) for label in distinct]
+    order = sorted(range(len(texts)), key=lambda place: _natural(texts[place]))
+    rank = np.empty(len(order), dtype=np.intp)
+    rank[order] = np.arange(len(order))
+    return tuple(texts[place] for place in order), rank[index]
+
+
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
+
+
+def _natural(label: str) -> tuple[object, ...]:
+    """A key that sorts the numbers in texts by their size; a bin without a lower end comes first."""
+    bin_of = re.match(r"\s*(below |above )?(" + _NUMBER.pattern + r")(?![\d-])", label)
+    if bin_of is not None:
+        side = {"below ": -1, "above ": 1}.get(bin_of[1] or "", 0)
+        return (0, float(bin_of[2]), side, label)
+    # Texts and whole numbers take turns, so that like is compared with like.
+    parts = re.split(r"(\d+)", label)
+    return (1, *(int(part) if place % 2 else part for place, part in enumerate(parts)))
 
 
 def grouped_sums(

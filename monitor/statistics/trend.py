@@ -100,7 +100,8 @@ def trend(
 
     ``u`` (n,) standard uncertainties in the unit of the values (what is common to all runs, such as the
     scale bar, moves no slope and is better left out); their common scale is estimated. ``days`` (n,) labels
-    whose runs share a day component; None: every run is its own day. At least three days. Raises
+    whose runs share a day component, and which count at the mean time of the day; None: every run is its own day.
+    At least three days. Raises
     ``DataError`` for fewer, for times that are all alike, non-finite values, or ``u`` not above zero.
     Neglected: serial correlation between days, except in ``monotone``.
     Measured false alarms at 5 %: 1 to 6 % for 3 to 40 days (1 to 2 % with few days and no day component).
@@ -117,8 +118,14 @@ def trend(
         )
     if np.ptp(t) == 0.0:
         raise DataError(f"all times are {t[0]}; a trend needs times that differ.")
-    at = float(t.mean())
-    design = np.column_stack([np.ones_like(t), t - at])
+    # All runs of a day count at its mean time: what happens within a day (a machine that warms up every morning) is
+    # scatter of the runs and no drift of years, which a slope within the day would pass itself off as.
+    weight = np.ones_like(t) if own is None else 1.0 / own**2
+    on_day = (np.bincount(index, weight * t) / np.bincount(index, weight))[index]
+    if np.ptp(on_day) == 0.0:
+        raise DataError("all days have the same mean time; a trend needs days that differ.")
+    at = float(on_day.mean())
+    design = np.column_stack([np.ones_like(t), on_day - at])
     fit = fit_with_days(y, design, own, index)
     means, moments = day_averages(y, t, own, index)
     return _result(fit, at, y, own, (means, moments), level)

@@ -5,7 +5,13 @@ argument. People who query with SQL start from the views ``v_*``; every table an
 its unit. Only this room imports duckdb.
 """
 
-from monitor.store.analyses import StoredAnalysis, list_analyses, load_analysis, save_analysis
+from monitor.store.analyses import (
+    StoredAnalysis,
+    latest_documents,
+    list_analyses,
+    load_analysis,
+    save_analysis,
+)
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import described_machines, list_campaigns, list_machines, list_runs
@@ -22,7 +28,7 @@ from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.events import list_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
-from monitor.store.history import MachineHistory, machine_history, unidentified_campaigns
+from monitor.store.history import MachineHistory, latest_tolerances, machine_history, unidentified_campaigns
 from monitor.store.identifications import (
     identification_by_number,
     list_identifications,
@@ -61,6 +67,8 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "latest_documents",
+    "latest_tolerances",
     "list_analyses",
     "list_backups",
     "list_campaigns",

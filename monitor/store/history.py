@@ -26,7 +26,7 @@ WITH chosen AS (
       AND ($version IS NULL OR i.model_version = $version)
     GROUP BY i.campaign_id
 )
-SELECT h.identification_id, c.campaign, r.run, r.started_at, r.utc_offset_s, r.day, r.warm_up, r.conditions
+SELECT h.identification_id, c.campaign, r.run, r.started_at, r.utc_offset_s, r.day, r.warm_up, r.conditions, c.method
 FROM chosen AS h JOIN campaign AS c USING (campaign_id) JOIN run AS r USING (campaign_id)
 WHERE r.started_at >= $since OR $since IS NULL
 ORDER BY r.started_at, h.identification_id, r.run
@@ -36,6 +36,26 @@ _VALUES = """
 SELECT v.identification_id, v.run, v.parameter, v.value / v.display_factor AS value, v.u / v.display_factor AS u, v.unit
 FROM parameter_value AS v
 WHERE v.identification_id IN ({marks}) AND v.value IS NOT NULL
+"""
+
+_TOLERANCES = """
+WITH latest AS (
+    SELECT c.machine, arg_max(c.campaign_id, (r.latest, c.campaign_id)) AS campaign_id
+    FROM campaign AS c
+    LEFT JOIN (
+        SELECT campaign_id, max(started_at) AS latest FROM run
+        WHERE $machine IS NULL OR campaign_id IN (SELECT campaign_id FROM campaign WHERE machine = $machine)
+        GROUP BY campaign_id
+    ) AS r USING (campaign_id)
+    WHERE $machine IS NULL OR c.machine = $machine
+    GROUP BY c.machine
+)
+SELECT machine, parameter, CAST(machine_description -> 'tolerances' ->> parameter AS DOUBLE) AS tolerance
+FROM (
+    SELECT l.machine, c.machine_description, unnest(json_keys(c.machine_description, '$.tolerances')) AS parameter
+    FROM latest AS l JOIN campaign AS c USING (campaign_id)
+)
+ORDER BY ALL
 """
 
 _CHANNELS = """
@@ -52,13 +72,15 @@ GROUP BY ALL ORDER BY ALL
 class MachineHistory:
     """n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
 
-    ``started_at`` keeps the shop's offset; ``values`` and ``u`` (n, p) are NaN where a parameter was refused;
-    ``conditions`` name to (n,): those of the runs and the means over each run of the recorded channels, in the unit
-    that the name ends in, NaN where not recorded. ``tolerances`` are those of the machine's latest campaign.
+    ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
+    are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
+    the recorded channels, in the unit that the name ends in, NaN where not recorded. ``tolerances`` are those of the
+    machine's latest campaign.
     """
 
     machine: str
     campaign: npt.NDArray[np.str_]
+    method: npt.NDArray[np.str_]
     run: npt.NDArray[np.int64]
     started_at: tuple[datetime, ...]
     day: npt.NDArray[np.int64]
@@ -99,6 +121,7 @@ def machine_history(
     return MachineHistory(
         machine=machine,
         campaign=campaign,
+        method=np.array([row[8] for row in rows], dtype=np.str_),
         run=run,
         started_at=tuple(
             row[3].replace(tzinfo=UTC).astimezone(timezone(timedelta(seconds=row[4]))) for row in rows
@@ -110,7 +133,7 @@ def machine_history(
         values=values,
         u=u,
         conditions=_conditions(db, machine, [row[7] for row in rows], campaign, run),
-        tolerances=_tolerances(db, machine),
+        tolerances={name: limit for (_, name), limit in latest_tolerances(db, machine).items()},
     )
 
 
@@ -126,8 +149,10 @@ def unidentified_campaigns(
             LEFT JOIN identification AS i ON i.campaign_id = c.campaign_id
                 AND (i.model = $model OR $model IS NULL AND i.model = i.method)
                 AND ($version IS NULL OR i.model_version = $version)
-            LEFT JOIN (SELECT campaign_id, count(*) AS runs FROM run GROUP BY campaign_id) AS r
-                ON r.campaign_id = c.campaign_id
+            LEFT JOIN (
+                SELECT campaign_id, count(*) AS runs FROM run
+                WHERE campaign_id IN (SELECT campaign_id FROM campaign WHERE machine = $machine) GROUP BY campaign_id
+            ) AS r ON r.campaign_id = c.campaign_id
             WHERE c.machine = $machine
             GROUP BY c.campaign_id, c.campaign, r.runs
             HAVING coalesce(max(i.run_count), 0) < r.runs
@@ -184,11 +209,9 @@ def _conditions(
     return found
 
 
-def _tolerances(db: Database, machine: str) -> dict[str, float]:
-    return dict(
-        db.rows(
-            "SELECT t.parameter, t.tolerance FROM v_tolerances AS t JOIN v_machines AS m "
-            "ON m.machine = t.machine AND m.latest_campaign = t.campaign WHERE t.machine = ? ORDER BY ALL",
-            [machine],
-        )
-    )
+def latest_tolerances(db: Database, machine: str | None = None) -> dict[tuple[str, str], float]:
+    """Limits of the absolute value by machine and parameter, in display units, as each latest campaign states them."""
+    return {
+        (name, parameter): float(limit)
+        for name, parameter, limit in db.rows(_TOLERANCES, {"machine": machine})
+    }

@@ -6,7 +6,21 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from monitor.records import Artefact, AxisSettings, Ball, ChainAxis, Machine, Probe, Reflector, ScaleBar
+from monitor.records import (
+    Artefact,
+    AxisSettings,
+    Ball,
+    ChainAxis,
+    KnownError,
+    LShape,
+    Machine,
+    Module,
+    Placement,
+    Probe,
+    Reflector,
+    ScaleBar,
+    SelfCalibration,
+)
 
 
 def machine_json(machine: Machine) -> str:
@@ -64,8 +78,13 @@ def probe_record(text: str) -> Probe:
 def artefact_json(artefact: Artefact) -> str:
     """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C."""
     data = asdict(artefact)
+    # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
+    if artefact.self_calibration is None:
+        del data["self_calibration"]
     if not artefact.reflectors:
         del data["reflectors"]
+    if artefact.l_shape is None:
+        del data["l_shape"]
     return _text(data)
 
 
@@ -79,7 +98,24 @@ def artefact_record(text: str) -> Artefact:
         balls,
         None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])}),
         tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
+        l_shape=_l_shape(data.get("l_shape")),
+        self_calibration=_self_calibration(data.get("self_calibration")),
     )
+
+
+def _self_calibration(data: dict[str, Any] | None) -> SelfCalibration | None:
+    if data is None:
+        return None
+    nodes = {axis: tuple(places) for axis, places in data["nodes"].items()}
+    return SelfCalibration(nodes, KnownError(**data["length"]), tuple(data["conditions"]))
+
+
+def _l_shape(data: dict[str, Any] | None) -> LShape | None:
+    if data is None:
+        return None
+    modules = tuple(Module(one["id"], _tuple(one["centre"]), _tuple(one["tilt"])) for one in data["modules"])
+    placements = tuple(Placement(one["plane"], _tuple(one["corner"])) for one in data["placements"])
+    return LShape(**{**data, "modules": modules, "placements": placements})
 
 
 def _text(data: dict[str, Any]) -> str:

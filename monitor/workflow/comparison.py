@@ -9,7 +9,7 @@ import numpy as np
 
 from monitor.discovery import Comparison, Explanation, Fit, Missing, explain, fit, version_error
 from monitor.discovery import compare as compare_fit
-from monitor.discovery.compare import Part
+from monitor.discovery.compare import SOMETHING_IS_MISSING, Part
 from monitor.discovery.steps import Step
 from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import method_named
@@ -20,11 +20,16 @@ from monitor.units import DEGREE, MICROMETRE, Unit
 from monitor.workflow import curves
 from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.models import as_model, label, resolve
+from monitor.workflow.residuals_against import picture_documents
 
 Document = dict[str, Any]
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.
 SEED = 20260302
+ONE_RUN = (
+    "with one run nobody can say what varies from run to run, what stepped between runs, or how well a reading "
+    "repeats; measure the same plan again"
+)
 
 
 def _um(length: float | None) -> float | None:
@@ -73,6 +78,7 @@ def compare(db: Database, campaign: str, model: str | None = None) -> tuple[Docu
     """Compare a model with a campaign; the document is stored. The fit serves the figures."""
     loaded, stored, found = fitted(db, campaign, model)
     document = comparison_document(compare_fit(found, campaign, label(stored)))
+    document["target_word"] = found.problem.target_word
     save_analysis(
         db, "comparison", document, method=loaded.method, campaign=campaign,
         model=stored.name, model_version=stored.version,
@@ -179,8 +185,17 @@ def explanation_document(found: Explanation) -> Document:
         "changes": changes,
         "blind_spots": list(found.blind),
         "not_recorded": dict(found.refused),
+        "target_word": problem.target_word,
+        "held_out": "runs" if len(problem.runs) > 1 else "blocks of poses",
+        "undecided": [ONE_RUN] if len(problem.runs) == 1 else [],
     }
     document["answer"] = _answer(document)
+    # Where nothing is missing there is nothing to picture.
+    document |= (
+        picture_documents(found, missing[0]["effect"] if missing else None)
+        if document["verdict"] == SOMETHING_IS_MISSING
+        else {"residual_map": None, "residual_against": None}
+    )
     return document
 
 
@@ -205,7 +220,7 @@ def _answer(document: Document) -> str:
         count = len(document["suspect_data"])
         parts.append(f"{count} bad point{'s were' if count > 1 else ' was'} left out.")
     for change in document["changes"]:
-        what = f"ball {change['target']}" if "target" in change else change["parameter"]
+        what = f"{document['target_word']} {change['target']}" if "target" in change else change["parameter"]
         verb = "moved" if "target" in change else "stepped"
         parts.append(f"{what} {verb} by {change['size']:.1f} {change['unit']} at run {change['run']}.")
     return " ".join(parts)
@@ -258,13 +273,18 @@ def latest_campaign(db: Database, model: StoredModel) -> str:
     )
 
 
-def history(db: Database, model: str, campaign: str | None = None) -> list[Document]:
-    """The error falling: every version from the base on, fitted to one campaign."""
+def history(
+    db: Database, model: str, campaign: str | None = None, *, before: datetime | None = None
+) -> list[Document]:
+    """The error falling: every version from the base on, fitted to one campaign.
+
+    Runs that began at or after ``before`` (local time without a zone) take no part.
+    """
     stored = resolve(db, model)
     name = campaign or latest_campaign(db, stored)
     if is_curve(db, name):
         return curves.history(db, stored, name)
-    loaded = load_campaign(db, name)
+    loaded = runs_before(load_campaign(db, name), before)
     steps = []
     for version in model_history(db, stored.name, stored.version):
         found = fit(method_named(loaded.method).problem_of(loaded, as_model(version)))

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from monitor.effects.catalogue import catalogue
+from monitor.effects.catalogue import catalogue, of_balls, of_tracker
 from monitor.effects.words import describe
 from monitor.machine import parse_topology
 from monitor.methods.base_effects import base_effects
+
+# Those that every campaign has, and two channels as examples.
+DRIVERS = ("warmup", "run_time", "ambient_degC", "x_axis_degC")
 
 
 def effects(topology: str, text: str | None = None) -> dict[str, Any]:
@@ -15,7 +18,7 @@ def effects(topology: str, text: str | None = None) -> dict[str, Any]:
     chain = parse_topology(topology)
     found = []
     for effect in catalogue(
-        chain, base_effects(chain), ("warmup", "run_time", "ambient_degC", "x_axis_degC")
+        chain, base_effects(chain), DRIVERS, more=(*of_balls(DRIVERS), *of_tracker(chain, DRIVERS))
     ):
         words = describe(effect)
         one = {

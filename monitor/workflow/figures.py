@@ -8,28 +8,22 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import Explanation, Fit
-from monitor.discovery.anomalies import plan_places
 from monitor.effects import ChainEffect
 from monitor.exceptions import DataError, InputError
-from monitor.machine import evaluate
 from monitor.records import Array
 from monitor.reporting.figure_style import save
+from monitor.reporting.figures_drivers import predicted_against_measured, residual_against_driver
 from monitor.reporting.figures_models import error_falling, ranked_effects
 from monitor.reporting.figures_parameters import parameters_by_run
-from monitor.reporting.figures_residuals import (
-    predicted_against_measured,
-    residual_against_driver,
-    residual_bars,
-    residual_vectors,
-)
+from monitor.reporting.figures_residuals import residual_bars, residual_vectors
 from monitor.reporting.numbers import round_result
 from monitor.store import StoredIdentification
 from monitor.units import MICROMETRE
+from monitor.workflow.residuals import drivers_followed, in_machine_frame, mean_over_runs
+from monitor.workflow.residuals_against import against_effect
 
 Document = dict[str, Any]
 ENDINGS = (".svg", ".png")
-# Of the drivers of the residual so many are drawn: those that explain most, the others in the document.
-MOST_DRIVERS = 4
 
 
 def _saved(figure: Any, folder: Path, name: str) -> list[str]:
@@ -43,21 +37,6 @@ def make_folder(folder: Path) -> Path:
     except OSError as error:
         raise InputError(f"the folder {folder} cannot be made: {error.strerror or error}") from error
     return folder
-
-
-def _in_machine_frame(found: Fit) -> tuple[Array, Array]:
-    """Where the tip stood, mm, and the residual, µm, both (n, 3) along the machine's axes."""
-    errors, target, tip = found.problem.state(found.solution.local, found.solution.common)
-    context = found.problem.context
-    seen = evaluate(context.chain, context.positions, errors, target, tip)
-    turned = np.einsum("nij,nj->ni", seen.work_rotation, seen.residual)
-    linear = [place for place, joint in enumerate(context.chain.joints) if not joint.turns]
-    places = np.zeros((len(context), 3))
-    for place in linear:
-        sign = 1.0 if place >= len(context.chain.work) else -1.0
-        places += sign * context.positions[:, [place]] * np.array(context.chain.joints[place].direction)
-    vectors: Array = MICROMETRE.to_display(1.0) * turned
-    return places, vectors
 
 
 def comparison_figures(document: Document, found: Fit, folder: Path) -> list[str]:
@@ -80,8 +59,8 @@ def comparison_figures(document: Document, found: Fit, folder: Path) -> list[str
     files = _saved(
         residual_bars(groups, level_um=level, level_name="expected", title=title), folder, "where-it-fails"
     )
-    places, vectors = _in_machine_frame(found)
-    places, vectors = _mean_over_runs(found, places, vectors)
+    places, vectors = in_machine_frame(found)
+    places, vectors = mean_over_runs(found, places, vectors)
     files += _saved(
         residual_vectors(
             places, vectors, title="What the model leaves, mean over the runs, over the workspace"
@@ -89,7 +68,7 @@ def comparison_figures(document: Document, found: Fit, folder: Path) -> list[str
         folder,
         "residual-vectors",
     )
-    for name, driver, axis, values in _drivers(found):
+    for name, driver, axis, values in drivers_followed(found):
         files += _saved(
             residual_against_driver(
                 driver, values, title=f"Residual along {axis} against {name}", driver_name=name,
@@ -99,57 +78,6 @@ def comparison_figures(document: Document, found: Fit, folder: Path) -> list[str
             f"residual-against-{name.split(' ')[0].lower()}",
         )  # fmt: skip
     return files
-
-
-def _mean_over_runs(found: Fit, places: Array, vectors: Array) -> tuple[Array, Array]:
-    numbers = plan_places(found)
-    keep = ~found.left_out
-    count = np.bincount(numbers[keep]).astype(float)
-    count[count == 0] = np.nan
-
-    def mean(rows: Array) -> Array:
-        sums = [
-            np.bincount(numbers[keep], weights=rows[keep, axis], minlength=len(count)) for axis in range(3)
-        ]
-        means: Array = np.stack(sums, axis=1) / count[:, None]
-        return means
-
-    first, second = mean(places), mean(vectors)
-    good = np.isfinite(first).all(axis=1)
-    return first[good], second[good]
-
-
-def _drivers(found: Fit) -> list[tuple[str, Array, str, Array]]:
-    """The drivers that the residual follows most, with the axis in which it does: name, values, axis, residual."""
-    context = found.problem.context
-    _, vectors = _in_machine_frame(found)
-    keep = ~found.left_out
-    scored = []
-    columns: dict[str, Array] = {
-        f"{joint.name} / {'°' if joint.turns else 'mm'}": joint.sign * context.positions[:, place]
-        * (180.0 / np.pi if joint.turns else 1.0)
-        for place, joint in enumerate(context.chain.joints)
-    }  # fmt: skip
-    columns |= {name: values for name, values in context.columns.items() if name.endswith("_degC")}
-    columns["time_in_run / min"] = context.time / 60.0
-    columns["time_of_day / h"] = context.day_time / 3600.0
-    for name, values in columns.items():
-        if not np.isfinite(values[keep]).all() or np.ptp(values[keep]) == 0.0:
-            continue
-        cuts = np.unique(np.quantile(values[keep], np.linspace(0, 1, 9)[1:-1]))
-        bins = np.searchsorted(cuts, values[keep], side="right")
-        for axis in range(3):
-            rows = vectors[keep, axis]
-            count = np.bincount(bins)
-            means = np.bincount(bins, weights=rows) / np.maximum(count, 1)
-            scored.append((float(np.sum(count * means**2)), name, axis))
-    best: dict[str, tuple[float, int]] = {}
-    for score, name, axis in sorted(scored, reverse=True):
-        best.setdefault(name, (score, axis))
-    chosen = sorted(best, key=lambda name: -best[name][0])[:MOST_DRIVERS]
-    return [
-        (name, columns[name][keep], "XYZ"[best[name][1]], vectors[keep, best[name][1]]) for name in chosen
-    ]
 
 
 def explanation_figures(document: Document, found: Explanation, folder: Path) -> list[str]:
@@ -177,6 +105,7 @@ def explanation_figures(document: Document, found: Explanation, folder: Path) ->
         "missing-effects",
     )
     files += _saved(_falling(document), folder, "error-falling")
+    files += _failing(found, missing[0]["effect"], folder)
     pair = _predicted(found, missing[0]["effect"])
     if pair is not None:
         files += _saved(
@@ -186,6 +115,28 @@ def explanation_figures(document: Document, found: Explanation, folder: Path) ->
             folder,
             "predicted-against-measured",
         )
+    return files
+
+
+def _failing(found: Explanation, effect: str, folder: Path) -> list[str]:
+    """Where the model fails, and what is missing: the residual against what drives the effect, before and after."""
+    files = []
+    final, before = found.final, found.comparison.vectors
+    if before.shape[1] == 3:
+        places, vectors = mean_over_runs(final, *in_machine_frame(final, before))
+        title = "What the model leaves, mean over the runs, over the workspace"
+        files += _saved(residual_vectors(places, vectors, title=title), folder, "residual-vectors")
+    against = against_effect(found, effect)
+    if against is not None:
+        files += _saved(
+            residual_against_driver(
+                against.at, against.before, title=f"{effect} is missing: the residual along {against.along} follows it",
+                driver_name=against.driver, residual_name=f"residual along {against.along} / µm", group=against.groups,
+                after_um=against.after,
+            ),
+            folder,
+            "missing-effect-before-after",
+        )  # fmt: skip
     return files
 
 

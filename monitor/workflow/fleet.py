@@ -10,7 +10,7 @@ import numpy as np
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
 from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
-from monitor.store import Database, FleetSums, fleet_sums
+from monitor.store import Database, FleetSums, fleet_sums, latest_tolerances
 from monitor.workflow.models import resolve
 from monitor.workflow.trend_parameter import DAYS_PER_YEAR, SHORTEST_DAYS
 
@@ -41,13 +41,7 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
 
 def _limits(db: Database, sums: FleetSums) -> Array:
     """Limit of the absolute value of each cell by the machine's latest campaign; NaN where none is stated."""
-    stated = {
-        (machine, parameter): float(limit)
-        for machine, parameter, limit in db.rows(
-            "SELECT t.machine, t.parameter, t.tolerance FROM v_tolerances AS t JOIN v_machines AS m "
-            "ON m.machine = t.machine AND m.latest_campaign = t.campaign"
-        )
-    }
+    stated = latest_tolerances(db)
     keys = zip(sums.machine.tolist(), sums.parameter.tolist(), strict=True)
     return np.array([stated.get(key, np.nan) for key in keys])
 

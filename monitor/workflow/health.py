@@ -21,6 +21,7 @@ from monitor.store.catalogue import check_machine
 from monitor.workflow.campaigns import records
 from monitor.workflow.health_history import check_campaigns, makers
 from monitor.workflow.health_machine import Settings, machine_health
+from monitor.workflow.health_refusals import refused_elsewhere
 from monitor.workflow.weeks import Week, week_before, week_named
 
 Document = dict[str, Any]
@@ -72,6 +73,7 @@ def report(
     fleet = Fleet(
         chosen.name, chosen.first, chosen.last, now, f"machine-health-monitor {__version__}", own.risk,
         tuple(row for row, _ in rows),
+        refused_elsewhere(db, {str(known["machine"]) for known in records(list_machines(db))}, chosen),
     )  # fmt: skip
     files = _write(db, fleet, [number for _, number in rows], out or Path(), machine)
     return _document(fleet, chosen, files)
@@ -130,6 +132,7 @@ def _document(fleet: Fleet, week: Week, files: list[str]) -> Document:
         "machines": [to_document(row) for row in fleet.rows],
         "measured": measured,
         "alarms": [row.machine for row in fleet.rows if row.state in ALARMS],
+        "refused_imports": [to_document(one) for one in fleet.refused_imports],
         "message": ""
         if measured
         else f"No machine was measured in week {week.name} ({week.first} to {week.last}).",

@@ -14,6 +14,7 @@ from monitor.reporting.health import (
     Drift,
     History,
     ParameterHealth,
+    RefusedImport,
 )
 from monitor.reporting.health_words import in_words
 from monitor.reporting.symbols import describe
@@ -73,6 +74,7 @@ def _drift(found: DriftFound, origin: datetime) -> Drift:
     return Drift(
         found.slope,
         found.u_slope,
+        found.between,
         found.p_value,
         day(found.crosses),
         (day(found.crosses_between[0]), day(found.crosses_between[1])),
@@ -144,25 +146,33 @@ def quality_of(
     here: list[PastRun],
     explained: Document | None,
     evaluated: Document | None,
+    refused_imports: tuple[RefusedImport, ...],
     remarks: list[str],
 ) -> DataQuality:
-    runs = {run.run for run in here}
-    probings = sum(
-        db.rows("SELECT count(*) FROM v_probings WHERE campaign = ? AND run = ?", [run.campaign, run.run])[0][
-            0
-        ]
-        for run in here
-    )
+    """What the data of the week's runs ``here`` are worth; without a result, what depends on it is empty."""
+    runs = {(run.campaign, run.run) for run in here}
+    counts = {
+        (campaign, run): count
+        for name in {run.campaign for run in here}
+        for campaign, run, count in db.rows(
+            "SELECT campaign, run, count(*) FROM v_probings WHERE campaign = ? GROUP BY ALL", [name]
+        )
+    }
     suspect = tuple(
         f"run {one['run']}, touch {one['sequence']}, ball {one['target']}: "
         f"{one['axis']} is off by {one['size_um']:.1f} µm"
         for one in (explained or {}).get("suspect_data", [])
-        if one["run"] in runs
+        if ((explained or {}).get("campaign"), one["run"]) in runs
     )
-    refused = tuple(
-        (", ".join(one["parameters"]), one["why"]) for one in (evaluated or {}).get("refused", [])
-    )
-    blind = tuple((explained or {}).get("blind_spots", []))
     return DataQuality(
-        len(here), probings, sum(run.warm_up for run in here), suspect, refused, blind, tuple(remarks)
+        runs=len(here),
+        probings=sum(counts.get(one, 0) for one in runs),
+        warm_up_runs=sum(run.warm_up for run in here),
+        suspect=suspect,
+        refused=tuple(
+            (", ".join(one["parameters"]), one["why"]) for one in (evaluated or {}).get("refused", [])
+        ),
+        blind_spots=tuple((explained or {}).get("blind_spots", [])),
+        remarks=tuple(remarks),
+        refused_imports=refused_imports,
     )

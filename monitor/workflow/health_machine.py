@@ -7,7 +7,7 @@ from datetime import datetime
 
 import numpy as np
 
-from monitor.reporting.health import DataQuality, MachineHealth
+from monitor.reporting.health import DataQuality, MachineHealth, RefusedImport
 from monitor.store import Database
 from monitor.workflow.health_facts import (
     changes_noted,
@@ -24,15 +24,24 @@ from monitor.workflow.health_history import (
     past_events,
     past_runs,
 )
-from monitor.workflow.health_map import stored_map
+from monitor.workflow.health_map import map_told
 from monitor.workflow.health_model import model_of
-from monitor.workflow.health_results import explanation_of, identified, tolerances_of, uncertainty_of
+from monitor.workflow.health_refusals import refused_of
+from monitor.workflow.health_results import (
+    explanation_of,
+    history_of,
+    identified,
+    map_of,
+    tolerances_of,
+    uncertainty_of,
+)
 from monitor.workflow.health_series import changes_of, drift_of, series_of
 from monitor.workflow.health_verdict import (
     changed_in_words,
     factor_in_words,
     judged_by,
     next_check,
+    refusals_in_words,
     since_when,
     state_of,
 )
@@ -56,9 +65,10 @@ def machine_health(
     runs, remarks = past_runs(db, machine, week, settings.campaigns)
     here = [run for run in runs if week.holds(run.at)]
     events = past_events(db, machine, week)
+    refused = refused_of(db, machine, week)
     if not here:
         ahead = first_run(db, machine, settings.campaigns)
-        return _not_measured(machine, description, location, runs, ahead, events, remarks, week)
+        return _not_measured(machine, description, location, runs, ahead, events, refused, remarks, week)
     last = here[-1]
     (method,) = db.rows("SELECT method FROM v_campaigns WHERE campaign = ?", [last.campaign])[0]
     model = resolve(db, settings.model, method)
@@ -66,6 +76,7 @@ def machine_health(
     identified(db, here, model, remarks)
     evaluated = uncertainty_of(db, last, model, span, remarks)
     explained = explanation_of(db, last.campaign, method, model, span, remarks)
+    mapped = None if evaluated is None else map_of(db, last, model, span, remarks)
     series = series_of(db, machine, model, runs)
     origin = runs[0].at
     changes = changes_of(series, events, origin)
@@ -86,17 +97,18 @@ def machine_health(
             )
         )
     noted = changes_noted(changes, series, events, explained, runs, last.campaign, origin, week)
-    quality = quality_of(db, here, explained, evaluated, remarks)
+    quality = quality_of(db, here, explained, evaluated, refused, remarks)
     state = state_of(judged, noted, explained, quality, settings.risk)
     return MachineHealth(
         machine, description, location, state,
-        changed=changed_in_words(noted), since=since_when(state, parameters, noted), probability_out=judged.any,
-        next_check=next_check(state, drifts, limits, last.at),
+        changed=changed_in_words(noted, explained, quality),
+        since=since_when(state, parameters, noted, span.first), probability_out=judged.any,
+        next_check=next_check(state, drifts, limits, last.at, week),
         run=f"run {last.run} of campaign {last.campaign}, {last.at:%Y-%m-%d %H:%M}",
         basis="" if evaluated is None else evaluated["input_covariance"], factor=factor_in_words(evaluated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=conditions_of(here),
-        model=model_of(explained, span), quality=quality,
-        map=stored_map(db, last.campaign, [run.run for run in here if run.campaign == last.campaign], model),
+        model=model_of(explained, history_of(db, last.campaign, model, span, remarks), span), quality=quality,
+        map=map_told(mapped),
     )  # fmt: skip
 
 
@@ -107,6 +119,7 @@ def _not_measured(
     runs: list[PastRun],
     ahead: tuple[datetime, str] | None,
     events: list[Event],
+    refused: tuple[RefusedImport, ...],
     remarks: list[str],
     week: Week,
 ) -> MachineHealth:
@@ -119,10 +132,12 @@ def _not_measured(
     else:
         check = "now: no run yet"
         said = "not yet measured: the database holds no run of it"
+    said = "; ".join([said, *refusals_in_words(refused)])
     noted = [event_noted(one, week) for one in reversed(events)]
+    quality = DataQuality(0, 0, 0, (), (), (), tuple(remarks), refused)
     return MachineHealth(
         machine, description, location, "not measured",
         changed=said, since=runs[-1].at if runs else None, probability_out=None,
         next_check=check, run="", basis="", factor="", parameters=(), changes=tuple(noted),
-        conditions=(), model=None, quality=DataQuality(0, 0, 0, (), (), (), tuple(remarks)), map=None,
+        conditions=(), model=None, quality=quality, map=None,
     )  # fmt: skip

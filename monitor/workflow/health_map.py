@@ -1,35 +1,17 @@
-"""The volumetric error of a machine on its health report: the stored map of the week's last run that has one."""
+"""The volumetric error of a machine on its health report: the map of the week's last run."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from monitor.exceptions import NotFoundError
 from monitor.reporting.health import PoseError, VolumetricMap
-from monitor.store import Database, StoredModel, load_analysis
 
 
-def stored_map(db: Database, campaign: str, runs: Sequence[int], model: StoredModel) -> VolumetricMap | None:
-    """The map of the last of ``runs`` of a campaign that has one under a model (`monitor map CAMPAIGN`), or None."""
-    for run in reversed(runs):
-        try:
-            return _told(
-                load_analysis(
-                    db,
-                    "volumetric map",
-                    campaign=campaign,
-                    run=run,
-                    model=model.name,
-                    model_version=model.version,
-                ).document
-            )
-        except NotFoundError:
-            continue
-    return None
-
-
-def _told(found: Mapping[str, Any]) -> VolumetricMap:
+def map_told(found: Mapping[str, Any] | None) -> VolumetricMap | None:
+    """The document of `monitor map` as the report states it; None where there is none."""
+    if found is None:
+        return None
     worst, region = found["worst"], found["region"]
     return VolumetricMap(
         run=int(found["run"]),

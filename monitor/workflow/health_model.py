@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
-from monitor.reporting.health import MissingEffect, ModelHealth
+from monitor.reporting.documents import from_document
+from monitor.reporting.health_comparison import (
+    ErrorStep,
+    MissingEffect,
+    ModelHealth,
+    ResidualAgainst,
+    ResidualMap,
+)
 from monitor.workflow.health_history import Span, plain
 
 Document = dict[str, Any]
 
 
-def model_of(explained: Document | None, span: Span) -> ModelHealth | None:
-    """The comparison, which is of the runs of ``span``: their number and days are said with it."""
+def model_of(explained: Document | None, history: list[Document], span: Span) -> ModelHealth | None:
+    """The comparison, which is of the runs of ``span``: their number and days are said with it.
+
+    ``history`` has the versions of the model (empty where there is one only).
+    """
     if explained is None:
         return None
     return ModelHealth(
@@ -37,13 +48,40 @@ def model_of(explained: Document | None, span: Span) -> ModelHealth | None:
             )
             for one in explained["missing"]
         ),
+        stated_um=explained["stated_uncertainty_um"],
+        where=None
+        if explained["residual_map"] is None
+        else from_document(ResidualMap, explained["residual_map"]),
+        against=_against(explained["residual_against"]),
+        steps=tuple(_steps(explained, history)),
     )
+
+
+def _against(found: Document | None) -> ResidualAgainst | None:
+    return None if found is None else from_document(ResidualAgainst, found)
+
+
+def _steps(explained: Document, history: list[Document]) -> Iterator[ErrorStep]:
+    """The error from the method's own model on: what was added, and what adding the missing effects would give."""
+    for one in history:
+        changed = [f"+ {text}" for text in (one["added"] or "").split(" + ") if text]
+        changed += [f"\N{MINUS SIGN} {text}" for text in (one["removed"] or "").split(" + ") if text]
+        yield ErrorStep(
+            f"{one['model']}: {' '.join(changed) or 'as it is'}", one["rms_um"], one["heldout_rms_um"], False
+        )
+    missing = explained["missing"]
+    if missing and not history:
+        first = missing[0]
+        yield ErrorStep(
+            f"{explained['model']}: as it is", first["rms_before_um"], first["heldout_before_um"], False
+        )
+    for one in missing:
+        yield ErrorStep(f"+ {one['effect']}", one["rms_after_um"], one["heldout_after_um"], True)
 
 
 def _runs_in_words(campaign: str, span: Span) -> str:
     first, last = f"{span.first:%Y-%m-%d}", f"{span.last:%Y-%m-%d}"
     days = first if first == last else f"{first} to {last}"
-    runs = "the one run" if span.count == 1 else f"all {span.count} runs"
-    if not span.later:
-        return f"{runs} of campaign {campaign}, {days}"
-    return f"{runs} of campaign {campaign} until the end of the week, {days}; {span.later} later left out"
+    if span.later:
+        return f"{span.count} of {span.count + span.later} runs of {campaign}, {days}; the others began after the week"
+    return f"{'the one run' if span.count == 1 else f'all {span.count} runs'} of {campaign}, {days}"

@@ -11,13 +11,14 @@ from datetime import datetime
 from typing import Any
 
 from monitor.exceptions import MonitorError, NotFoundError
-from monitor.store import Database, StoredModel, load_analysis
+from monitor.store import Database, StoredModel, load_analysis, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
-from monitor.workflow.comparison import explain_campaign
+from monitor.workflow.comparison import explain_campaign, history
 from monitor.workflow.health_history import PastRun, Span
 from monitor.workflow.identification import identify
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty import uncertainty
+from monitor.workflow.volumetric import volumetric_map
 
 Document = dict[str, Any]
 #: The probability that every expanded uncertainty of the report is stated with.
@@ -84,13 +85,54 @@ def explanation_of(
         model=model.name,
         model_version=model.version,
     )
-    if known is not None:
+    # A version before 0.1 stored no pictures with it.
+    if known is not None and "residual_map" in known:
         return known
     return kept(
         lambda: explain_campaign(db, campaign, label(model), before=span.before)[0],
         "model and measurement could not be compared",
         remarks,
     )
+
+
+def map_of(
+    db: Database, last: PastRun, model: StoredModel, span: Span, remarks: list[str]
+) -> Document | None:
+    """The volumetric error of a run over the strokes, from the runs of ``span``; None, with a remark, without one."""
+    known = _stored(
+        db, "volumetric map", span.before, METHOD, campaign=last.campaign, run=last.run, model=model.name,
+        model_version=model.version,
+    )  # fmt: skip
+    if known is not None:
+        return known
+    return kept(
+        lambda: volumetric_map(
+            db, last.campaign, last.run, model=label(model), p=COVERAGE, before=span.before
+        )[0],
+        "the volumetric error could not be mapped",
+        remarks,
+    )
+
+
+def history_of(
+    db: Database, campaign: str, model: StoredModel, span: Span, remarks: list[str]
+) -> list[Document]:
+    """The error of every version of the model on the runs of ``span``; empty where there is one version only."""
+    if model.parent is None:
+        return []
+    which: dict[str, Any] = {"campaign": campaign, "model": model.name, "model_version": model.version}
+    known = _stored(db, "model history", span.before, METHOD, **which)
+    if known is None:
+        known = kept(
+            lambda: {"steps": history(db, label(model), campaign, before=span.before)},
+            "the versions of the model could not be compared",
+            remarks,
+        )
+        if known is None:
+            return []
+        method = method_of(METHOD, span.before)
+        save_analysis(db, kind_of("model history", span.before), known, method=method, **which)
+    return list(known["steps"])
 
 
 def _stored(db: Database, kind: str, before: datetime | None, method: str, **which: Any) -> Document | None:

@@ -53,10 +53,11 @@ class Series:
 
 @dataclass(frozen=True)
 class DriftFound:
-    """A drift since the last change, and how long a run stays in tolerance with 95 % (days from ``now``)."""
+    """A drift a year since the last change, its 95 % interval, and how many days a run stays in tolerance with 95 %."""
 
     slope: float
     u_slope: float
+    between: tuple[float, float]
     p_value: float
     crosses: float | None
     crosses_between: tuple[float, float]
@@ -120,17 +121,16 @@ def drift_of(one: Series, since: float, now: float, tolerance: float | None) -> 
     try:
         line = trend(one.values[kept], one.t[kept], u=one.u[kept], days=days)
         span = float(np.ptp(one.t[kept]))
+        low, high = line.slope_interval
+        between = (low * DAYS_A_YEAR, high * DAYS_A_YEAR)
+        head = (line.slope * DAYS_A_YEAR, line.u_slope * DAYS_A_YEAR, between, line.p_value)
         if tolerance is None:
-            return DriftFound(
-                line.slope * DAYS_A_YEAR, line.u_slope * DAYS_A_YEAR, line.p_value, None, (np.inf, np.inf), None, span
-            )  # fmt: skip
+            return DriftFound(*head, None, (np.inf, np.inf), None, span)
         ahead = forecast(line, (-tolerance, tolerance), now, [], horizon=now + span)
     except (DataError, InputError):
         return None
-    return DriftFound(
-        line.slope * DAYS_A_YEAR, line.u_slope * DAYS_A_YEAR, line.p_value,
-        ahead.crossing.at, ahead.crossing.interval, float(min(ahead.recommended_interval, span)), span,
-    )  # fmt: skip
+    good_for = float(min(ahead.recommended_interval, span))
+    return DriftFound(*head, ahead.crossing.at, ahead.crossing.interval, good_for, span)
 
 
 def moment(origin: datetime, days: float) -> datetime | None:

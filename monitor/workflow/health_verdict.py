@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from monitor.reporting.health import ALARMS, Change, DataQuality, ParameterHealth, State
+from monitor.reporting.health import ALARMS, Change, DataQuality, ParameterHealth, RefusedImport, State
 from monitor.uncertainty.conformity import conformity
 from monitor.workflow.health_series import DriftFound
+from monitor.workflow.weeks import Week
 
 Document = dict[str, Any]
 
@@ -42,18 +43,35 @@ def judged_by(evaluated: Document | None, limits: dict[str, float]) -> Judged:
     return Judged(single, float(1.0 - found.joint), all(name in limits for name in names))
 
 
-def changed_in_words(noted: list[Change]) -> str:
+def changed_in_words(noted: list[Change], explained: Document | None, quality: DataQuality) -> str:
+    """What is new this week: changes, then events, what the model lacks, and data that never came in."""
     own = [one.what for kind in ("change", "event") for one in noted if one.this_week and one.kind == kind]
-    if not own:
-        return "nothing this week"
-    return "; ".join(own[:3]) + (f"; and {len(own) - 3} more" if len(own) > 3 else "")
+    own += refusals_in_words(quality.refused_imports)
+    own = own[:3] + ([f"and {len(own) - 3} more"] if len(own) > 3 else [])
+    own += [f"the model lacks {one['effect']}" for one in (explained or {}).get("missing", [])[:1]]
+    return "; ".join(own) or "nothing this week"
 
 
-def since_when(state: State, parameters: list[ParameterHealth], noted: list[Change]) -> datetime | None:
-    """Since when the machine is in this state: beyond a tolerance, or another one than before."""
+def refusals_in_words(refused: tuple[RefusedImport, ...]) -> list[str]:
+    """One sentence for the imports that were refused and did not come in since."""
+    still = [one for one in refused if one.imported_at is None]
+    if not still:
+        return []
+    if len(still) == 1:
+        return [f"an import was refused on {still[0].at:%Y-%m-%d}"]
+    return [f"{len(still)} imports were refused, the last on {still[-1].at:%Y-%m-%d}"]
+
+
+def since_when(
+    state: State, parameters: list[ParameterHealth], noted: list[Change], compared: datetime
+) -> datetime | None:
+    """Since when the machine is in this state: beyond a tolerance, another one than before, or not explained by the
+    model, which then is so from the first run ``compared`` with it."""
     beyond = [one.out_since for one in parameters if one.out_since is not None]
     if state == "out of tolerance" and beyond:
         return min(beyond)
+    if state == "model fails":
+        return compared
     changed = [one.at for one in noted if one.kind == "change"]
     if state == "changed":
         changed = [one.at for one in noted if one.kind == "change" and one.this_week]
@@ -78,8 +96,9 @@ def state_of(
 
 
 def next_check(
-    state: State, drifts: dict[str, DriftFound | None], limits: dict[str, float], last: datetime
+    state: State, drifts: dict[str, DriftFound | None], limits: dict[str, float], last: datetime, week: Week
 ) -> str:
+    """When to measure again, and why: the machine is likely to be in tolerance until then."""
     known = {
         name: one.good_for for name, one in drifts.items() if one is not None and one.good_for is not None
     }
@@ -93,6 +112,10 @@ def next_check(
     found = drifts[name]
     assert found is not None
     day = (last + timedelta(days=known[name])).date()
+    if known[name] >= found.horizon and day <= week.last:
+        return f"next week: {found.horizon:.0f} days of history allow no longer forecast"
+    if day <= week.last:
+        return f"now: {name} stayed in tolerance with 95 % until {day} only"
     if known[name] >= found.horizon:
         return f"by {day}: in tolerance as far ahead as the history is long"
     return f"by {day}: {name} stays in tolerance with 95 % until then"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from monitor.discovery import fit
+from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods import method_named
 from monitor.methods.expected import candidate_touches, planned_context
@@ -76,6 +77,11 @@ def _with_found_tip(problem: TouchProblem) -> TouchProblem:
 def planned(loaded: Campaign, stored: StoredModel, most_balls: int) -> Planned:
     """The candidates of a campaign; where it has fewer than ``most_balls`` balls, places for more are added."""
     problem = method_named(loaded.method).problem_of(loaded, as_model(stored))
+    if not isinstance(problem, TouchProblem):
+        raise DataError(
+            f"plan weighs where balls are touched, and campaign {loaded.name} was measured by {loaded.method}; what"
+            " its plan cannot tell apart, identify names with what to do"
+        )
     problem = _with_found_tip(problem)
     first = problem.context.run == problem.runs[0]
     one = replace(

@@ -17,7 +17,7 @@ from monitor.effects import parse_effect
 from monitor.effects.catalogue import catalogue
 from monitor.exceptions import InputError
 from monitor.machine import Chain
-from monitor.methods import method_named
+from monitor.methods import free_form, method_named
 from monitor.methods.expected import planned_context
 from monitor.methods.planning import (
     MOST_BALLS,
@@ -33,6 +33,7 @@ from monitor.uncertainty.coverage import rectangle_factor
 from monitor.units import DEGREE, MICROMETRE, Unit
 from monitor.workflow.figures import ENDINGS, make_folder
 from monitor.workflow.models import as_model, label, resolve
+from monitor.workflow.plan_angles import plan_angles
 from monitor.workflow.plan_candidates import Planned, planned, strokes_of
 
 Document = dict[str, Any]
@@ -61,6 +62,12 @@ def plan(
         raise InputError(f"--balls {balls}: choose 1 to {MOST_BALLS}")
     loaded = load_campaign(db, campaign)
     stored = resolve(db, model, loaded.method)
+    if loaded.method == free_form.NAME:
+        if balls is not None or wanted or separate is not None:
+            raise InputError(
+                "a plan of the method free-form is its angles of the table: --poses N proposes the next N of them"
+            )
+        return _kept(db, plan_angles(loaded, stored, poses, p), loaded, stored)
     found = planned(loaded, stored, balls or 1)
     units = {
         name: effect.unit
@@ -96,12 +103,16 @@ def plan(
         document["proposed"]["blind_spots"] = _blind(found, proposed)
     if separate is not None:
         document["separate"] = _separate(loaded, stored, separate)
+    return _kept(db, document, loaded, stored)
+
+
+def _kept(db: Database, document: Document, loaded: Campaign, stored: StoredModel) -> Document:
     save_analysis(
         db,
         "plan",
         document,
         method=loaded.method,
-        campaign=campaign,
+        campaign=loaded.name,
         model=stored.name,
         model_version=stored.version,
     )

@@ -25,6 +25,7 @@ from monitor.workflow.models import resolve
 from monitor.workflow.run_columns import campaign_columns, group_labels, selected
 from monitor.workflow.run_tests import SEED, components, histogram, normal_scatter, vector_tests
 from monitor.workflow.selections import group
+from monitor.workflow.session_drift import session_drift
 
 Document = dict[str, Any]
 
@@ -183,6 +184,7 @@ def stats(
         "groups": {label: int(count) for label, count in zip(pooled.labels, pooled.counts, strict=True)},
         "parameters": parameters,
         "vector": vector_tests(values, groups),
+        "drift": session_drift(loaded, found, runs),
         "coordinates": _coordinates(loaded, runs, groups),
         "parameter_order": names,
         "correlation_all": _rows(pooled.covariance_all.correlation),

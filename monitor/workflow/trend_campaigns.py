@@ -24,6 +24,7 @@ def chosen_only(history: MachineHistory, campaigns: tuple[str, ...]) -> MachineH
     return replace(
         history,
         campaign=history.campaign[kept],
+        method=history.method[kept],
         run=history.run[kept],
         started_at=tuple(at for at, keep in zip(history.started_at, kept, strict=True) if keep),
         day=history.day[kept],

@@ -14,7 +14,8 @@ from monitor.reporting.health_words import in_words
 from monitor.statistics import predict
 from monitor.workflow.figures import ENDINGS, make_folder
 from monitor.workflow.trend_parameter import Document
-from monitor.workflow.trends import SECONDS_PER_DAY, Trends
+from monitor.workflow.trend_series import SECONDS_PER_DAY
+from monitor.workflow.trends import Trends
 
 
 def _day(text: str) -> float:

@@ -1,4 +1,4 @@
-"""What the history of one parameter says: drift, dependence, cycles, warm-up, forecast. Parts of `monitor trend`.
+"""What the history of one parameter says: drift, dependence, cycles, warm-up. Parts of `monitor trend`.
 
 Where the runs do not suffice for a part, it is a sentence under ``why`` and its numbers are null.
 """
@@ -16,11 +16,9 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics import (
-    Forecast,
     Trend,
     control_false_discoveries,
     dependence,
-    forecast,
     trend,
     warm_up,
 )
@@ -39,8 +37,6 @@ SHORTEST_DAYS = 30.0
 DAY_COVERAGE_H, YEAR_COVERAGE_D = 12.0, 300.0
 #: Channels that go together more closely than this cannot be told apart (their variances inflate tenfold).
 COLLINEAR = 0.95
-#: A forecast beyond this many years is no forecast; the date is then left out.
-HORIZON_YEARS = 20.0
 
 
 @dataclass(frozen=True)
@@ -215,9 +211,9 @@ def warming(
 ) -> tuple[Document | None, str | None]:
     """Warm-up of the latest campaign that was begun cold or hot: time constant and when the machine is stable."""
     # A campaign with runs while warming up has seen the whole of it; its other runs say where it ends.
-    for name in dict.fromkeys(campaigns[::-1].tolist()):
+    for name in dict.fromkeys(campaigns[warm][::-1].tolist()):
         inside = campaigns == name
-        if warm[inside].any() and inside.sum() >= 6:
+        if inside.sum() >= 6:
             own = series.part(inside)
             hours = (own.t - own.t[0]) * 24.0
             try:
@@ -232,35 +228,3 @@ def warming(
                 "stable_within": found.tolerance, "p_value": found.p_value,
             }, None  # fmt: skip
     return None, "no warm-up: no campaign of six runs or more has runs marked warm_up"
-
-
-def prediction(
-    series: Series, line: Trend | None, limit: float | None, check: float, reliability: float
-) -> tuple[Document, Forecast | None]:
-    """When the drift reaches the limit, and how likely the parameter is in tolerance at the next ``check``."""
-    document: Document = {
-        "limit": limit, "crosses_limit_at": None, "crosses_limit_interval": None, "in_tolerance_at_next_check": None,
-        "next_check": date(check, series.offset), "recommended_interval_days": None, "recommended_by": None,
-        "why_no_forecast": None,
-    }  # fmt: skip
-    if limit is None:
-        return {
-            **document,
-            "why_no_forecast": "no forecast: the machine file states no tolerance for it",
-        }, None
-    if line is None:
-        return {**document, "why_no_forecast": "no forecast: there is no drift to extrapolate"}, None
-    now = float(series.t[-1])
-    horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
-    found = forecast(line, (-limit, limit), now, [max(check, now)], reliability=reliability, horizon=horizon)
-    crossing, offset = found.crossing, series.offset
-    low, high = (date(x, offset) if x < horizon else None for x in crossing.interval)
-    document |= {
-        "crosses_limit_at": None if crossing.at is None else date(crossing.at, offset),
-        # An open end says that the drift may never get there (within the horizon).
-        "crosses_limit_interval": None if low is None and high is None else [low, high],
-        "in_tolerance_at_next_check": float(found.probability[0]),
-        "recommended_interval_days": float(min(found.recommended_interval, horizon - now)),
-        "recommended_by": f"{found.method}: {reliability:g}",
-    }
-    return document, found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -20,11 +20,13 @@ from monitor.store import (
     save_analysis,
     unidentified_campaigns,
 )
-from monitor.workflow.change_search import DAYS_FOR_MEANS, search_changes
+from monitor.workflow.agreement import Moment, agreement, evaluated
+from monitor.workflow.change_search import search_changes
 from monitor.workflow.identification import identify
 from monitor.workflow.models import resolve
 from monitor.workflow.trend_campaigns import chosen_only, same_hours
-from monitor.workflow.trend_control import Charts, Points
+from monitor.workflow.trend_control import Charts
+from monitor.workflow.trend_forecast import backtested, prediction
 from monitor.workflow.trend_parameter import (
     DAYS_PER_YEAR,
     SHORTEST_DAYS,
@@ -34,15 +36,15 @@ from monitor.workflow.trend_parameter import (
     date,
     drift,
     number,
-    prediction,
     warming,
 )
+from monitor.workflow.trend_series import SECONDS_PER_DAY, all_series, piece_begins, points_of, steady_runs
+from monitor.workflow.trend_volumetric import Followed, volumetric_forecast
 
 Document = dict[str, Any]
 
 # Seeds what is simulated: the null distributions of changes and warm-up, the limit of MEWMA; stored with the result.
 SEED = 20260302
-SECONDS_PER_DAY = 86400.0
 #: The next check where none is named: as far away as the campaigns lie apart (median), or this many days.
 NEXT_CHECK_D = 30.0
 FALSE_ALARM = 0.05
@@ -59,6 +61,7 @@ class Choice:
     reliability: float = 0.95
     campaigns: tuple[str, ...] = ()
     model: str | None = None
+    volumetric_limit_um: float | None = None
 
 
 @dataclass(frozen=True)
@@ -99,22 +102,6 @@ def _history(db: Database, machine: str, choice: Choice) -> MachineHistory:
     return found
 
 
-def _series(history: MachineHistory) -> list[tuple[Series, npt.NDArray[np.bool_]]]:
-    """Each parameter with the runs that have it."""
-    t = history.seconds / SECONDS_PER_DAY
-    days = np.array(
-        [f"{campaign} day {day}" for campaign, day in zip(history.campaign, history.day, strict=True)], dtype=np.str_
-    )  # fmt: skip
-    hour = np.array([at.hour + at.minute / 60.0 for at in history.started_at])
-    offset = (history.started_at[-1].utcoffset() if history.started_at else None) or timedelta()
-    found = []
-    for j, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
-        own = np.isfinite(history.values[:, j])
-        whole = Series(name, unit, history.values[:, j], history.u[:, j], t, days, hour, offset)
-        found.append((whole.part(own), own))
-    return found
-
-
 def _change(one: Change, series: Series) -> Document:
     slope = one.kind in ("slope", "trend")
     # A slope of a short history is stated a day: see SHORTEST_DAYS.
@@ -130,32 +117,24 @@ def _change(one: Change, series: Series) -> Document:
     }
 
 
-def _piece_begins(series: Series, found: History | None, events: list[float]) -> float:
-    """When the present piece of history began: at the last event or change."""
-    moments = [at for at in events if at <= series.t[-1]]
-    moments += [one.at for one in found.changes] if found is not None else []
-    return max(moments, default=-np.inf)
-
-
-def _steady(series: Series, warm: npt.NDArray[np.bool_]) -> Series:
-    """The runs that are not marked warm_up, where six or more are not: a warming machine is another matter."""
-    return series.part(~warm) if (~warm).sum() >= 6 else series
-
-
 def _parameter(
     series: Series, history: MachineHistory, own: npt.NDArray[np.bool_], events: list[float], check: float,
     choice: Choice, charts: Charts, place: int, searched: Mapping[str, tuple[History | None, str | None]],
-) -> tuple[Document, Trend | None]:  # fmt: skip
-    steady = _steady(series, history.warm_up[own])
+) -> tuple[Document, Followed]:  # fmt: skip
+    steady = steady_runs(series, history.warm_up[own])
     found, why = searched[series.name]
-    begins = _piece_begins(steady, found, events)
+    begins = piece_begins(steady, found, events)
     slope, line = drift(steady, begins)
     channels = {name: values[own] for name, values in history.conditions.items()}
+    # The method is a condition like any other: 1 for the runs of each but the first.
+    for method in list(dict.fromkeys(history.method[own].tolist()))[1:]:
+        channels[f"method {method}"] = (history.method[own] == method).astype(np.float64)
     coefficients, why_conditions = conditions(series, channels, begins)
     waves, why_cycles = cycles(steady, begins)
     warmth, why_warm = warming(
         series, history.warm_up[own], np.random.default_rng([SEED, len(series.t)]), history.campaign[own]
     )
+    tested, why_untested = backtested(steady, begins)
     limit = history.tolerances.get(series.name)
     ahead, _ = prediction(steady, line, limit, check, choice.reliability)
     last = steady.days == steady.days[-1]
@@ -174,28 +153,10 @@ def _parameter(
         "warm_up": warmth,
         "why_no_warm_up": why_warm,
         **ahead,
+        "backtest": tested,
+        "why_no_backtest": why_untested,
         "control": charts.of(place),
-    }, line
-
-
-def _points(history: MachineHistory, series: list[tuple[Series, npt.NDArray[np.bool_]]]) -> Points:
-    """Points of the charts: runs, or day means where there are enough days; runs of a warming machine left out."""
-    t = history.seconds / SECONDS_PER_DAY
-    offset = series[0][0].offset
-    keep = ~history.warm_up if (~history.warm_up).sum() >= 6 else np.ones(len(t), dtype=np.bool_)
-    labels = np.array([f"{c} day {d}" for c, d in zip(history.campaign, history.day, strict=True)])[keep]
-    distinct, first, index = np.unique(labels, return_index=True, return_inverse=True)
-    if len(distinct) < DAYS_FOR_MEANS:
-        return Points(history.values[keep], t[keep], "runs", offset)
-    values = history.values[keep]
-    here = np.isfinite(values)
-    sums, counts = np.zeros((len(distinct), values.shape[1])), np.zeros((len(distinct), values.shape[1]))
-    np.add.at(sums, index, np.where(here, values, 0.0))
-    np.add.at(counts, index, here)
-    means = sums / np.where(counts > 0, counts, np.nan)
-    order = np.argsort(first, kind="stable")
-    moments = np.bincount(index, t[keep]) / np.bincount(index)
-    return Points(means[order], moments[order], "days", offset)
+    }, Followed(steady, begins, line)
 
 
 def _next_check(history: MachineHistory, choice: Choice) -> float:
@@ -231,6 +192,15 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         "since": None if choice.since is None else choice.since.isoformat(),
         "runs": len(history.run),
         "campaigns": list(dict.fromkeys(history.campaign.tolist())),
+        "methods": list(dict.fromkeys(history.method.tolist())),
+        "agreement": agreement(
+            history,
+            [
+                Moment(at.timestamp(), one["kind"], one["description"])
+                for at, one in zip(moments, known, strict=True)
+            ],
+            evaluated(db, list(dict.fromkeys(history.campaign.tolist()))),
+        ),
         "events": known,
         "notes": same_hours(history),
         "false_alarm": FALSE_ALARM,
@@ -241,13 +211,13 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         of = f" of campaign {', '.join(choice.campaigns)}" if choice.campaigns else ""
         why = f"machine {machine} has no identified run{of} {when}"
         return Trends({**head, "why": why, "parameters": {}}, (), {})
-    series = _series(history)
+    series = all_series(history)
     events = [_days(at) for at in moments]
     reference = None if choice.reference is None else (_days(choice.reference[0]), _days(choice.reference[1]))
-    charts = Charts(_points(history, series), reference)
+    charts = Charts(points_of(history, series), reference)
     check = _next_check(history, choice)
     searched = search_changes(
-        [_steady(one, history.warm_up[own]) for one, own in series if len(one.t)],
+        [steady_runs(one, history.warm_up[own]) for one, own in series if len(one.t)],
         events,
         false_alarm=FALSE_ALARM,
         seed=SEED,
@@ -258,7 +228,7 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         if len(one.t)
     }
     parameters = {name: one for name, (one, _) in judged.items()}
-    lines = {name: line for name, (_, line) in judged.items()}
+    followed = {name: one for name, (_, one) in judged.items()}
     _discoveries(parameters)
     document: Document = {
         **head,
@@ -270,9 +240,17 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         },
         "parameters": parameters,
     }
+    if choice.parameter is None:
+        document["volumetric_error"] = volumetric_forecast(
+            db, history, followed, check,
+            model=choice.model, limit_um=choice.volumetric_limit_um, reliability=choice.reliability,
+            rng=np.random.default_rng([SEED, 1]), offset=series[0][0].offset,
+        )  # fmt: skip
     if choice == Choice() and not db.read_only:
         save_analysis(db, "trend", document, method="all parameters", machine=machine, seed=SEED)
-    return Trends(document, tuple(one for one, _ in series), lines)
+    return Trends(
+        document, tuple(one for one, _ in series), {name: one.line for name, one in followed.items()}
+    )
 
 
 def _discoveries(parameters: Mapping[str, Document]) -> None:

@@ -22,7 +22,7 @@ from monitor.exceptions import DataError, InputError
 from monitor.methods import method_named
 from monitor.methods.identification import Refusal
 from monitor.methods.results import refusals
-from monitor.records import Array, Campaign
+from monitor.records import Array, Campaign, LinearAxes
 from monitor.store import Database, StoredModel, load_campaign, save_analysis
 from monitor.uncertainty import (
     FrameworkResult,
@@ -40,6 +40,7 @@ from monitor.uncertainty import (
     validate,
 )
 from monitor.uncertainty.coverage import ellipsoid_factor, rectangle_factor
+from monitor.uncertainty.linear_axes import row_covariances
 from monitor.uncertainty.row_problem import repeated_readings, run_problem
 from monitor.uncertainty.run_problem import OneRun, RunProblem
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
@@ -80,6 +81,10 @@ class Evaluated:
     monte_carlo: MonteCarloResult | None
     validation: Validation | None
     causes: tuple[tuple[str, float], ...] = ()
+
+
+# A covariance of 4 000 readings takes 128 MB and some copies; 10 000 trials of 1 000 readings some ten minutes.
+MOST_READINGS, MOST_READINGS_MCM = 4000, 1200
 
 
 def _reading_inputs(
@@ -166,10 +171,12 @@ def evaluate(
     cluster: str | None = None,
     select: str | None = None,
     before: datetime | None = None,
+    linear_axes: LinearAxes | None = None,
 ) -> Evaluated:
     """Evaluate the uncertainty of one run (the last by default). Raises InputError, DataError, NotFoundError.
 
     ``select`` names a stored selection, or a campaign of the same plan: its runs give the covariance of the readings.
+    ``linear_axes`` adds what errors of the linear axes do, for a method that takes those axes as known.
     Runs that began at or after ``before`` (local time without a zone) take no part.
     The trials go to ``workers`` processes or the Dask scheduler at the address ``cluster``, else to threads.
     """
@@ -188,6 +195,7 @@ def evaluate(
     # The uncertainty of shared effects and time constants is not propagated into a run's own parameters.
     fixed, coefficients = found.problem.resolved(found.solution.common)
     one = run_problem(fixed, number, coefficients)
+    _refuse_too_many(len(one.reading_names), method)
     readings, words = _reading_inputs(db, found, loaded, one, stored, select)
     calibrated = _calibrated_inputs(one)
     inputs = joined(readings, calibrated) if calibrated is not None else readings
@@ -205,7 +213,13 @@ def evaluate(
             outputs,
             {name: axis.scale_pitch for name, axis in loaded.machine.axes.items() if axis.scale_pitch},
         )
-    framework = _framework(at, inputs, names, units, p, [extra] if extra is not None else [])
+    contributions = [] if extra is None else [extra]
+    readings_only = inputs
+    if linear_axes is not None:
+        inputs, of_axes = _with_linear_axes(one, inputs, at, names, linear_axes)
+        words += "; and the errors of the linear axes as stated"
+        contributions = [*of_axes, *contributions]
+    framework = _framework(at, readings_only, names, units, p, contributions)
     mcm = validation = None
     if method != "guf":
         with trials_of(one, inputs, names, seed, workers, cluster) as (trials, sampler, threads):
@@ -233,6 +247,40 @@ def evaluate(
     advice = method_named(loaded.method).advice
     refused = refusals(found.problem, found.solution.null_space[place], number, advice)
     return Evaluated(loaded, stored, found, number, framework, units, refused, words, mcm, validation, causes)
+
+
+def _refuse_too_many(readings: int, method: str) -> None:
+    """DataError where a run has so many readings that the evaluation would take hours or more memory than there is."""
+    if readings > MOST_READINGS:
+        raise DataError(
+            f"a run of {readings} readings has a covariance of {readings} rows, which is not built here (up to "
+            f"{MOST_READINGS}); `monitor identify` gives the standard uncertainties from the stated one, to first order"
+        )
+    if method != "guf" and readings > MOST_READINGS_MCM:
+        raise DataError(
+            f"a Monte Carlo of {readings} readings would take hours (up to {MOST_READINGS_MCM} are done here); write "
+            "--method guf: errors of 1 mrad leave products of 1 µrad, so that first order is as good"
+        )
+
+
+def _with_linear_axes(
+    one: OneRun, inputs: Inputs, at: Sensitivity, names: tuple[str, ...], axes: LinearAxes
+) -> tuple[Inputs, list[OutputContribution]]:
+    """The inputs with what errors of the linear axes do to them, and the same by source as lines of the budget."""
+    if isinstance(one, RunProblem):
+        raise InputError(
+            "--linear-axes is for methods that take the linear axes as known, such as rotary-probing; this method "
+            "identifies errors of the linear axes itself"
+        )
+    count, rows = len(one.reading_names), at.rows(names)[:, : len(one.reading_names)]
+    covariance = inputs.covariance.copy()
+    lines = []
+    for source, of_rows in row_covariances(one, at.unknowns, axes).items():
+        covariance[:count, :count] += of_rows
+        of_outputs = rows @ of_rows @ rows.T
+        lines.append(OutputContribution(source, 0.5 * (of_outputs + of_outputs.T)))
+    whole = Inputs(inputs.names, inputs.units, inputs.estimate, covariance, inputs.sources, inputs.dof)
+    return whole, lines
 
 
 def _units(found: Fit, names: tuple[str, ...]) -> tuple[Unit, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from monitor.records import Array, Campaign
 from monitor.store import Database, save_analysis
 from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
 from monitor.units import DEGREE, MICROMETRE
+from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty import Evaluated, evaluate
 
@@ -114,7 +116,7 @@ def _of_shared(found: Evaluated, local: list[int], shared: list[int]) -> Array:
     return added
 
 
-def _ranges(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, float]], bool]:
+def ranges_of(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, float]], bool]:
     """Readings of the linear axes: the strokes of the machine file if it has all, else what was visited."""
     linear = [joint.name for joint in chain.joints if not joint.turns]
     strokes = {name: campaign.machine.axes[name].stroke for name in linear if name in campaign.machine.axes}
@@ -130,7 +132,7 @@ def _ranges(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, fl
     return visited | given, False
 
 
-def _poses(chain: Chain, positions: Array) -> Array:
+def poses_of(chain: Chain, positions: Array) -> Array:
     """The rotary poses of the plan (P, J), all at zero first; the spindle at zero."""
     turned = np.array([joint.kind == "rotary" for joint in chain.joints])
     poses = np.unique(np.round(np.where(turned, positions, 0.0), 9), axis=0) + 0.0
@@ -149,29 +151,33 @@ def volumetric_map(
     points: int = POINTS,
     absolute: bool = False,
     model_uncertainty: bool = True,
+    before: datetime | None = None,
 ) -> tuple[Document, Mapped]:
     """Map the volumetric error of one run (the last by default) over the strokes; the document is stored.
 
     The grid of ``points`` along every linear axis is laid at every rotary pose of the plan. The workpiece's zero
-    is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``.
+    is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``. Runs that began at or after
+    ``before`` (local time without a zone) take no part; the document is then stored as ``partial volumetric map``.
     """
     if not 2 <= points <= 41:
         raise InputError(f"--points {points}: choose 2 to 41 points along each axis")
-    found = evaluate(db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty)
+    found = evaluate(
+        db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty, before=before
+    )
     known, left_out = geometric_errors(found)
     if not known.names:
         raise DataError(
             f"run {found.run} of campaign {campaign} determines no geometric error; there is nothing to map"
         )
-    ranges, from_strokes = _ranges(found.campaign, known.chain)
-    poses = _poses(known.chain, known.context.positions)
+    ranges, from_strokes = ranges_of(found.campaign, known.chain)
+    poses = poses_of(known.chain, known.context.positions)
     datum = None if absolute else middle(known.chain, ranges)
     error = volumetric_error(known, grid(known.chain, ranges, points, poses), datum)
     mapped = Mapped(found, known, ranges, from_strokes, poses, points, error, left_out)
     document = _document(mapped, p)
     save_analysis(
-        db, "volumetric map", document, method="guf", campaign=campaign, run=found.run,
-        model=found.model.name, model_version=found.model.version,
+        db, kind_of("volumetric map", before), document, method=method_of("guf", before), campaign=campaign,
+        run=found.run, model=found.model.name, model_version=found.model.version,
     )  # fmt: skip
     return document, mapped
 

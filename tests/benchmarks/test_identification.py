@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from monitor.methods import samba
+from monitor.methods import free_form, rotary_probing, samba
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 
@@ -27,3 +30,29 @@ def test_twenty_runs_with_three_effects_in_common(benchmark: Any) -> None:
     model = Model("grown", added=("EYX:poly2", "EXX:reversal", "EZC1:const@warmup45min"))
     found = benchmark(samba.identify, campaign, model)
     assert np.isfinite(found.added_estimate).all()
+
+
+def test_free_form_92_points_at_8_angles(benchmark: Any, tmp_path: Path) -> None:
+    """The issue asks for less than 0.2 s."""
+    place = Path(__file__).resolve().parents[1] / "simulator" / "__init__.py"
+    spec = importlib.util.spec_from_file_location(
+        "simulator", place, submodule_search_locations=[str(place.parent)]
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    sim = importlib.import_module("simulator.free_form")
+    rng, layout, angles = np.random.default_rng(1), sim.cross_pocket(), sim.CASE_2_ANGLES
+    truth = sim.draw_truth(layout, angles, rng)
+    sim.write_folder(tmp_path, "eight", layout, [sim.probe(layout, angles, truth, rng)])
+    found = benchmark(free_form.identify, read_campaign(tmp_path))
+    assert len(found.runs[0].residuals) == 736
+    assert found.runs[0].refused == ()
+
+
+def test_rotary_probing_of_154_touches(benchmark: Any) -> None:
+    """Less than a second is asked for, for one run; here there are four."""
+    campaign = read_campaign(EXAMPLES / "tilting-table")
+    found = benchmark(rotary_probing.identify, campaign)
+    assert all(np.isfinite(run.estimate).all() for run in found.runs)

@@ -10,13 +10,13 @@ import numpy as np
 from monitor.statistics import (
     anova,
     bartlett,
-    find_changes,
     kruskal_wallis,
     levene,
     mann_kendall,
     trend,
     welch_anova,
 )
+from monitor.statistics.scan import Scanner
 
 SEED = 20261121
 
@@ -86,35 +86,67 @@ def drifts(rng: np.random.Generator) -> None:
 def monotone(rng: np.random.Generator) -> None:
     """False alarms of Mann-Kendall on trend-free first-order series."""
     rows = []
-    for n in (10, 20, 40, 100):
+    for n in (6, 10, 20, 40, 100):
         for r in (0.0, 0.3, 0.6, 0.8):
-            found = [mann_kendall(first_order(rng, n, r), np.arange(n)) for _ in range(500)]
-            rates = [sum(p < 0.05 for p in ps) / 500 for ps in
+            found = [mann_kendall(first_order(rng, n, r), np.arange(n)) for _ in range(1000)]
+            rates = [sum(p < 0.05 for p in ps) / 1000 for ps in
                      ([m.p_value for m in found], [m.p_value_independent for m in found])]  # fmt: skip
             rows.append([n, r, *rates])
     table("Mann-Kendall on trend-free series", ["n", "r", "corrected", "plain"], rows)
 
 
-def changes(rng: np.random.Generator) -> None:
-    """Share of histories with any finding, and with the step's interval covering, by its height."""
+def shares(scanner: Scanner, series: list[np.ndarray], rng: np.random.Generator) -> tuple[float, float]:
+    """Share of series with any finding, as for one parameter and as for each of 13, at 5 % in all."""
+    p = np.array([scanner.scan(y, rng, 3999, 0.05 / 13).p_value for y in series])
+    return float((p <= 0.05).mean()), float((p <= 0.05 / 13).mean())
+
+
+def false_alarms(rng: np.random.Generator) -> None:
+    """Share of histories without a change in which one is called."""
     rows = []
-    for n in (20, 44):
+    for n in (12, 20, 44, 100, 200):
+        trials = 2000 if n < 100 else 800
+        t = np.arange(n, dtype=float)
+        plain = Scanner(t, None, "constant")
+        for r in (0.0, 0.3, 0.6, 0.8):
+            found = shares(plain, [first_order(rng, n, r) for _ in range(trials)], rng)
+            rows.append([n, f"r = {r:g}", trials, *found])
+        u = np.exp(0.5 * rng.normal(size=n))
+        weighted = Scanner(t, u, "constant")
+        found = shares(weighted, [u * rng.normal(size=n) for _ in range(trials)], rng)
+        rows.append([n, "uncertainties of 1 : 4", trials, *found])
+        found = shares(weighted, [u * first_order(rng, n, 0.6) for _ in range(trials)], rng)
+        rows.append([n, "the same, r = 0.6", trials, *found])
+        found = shares(plain, [rng.standard_t(4, size=n) for _ in range(trials)], rng)
+        rows.append([n, "Student, 4 degrees of freedom", trials, *found])
+    for days, runs in ((5, 4), (6, 3), (10, 4)):
+        n, day = days * runs, np.repeat(np.arange(days), runs)
+        scanner = Scanner(np.arange(n, dtype=float), None, "constant", day)
+        for component in (0.0, 0.5, 1.0, 2.0):
+            series = [rng.normal(size=n) + component * rng.normal(size=days)[day] for _ in range(2000)]
+            found = shares(scanner, series, rng)
+            rows.append([n, f"{days} days of {runs}, day component {component:g}", 2000, *found])
+    head = ["runs", "without a change", "histories", "one parameter", "one of 13 (nominal 0.0038)"]
+    table("Changes called where there is none, nominal 5 %", head, rows)
+
+
+def changes(rng: np.random.Generator) -> None:
+    """Share of histories with any finding, by the height of a step after three fifths of the runs."""
+    rows = []
+    for n in (12, 20, 44, 100):
+        scanner = Scanner(np.arange(n, dtype=float), None, "constant")
         for r in (0.0, 0.3, 0.6):
-            for height in (0.0, 1.0, 2.0, 3.0, 5.0):
-                at, called, covered = n * 12 // 20, 0, 0
-                # The rows without a step state a rate of a few per cent: they need more histories.
-                trials = 150 if height else 1500
-                for _ in range(trials):
-                    y = first_order(rng, n, r) + height * (np.arange(n) >= at)
-                    found = find_changes({"a": y}, np.arange(n), rng=rng, trials=399)
-                    called += bool(found.changes or found.trends)
-                    covered += any(c.interval[0] <= at - 1 and at <= c.interval[1] for c in found.changes)
-                rows.append([n, r, height, called / trials, covered / trials if height else ""])
+            for height in (1.0, 2.0, 3.0, 5.0, 8.0):
+                step = height * (np.arange(n) >= n * 12 // 20)
+                series = [first_order(rng, n, r) + step for _ in range(400)]
+                rows.append([n, r, height, *shares(scanner, series, rng)])
     table(
-        "A step, in innovation standard deviations", ["runs", "r", "height", "called", "covering step"], rows
+        "A step, in innovation standard deviations",
+        ["runs", "r", "height", "one parameter", "one of 13"],
+        rows,
     )
 
 
 if __name__ == "__main__":
-    for trial in (means, variances, drifts, monotone, changes):
+    for trial in (means, variances, drifts, monotone, false_alarms, changes):
         trial(np.random.default_rng(SEED))

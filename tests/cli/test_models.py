@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from monitor.methods import METHODS
+
 REVERSAL = "EXX:reversal"
 
 
@@ -67,7 +69,8 @@ def test_versions_of_one_model_and_taking_an_effect_out_again(typed: Any, db: Pa
     assert "it has 1 to 3" in typed("model", "show", "m@4", db=db).err
     assert "EBB:harmonic2" in typed("model", "show", "m@2", db=db).out
     listed = typed("model", "list", "--json", db=db).document["models"]
-    assert [one["model"] for one in listed] == ["m", "m@2", "m@3", "samba"]
+    assert [one["model"] for one in listed if one["name"] == "m"] == ["m", "m@2", "m@3"]
+    assert "samba" in {one["model"] for one in listed}
     assert typed("identify", "five-days", "--model", "m@2", "--json", db=db).document["model"] == "m@2"
 
 
@@ -81,7 +84,9 @@ def test_an_effect_is_added_once(typed: Any, db: Path) -> None:
 def test_a_model_that_cannot_be_shown_on_its_campaign_is_not_kept(typed: Any, db: Path) -> None:
     answer = typed("model", "add", REVERSAL, "--to", "samba", "--as", "m", "--campaign", "nope", db=db)
     assert answer.status == 2
-    assert [one["model"] for one in typed("model", "list", "--json", db=db).document["models"]] == ["samba"]
+    assert [one["model"] for one in typed("model", "list", "--json", db=db).document["models"]] == sorted(
+        METHODS
+    )
 
 
 def test_a_model_before_any_comparison_has_no_history_yet(typed: Any, examples: Path, tmp_path: Path) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
+import itertools
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from monitor.readers import read_campaign
 from monitor.records import (
     Array,
     Artefact,
@@ -131,3 +134,35 @@ def distance() -> Callable[[Array, Array], float]:
         return float(error @ np.linalg.solve(covariance, error))
 
     return of
+
+
+@pytest.fixture(scope="session")
+def sim(simulator: ModuleType) -> ModuleType:
+    """Layouts and touches of the method free-form."""
+    return importlib.import_module("simulator.free_form")
+
+
+@pytest.fixture
+def made(sim: ModuleType, tmp_path: Path) -> Callable[..., tuple[Any, Campaign]]:
+    """A simulated campaign, read from its folder, and its truth."""
+    folders = itertools.count()
+
+    def make(
+        layout: Any,
+        angles: Any,
+        seed: int = 1,
+        noise_um: float = 1.38,
+        runs: int = 1,
+        topology: str = "w C A b Y X Z (C1) t",
+        scale: float = 1.0,
+    ) -> tuple[Any, Campaign]:
+        rng = np.random.default_rng(seed)
+        truth = sim.draw_truth(layout, angles, rng, scale)
+        told = [sim.probe(layout, angles, truth, rng, noise_um, topology) for _ in range(runs)]
+        folder = tmp_path / str(next(folders))
+        sim.write_folder(
+            folder, "simulated", layout, told, truth.length * 1e3, (), topology, sim.PROBING_U_UM
+        )
+        return truth, read_campaign(folder)
+
+    return make

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from monitor.exceptions import CampaignError, Fault
-from monitor.readers import read_campaign
+from monitor.readers import method_rules, read_campaign
+from monitor.readers.method_rules import MethodRules
 
 TOML = """\
 format = 1
@@ -118,3 +119,9 @@ def faults_of() -> Callable[[Path], tuple[Fault, ...]]:
         return caught.value.faults
 
     return refused
+
+
+@pytest.fixture(autouse=True)
+def loose(monkeypatch):
+    """A plug-in's method that asks nothing of a folder beyond what every folder must hold."""
+    monkeypatch.setitem(method_rules(), "loose", MethodRules("loose"))

@@ -17,7 +17,7 @@ T = "campaign.toml"
 ROBOT = """\
 format = 1
 campaign = "robot"
-method = "l-shape"
+method = "loose"
 [machine]
 id = "R1"
 gravity = [0.0, 0.0, 1.0]

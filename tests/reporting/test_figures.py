@@ -12,14 +12,10 @@ from matplotlib.figure import Figure
 from monitor.exceptions import DataError, InputError
 from monitor.reporting.figure_style import BLUE, INK, ORANGE, png, save, svg
 from monitor.reporting.figures_correlation import correlation_map
+from monitor.reporting.figures_drivers import predicted_against_measured, residual_against_driver
 from monitor.reporting.figures_models import error_falling, ranked_effects
 from monitor.reporting.figures_parameters import parameter_intervals, parameters_by_run
-from monitor.reporting.figures_residuals import (
-    predicted_against_measured,
-    residual_against_driver,
-    residual_bars,
-    residual_vectors,
-)
+from monitor.reporting.figures_residuals import residual_bars, residual_vectors
 
 
 def intervals() -> Figure:

@@ -93,11 +93,15 @@ def track(
     location: Mapping[str, np.ndarray] | None = None,
     fixed_every: int = 0,
     reflectors: Sequence[str] = ("R1", "R2", "R3"),
+    ranges: Mapping[str, tuple[float, float]] | None = None,
 ) -> Tracked:
-    """Simulate one run of random poses; with ``fixed_every`` the fixed reflectors are seen each so many poses."""
+    """Simulate one run of random poses; with ``fixed_every`` the fixed reflectors are seen each so many poses.
+
+    ``ranges`` narrows the range of joints, in degrees.
+    """
     hidden = hidden or Hidden()
     location = errors_of_robot(rng) if location is None else location
-    low, high = np.array([limits for *_, limits in ELBOW]).T
+    low, high = np.array([(ranges or {}).get(name, limits) for name, *_, limits in ELBOW]).T
     degrees = np.round(rng.uniform(low, high, (poses, len(ELBOW))), 4)
     readings = {str(joint["name"]): np.deg2rad(degrees[:, place]) for place, joint in enumerate(JOINTS)}
     arms = lever_arms(readings)

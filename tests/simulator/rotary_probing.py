@@ -45,7 +45,7 @@ class Piece:
 def block(
     top: tuple[float, float, float] = (0.0, -200.0, 170.0),
     half: float = 50.0,
-    along: Sequence[float] = (-30.0, -10.0, 10.0, 30.0),
+    along: Sequence[float] = (-34.0, -12.0, 12.0, 34.0),
     height: float = 160.0,
     grid: float = 35.0,
 ) -> list[Feature]:

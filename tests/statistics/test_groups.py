@@ -7,6 +7,7 @@ import pytest
 
 from monitor.exceptions import DataError, NotFoundError
 from monitor.statistics import group_by, select_runs
+from monitor.statistics.sums import label_groups
 
 COLUMNS = {
     "run": np.arange(1, 7),
@@ -74,3 +75,17 @@ def test_groups_refuse_what_makes_no_groups():
         group_by(COLUMNS, "shift")
     with pytest.raises(DataError, match="not recorded for every run"):
         group_by({"t": np.array([1.0, np.nan])}, "t", edges=[1])
+
+
+def test_groups_stand_in_the_order_of_their_numbers():
+    for labels in (
+        ["below 4.5", "4.5 to 12", "above 12"],
+        ["1", "2", "10"],
+        ["-5", "0", "1e3"],
+        ["2026-03-02", "2026-03-10"],
+        ["campaign day 2", "campaign day 10"],
+        ["below 9", "9 to 10", "10 and above", "cold"],
+    ):
+        found, index = label_groups(labels[::-1], len(labels))
+        assert found == tuple(labels)
+        assert index.tolist() == list(range(len(labels)))[::-1]

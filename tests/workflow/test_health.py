@@ -140,7 +140,7 @@ def test_a_page_has_every_parameter_with_tolerance_uncertainty_and_history(
         assert all(one.history.this_week)
         assert (one.probability_out is not None) == (one.name in WIDE)
     assert found.model is not None
-    assert found.model.runs.startswith("all 16 runs ")
+    assert found.model.runs.startswith("16 of 20 runs ")
     assert found.model.lack_of_fit_p is not None
     assert found.quality.probings == 16 * 62
     assert found.conditions[0].name == "ambient"
@@ -342,38 +342,29 @@ def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_pa
         assert not ink[-int(6 / 25.4 * 60) :].any()
 
 
-def test_a_stored_volumetric_map_is_told_with_its_worst_place_and_uncertainty(
+def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_with_its_worst_place(
     fleet: Database, week10: dict, tmp_path: Path
 ) -> None:
-    assert stored(fleet, "B-stepped").map is None
-    document, _ = volumetric_map(fleet, "campaign-B-stepped", 16)
-    found = report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
     told = stored(fleet, "B-stepped").map
     assert told is not None
+    assert told.run == 16
+    document, _ = volumetric_map(fleet, "campaign-B-stepped", 16, before=datetime.fromisoformat("2026-03-09"))
     assert told.worst_um == document["worst"]["error_um"] == max(one.worst_um for one in told.by_pose)
     assert told.expanded_um == document["worst"]["expanded_um"]
+    # That of the whole campaign has another uncertainty, and is left alone.
+    whole, _ = volumetric_map(fleet, "campaign-B-stepped", 16)
+    assert whole["worst"]["expanded_um"] != document["worst"]["expanded_um"]
+    found = report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
+    again = stored(fleet, "B-stepped")
+    assert again.map == told
     page = text_of(found["files"][1])[1]
     assert "Volumetric error, run 16" in page
-    assert f"{told.by_pose[0].rms_um:.1f} µm" in page or len(told.by_pose) > 4
-
-
-def test_a_map_of_a_run_after_the_week_is_left_out_and_the_comparison_says_its_runs(
-    fleet: Database, week10: dict, tmp_path: Path
-) -> None:
-    # The campaign's runs 17 to 20 are of Monday 9 March, in week 11.
-    volumetric_map(fleet, "campaign-B-stepped", 20)
-    volumetric_map(fleet, "campaign-B-stepped", 15)
-    found = report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
-    health = stored(fleet, "B-stepped")
-    assert health.map is not None
-    assert health.map.run < 17
-    assert health.model is not None
-    assert health.model.runs == (
-        "all 16 runs of campaign campaign-B-stepped until the end of the week, 2026-03-02 to 2026-03-05; "
-        "4 later left out"
+    assert again.model is not None
+    assert again.model.runs == (
+        "16 of 20 runs of campaign-B-stepped, 2026-03-02 to 2026-03-05; the others began after the week"
     )
-    assert health.model.runs in Path(found["files"][0]).read_text(encoding="utf-8")
-    assert "run 20" not in text_of(found["files"][1])[1]
+    assert again.model.runs in Path(found["files"][0]).read_text(encoding="utf-8")
+    assert "run 20" not in page
     later = report(fleet, "2026-W11", "B-stepped", tmp_path, made_at=MADE)
     assert "Volumetric error, run 20" in text_of(later["files"][1])[1]
 

@@ -132,7 +132,11 @@ def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: P
     assert {"where-it-fails.svg", "where-it-fails.png", "residual-vectors.png"} <= names
     found, explanation = comparison.explain_campaign(db, "hidden-reversal-x")
     files += explanation_figures(found, explanation, tmp_path / "figures ü")
-    assert "missing-effects.svg" in {Path(file).name for file in files}
+    # Where the model fails, what is missing, how far the error falls.
+    names = {Path(file).name for file in files}
+    assert names >= {
+        "missing-effects.svg", "residual-vectors.svg", "missing-effect-before-after.svg", "error-falling.png"
+    }  # fmt: skip
     for file in files:
         assert Path(file).stat().st_size > 1000
     one = found["missing"][0]

@@ -44,7 +44,9 @@ def run(options: Namespace) -> int:
             [name, *(_checked(part[which]) for which in ("rms_um", "largest_um")), str(part["n"])]
             for name, part in parts.items()
         ]
-        output.table("", [f"by {kind}", "RMS / µm", "largest / µm", "touches"], rows)
+        what = "touches" if found["target_word"] == "ball" else "readings"
+        if rows:
+            output.table("", [f"by {kind}", "RMS / µm", "largest / µm", what], rows)
     for file in found.get("figures", []):
         output.say(file)
     return 0

@@ -47,17 +47,19 @@ def run(options: Namespace) -> int:
     summary(found)
     output.say()
     for one in found["missing"]:
-        _effect(one)
+        _effect(one, found)
     for point in found["suspect_data"]:
         output.say(
-            f"bad point: run {point['run']}, sequence {point['sequence']}, ball {point['target']}: {point['axis']} is "
-            f"off by {point['size_um']:.1f} µm; it was left out"
+            f"bad point: run {point['run']}, sequence {point['sequence']}, {found['target_word']} {point['target']}: "
+            f"{point['axis']} is off by {point['size_um']:.1f} µm; it was left out"
         )
     output.say(found["answer"])
     if found["missing"]:
         output.say(
             f'to add it: monitor model add "{found["missing"][0]["effect"]}" --to {found["model"]} --as NAME'
         )
+    for sentence in found["undecided"]:
+        output.say(sentence)
     if found["blind_spots"]:
         output.say(
             f"blind spots of this plan: {len(found['blind_spots'])} effects leave nothing to see "
@@ -68,20 +70,22 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _effect(one: dict[str, Any]) -> None:
+def _effect(one: dict[str, Any], found: dict[str, Any]) -> None:
+    where = "tip" if found["target_word"] == "ball" else f"{found['target_word']}s"
     output.say(f"{one['rank']}. {one['effect']}: {one['meaning']}")
     output.say(
         f"   {output.rounded(one['amplitude'], one['u'])} ± {output.two_digits(one['u'])} {one['unit']}, at most "
-        f"{one['peak_um']:.1f} µm at the tip; {output.stated('p', one['p_value'])}, "
+        f"{one['peak_um']:.1f} µm at the {where}; {output.stated('p', one['p_value'])}, "
         f"{output.stated('q', one['q_value'])}"
     )
     if "searched" in one:
-        found = one["searched"]
-        u = "" if found["u"] is None else f" ± {output.two_digits(found['u'])}"
-        output.say(f"   {found['what']} {output.rounded(found['value'], found['u'])}{u} {found['unit']}")
+        sought = one["searched"]
+        u = "" if sought["u"] is None else f" ± {output.two_digits(sought['u'])}"
+        unit = "" if sought["unit"] == "1" else f" {sought['unit']}"
+        output.say(f"   {sought['what']} {output.rounded(sought['value'], sought['u'])}{u}{unit}")
     output.say(
         f"   RMS {output.micrometres(one['rms_before_um'])} -> {output.micrometres(one['rms_after_um'])} µm; "
-        f"on held-out runs {output.micrometres(one['heldout_before_um'])} -> "
+        f"on held-out {found['held_out']} {output.micrometres(one['heldout_before_um'])} -> "
         f"{output.micrometres(one['heldout_after_um'])} µm"
     )
     output.say(f"   cause: {one['cause']}")

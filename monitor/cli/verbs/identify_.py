@@ -8,9 +8,11 @@ from typing import Any
 from monitor.cli import curve_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.exceptions import InputError
 from monitor.store import is_curve
 from monitor.workflow import campaigns, curves
 from monitor.workflow.identification import identify
+from monitor.workflow.stepwise import steps
 
 EXAMPLE = "monitor identify five-days"
 # A screen holds so many runs beside the names of the parameters.
@@ -20,11 +22,22 @@ SHOWN_RUNS = 6
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", nargs="?", metavar="CAMPAIGN")
-    parser.add_argument("--model", metavar="NAME", help="a model, or a version of it: NAME@2 (default samba)")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="this run alone")
+    parser.add_argument(
+        "--stepwise",
+        action="store_true",
+        help="for l-shape: one run step by step as well, beside the fit of all at once, and why they differ",
+    )
 
 
 def run(options: Namespace) -> int:
+    if options.stepwise:
+        return _stepwise(options)
     with opened(options) as db, output.working("identifying"), db.transaction():
         names = campaigns.chosen(db, options.campaign)
         found = [
@@ -36,6 +49,42 @@ def run(options: Namespace) -> int:
         return 0
     for one in found:
         show(one)
+    return 0
+
+
+def _stepwise(options: Namespace) -> int:
+    if options.campaign is None:
+        raise InputError("--stepwise shows one run: name its campaign")
+    with opened(options) as db, output.working("identifying step by step"):
+        found = steps(db, options.campaign, options.model, options.number)
+    if options.json:
+        output.document(found)
+        return 0
+    rows = []
+    for name, one in found["stepwise"].items():
+        once = one["at_once"]
+        rows.append(
+            [
+                name,
+                one["unit"],
+                output.rounded(one["stepwise"], one["u_stepwise"]),
+                output.two_digits(one["u_stepwise"]),
+                "-" if once is None else output.rounded(once, one["u_at_once"]),
+                "-" if once is None else output.two_digits(one["u_at_once"]),
+                "-" if once is None else output.rounded(one["difference_by_method"], one["u_stepwise"]),
+                "" if one["agrees"] else "differs",
+                one["why"],
+            ]
+        )
+    output.table(
+        f"{found['campaign']}, run {found['run']}: step by step and all at once",
+        ["parameter", "unit", "stepwise", "u", "at once", "u", "by method", "", "what tells them apart"],
+        rows,
+        left=2,
+    )
+    output.say(
+        "by method: what of the difference remains without noise; 'differs': the rest exceeds 2 u of it"
+    )
     return 0
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.verbs import plan_angles
 from monitor.exceptions import InputError
 from monitor.workflow.planning import plan, plan_figure
 
@@ -22,7 +23,12 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--balls", type=int, metavar="N", help="the best N balls (1 to 24; places for more are proposed)"
     )
-    parser.add_argument("--poses", type=int, metavar="N", help="the best N indexations")
+    parser.add_argument(
+        "--poses",
+        type=int,
+        metavar="N",
+        help="the best N indexations (free-form: the next N angles of the table)",
+    )
     parser.add_argument(
         "--wanted", action="append", default=[], metavar="PARAMETER=U",
         help="a standard uncertainty in display units; the quickest plan that reaches all; may be repeated",
@@ -68,10 +74,15 @@ def run(options: Namespace) -> int:
             db, options.campaign, model=options.model, balls=options.balls, poses=options.poses, wanted=wanted,
             separate=separate,
         )  # fmt: skip
+        if options.figures is not None and "angles" in found:
+            raise InputError("--figures: a plan of table angles has no figure yet; leave it out")
         if options.figures is not None:
             found["figures"] = plan_figure(found, options.figures)
     if options.json:
         output.document(found)
+        return 0
+    if "angles" in found:
+        plan_angles.tables(found)
         return 0
     _tables(found)
     if "separate" in found:

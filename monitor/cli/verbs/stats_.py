@@ -78,6 +78,12 @@ def run(options: Namespace) -> int:
             )
         else:
             output.say(f"all parameters together, {words}: not tested. {test['why']}")
+    for name in found["drift"]["drifts"]:
+        one = found["drift"]["parameters"][name]
+        output.say(
+            f"{name} drifts within the day: {output.rounded(one['per_hour'], one['u'])} {one['unit']} "
+            f"(u = {output.two_digits(one['u'])} {one['unit']}, q = {output.probability(one['q_value'])})"
+        )
     below = sum(p is not None and p < 0.05 for p in found["coordinates"]["anova_p"])
     if found["coordinates"]["n"]:
         output.say(f"probed coordinates: {found['coordinates']['n']}; ANOVA p below 0.05 in {below} of them")

@@ -16,6 +16,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
+from monitor.workflow import agreement
 from monitor.workflow.trends import Choice, trends
 
 EXAMPLE = "monitor trend HU40-T --since 2025-01-01 --figures figures"
@@ -30,6 +31,10 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--reliability", type=float, default=0.95, metavar="P",
         help="wanted probability of being in tolerance until the next check (default 0.95)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--volumetric-limit", type=float, metavar="UM",
+        help="limit of the volumetric error, in place of 'volumetric' of the machine's tolerances, in µm",
     )  # fmt: skip
     parser.add_argument(
         "--reference", metavar="FROM..TO", help="reference period of the control charts, two dates"
@@ -54,6 +59,11 @@ def _date(text: str, option: str) -> datetime:
 def run(options: Namespace) -> int:
     if not 0.0 < options.reliability < 1.0:
         raise InputError(f"--reliability {options.reliability:g}: a probability lies between 0 and 1")
+    limit = options.volumetric_limit
+    if limit is not None and not 0.0 < limit < float("inf"):
+        raise InputError(f"--volumetric-limit {limit:g}: a limit in µm lies above zero")
+    if limit is not None and options.parameter is not None:
+        raise InputError("--volumetric-limit needs all parameters; leave out --parameter")
     reference = None
     if options.reference is not None:
         start, dots, end = options.reference.partition("..")
@@ -70,6 +80,7 @@ def run(options: Namespace) -> int:
         reliability=options.reliability,
         campaigns=tuple(options.campaign),
         model=options.model,
+        volumetric_limit_um=limit,
     )
     with opened(options) as db, output.working("following"), db.transaction():
         made = trends(db, options.machine, choice)
@@ -93,6 +104,8 @@ def _three(value: float) -> str:
 def _tables(found: dict[str, Any]) -> None:
     for note in found["notes"]:
         output.say(f"note: {note}")
+    for pair in found["agreement"]:
+        output.say(agreement.sentence(pair))
     if found["why"] is not None:
         output.say(found["why"])
         return
@@ -158,9 +171,67 @@ def _tables(found: dict[str, Any]) -> None:
                 f"{name}: warms up by {warm['amplitude']:.3g} {warm['unit']} with a time constant of "
                 f"{warm['tau_h']:.2g} h; stable after {warm['stable_after_h']:.2g} h"
             )
+    _forecasts(found)
     for sentence in dict.fromkeys(one["why"] for one in found["parameters"].values() if one["why"]):
         output.say(sentence)
     for event in found["events"]:
         output.say(f"event {event['at'][:10]}: {event['kind']}, {event['description']}")
     for file in found.get("figures", []):
         output.say(file)
+
+
+def _forecasts(found: dict[str, Any]) -> None:
+    """The volumetric error ahead, how good the forecasts were, and when the machine is best checked again."""
+    ahead = found.get("volumetric_error")
+    if ahead is not None and ahead["why"] is None:
+        low, high = ahead["predicted_interval_um"]
+        crosses = "does not reach its limit" if ahead["crosses_limit_at"] is None else (
+            f"reaches its limit on {ahead['crosses_limit_at'][:10]}"
+        )  # fmt: skip
+        between = _between(ahead["crosses_limit_interval"])
+        output.say(
+            f"volumetric error: {_three(ahead['latest_um'])} µm by the drifts of all parameters together, limit "
+            f"{_three(ahead['limit_um'])} µm; {crosses}{between}"
+        )
+        output.say(
+            f"  at the next check, {ahead['next_check'][:10]}: {_three(ahead['predicted_um'])} µm "
+            f"({_three(low)} to {_three(high)} µm with 95 %), in tolerance with "
+            f"{output.probability(ahead['in_tolerance_at_next_check'])}; check within "
+            f"{ahead['recommended_interval_days']:.0f} days"
+        )
+    elif ahead is not None and ahead["limit_um"] is not None:
+        output.say(ahead["why"])
+    intervals = {
+        name: one["recommended_interval_days"]
+        for name, one in found["parameters"].items()
+        if one["recommended_interval_days"] is not None
+    }
+    if intervals:
+        first = min(intervals, key=lambda name: intervals[name])
+        output.say(
+            f"check within {intervals[first]:.0f} days, for {first} ({found['parameters'][first]['recommended_by']})"
+        )
+    tested = {
+        name: one["backtest"] for name, one in found["parameters"].items() if one["backtest"] is not None
+    }
+    if tested:
+        made, inside = (sum(one[key] for one in tested.values()) for key in ("made", "inside"))
+        worst = min(tested, key=lambda name: tested[name]["share_inside"])
+        output.say(
+            f"backtest, every day foretold by the days before it: {inside} of {made} later values "
+            f"({100 * inside / made:.0f} %) inside the 95 % forecast interval; least for {worst}, "
+            f"{tested[worst]['inside']} of {tested[worst]['made']}"
+        )
+
+
+def _between(interval: list[str | None] | None) -> str:
+    if interval is None:
+        return ""
+    low, high = interval
+    if low is None:
+        return f" (95 %: by {high[:10]})" if high is not None else ""
+    return (
+        f" (95 %: {low[:10]} or later, perhaps never)"
+        if high is None
+        else f" (95 %: {low[:10]} to {high[:10]})"
+    )

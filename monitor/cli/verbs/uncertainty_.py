@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.readers import read_linear_axes
 from monitor.workflow.uncertainty import uncertainty
 
 EXAMPLE = "monitor uncertainty five-days --run 20 --method guf"
@@ -36,6 +38,10 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--no-model-uncertainty", action="store_true", help="leave the budget's line for lack of fit out"
     )
+    parser.add_argument(
+        "--linear-axes", type=Path, metavar="FILE",
+        help="errors of the linear axes as standard uncertainties (TOML), for methods that take these axes as known",
+    )  # fmt: skip
     parser.add_argument("--workers", type=int, metavar="N", help="spread the trials over N processes")
     parser.add_argument(
         "--cluster", metavar="ADDRESS", help="spread them over a Dask cluster, such as tcp://host:8786"
@@ -48,6 +54,7 @@ def run(options: Namespace) -> int:
             db, options.campaign, options.number, model=options.model, method=options.method, digits=options.digits,
             seed=options.seed, p=options.p, select=options.select, model_uncertainty=not options.no_model_uncertainty,
             workers=options.workers, cluster=options.cluster,
+            linear_axes=None if options.linear_axes is None else read_linear_axes(options.linear_axes),
         )  # fmt: skip
     if options.json:
         output.document(found)

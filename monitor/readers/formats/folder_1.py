@@ -117,6 +117,14 @@ def _artefact_fits(top: Table, artefact: Artefact | None, rules: MethodRules | N
         told = f"the table [artefact.scale_bar] is missing; the method {rules.name} needs a calibrated bar"
         top.fault("artefact", told)
         return False
+    if rules.needs_self_calibration and artefact.self_calibration is None:
+        told = f"the table [artefact.self_calibration] is missing; the method {rules.name} needs its nodes"
+        top.fault("artefact", told)
+        return False
+    if rules.needs_l_shape and artefact.l_shape is None:
+        told = f"the table [artefact.l_shape] is missing; the method {rules.name} needs its modules and placements"
+        top.fault("artefact", told)
+        return False
     ends = () if bar is None else bar.balls
     if rules.targets_are_balls and all(ball.id in ends for ball in artefact.balls):
         told = f"there is no [[artefact.balls]] beside the bar's; the method {rules.name} needs one or more"

@@ -1,0 +1,86 @@
+"""Model against measurement as a health report states it: what is missing, where it fails, how the error falls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class MissingEffect:
+    """An effect that the model lacks, its cause and what to do."""
+
+    effect: str
+    meaning: str
+    cause: str
+    remedy: str
+    peak_um: float | None
+    rms_before_um: float | None
+    rms_after_um: float | None
+    not_ruled_out: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ResidualMap:
+    """Mean residuals of the runs at every pose of the plan, in µm, and its place, in mm, along the machine's axes."""
+
+    place_mm: tuple[tuple[float, float, float], ...]
+    residual_um: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True)
+class GroupMean:
+    """Mean residual of ``n`` probings in µm with its standard uncertainty, before and after (None: not known)."""
+
+    at: float
+    n: int
+    before_um: float
+    u_before_um: float
+    after_um: float | None
+    u_after_um: float | None
+
+
+@dataclass(frozen=True)
+class ResidualAgainst:
+    """The residual in the direction ``along`` (a term, an axis) against a ``driver``: means of groups, some points."""
+
+    driver: str
+    along: str
+    groups: tuple[GroupMean, ...]
+    at: tuple[float, ...]
+    before_um: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ErrorStep:
+    """The error of one version of the model in µm: on the runs it was fitted to, and on held-out ones (None: unknown).
+
+    ``proposed`` is not in the model yet: what adding the effect would give.
+    """
+
+    what: str
+    rms_um: float
+    heldout_um: float | None
+    proposed: bool
+
+
+@dataclass(frozen=True)
+class ModelHealth:
+    """Model against measurement; ``runs`` says in words which runs were compared.
+
+    ``where`` and ``against`` are None where nothing is missing; ``steps`` begin with the method's own model.
+    """
+
+    campaign: str
+    runs: str
+    model: str
+    verdict: str
+    answer: str
+    rms_um: float
+    repeatability_um: float | None
+    lack_of_fit_f: float | None
+    lack_of_fit_p: float | None
+    missing: tuple[MissingEffect, ...]
+    stated_um: float
+    where: ResidualMap | None
+    against: ResidualAgainst | None
+    steps: tuple[ErrorStep, ...]

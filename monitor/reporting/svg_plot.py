@@ -1,0 +1,123 @@
+"""A plot as a few lines of SVG, written by hand: a hundred machines' pages a night have to cost nothing.
+
+The figures of the command line are drawn by matplotlib (``figures_*``); one of them costs 0.1 to 0.3 s and 40 to
+120 kB, these 1 ms and 5 kB. All lengths are in units of a tenth of a millimetre.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from html import escape
+
+from monitor.reporting.figure_style import INK, MID, PALE
+
+#: Units a millimetre.
+SCALE = 10.0
+#: Height of letters: 6.5 pt.
+LETTER = 22.9
+#: A letter of DejaVu Sans is on the average 0.56 of its height wide; what has to fit is counted with more.
+WIDE = 0.6
+
+
+@dataclass
+class Drawing:
+    """An SVG picture of a size in mm, for the inside of a page; ``marks`` are painted in their order."""
+
+    width_mm: float
+    height_mm: float
+    title: str
+    marks: list[str] = field(default_factory=list)
+
+    def line(
+        self, x1: float, y1: float, x2: float, y2: float, colour: str, width: float, dash: str = ""
+    ) -> None:
+        """A straight line."""
+        dashes = f' stroke-dasharray="{dash}"' if dash else ""
+        self.marks.append(
+            f'<path d="M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}" stroke="{colour}" '
+            f'stroke-width="{width:g}"{dashes} fill="none"/>'
+        )
+
+    def path(self, d: str, *, stroke: str = "none", width: float = 0.0, fill: str = "none") -> None:
+        """Any path: many lines of one look in one mark."""
+        self.marks.append(f'<path d="{d}" stroke="{stroke}" stroke-width="{width:g}" fill="{fill}"/>')
+
+    def text(
+        self, x: float, y: float, words: str, *, anchor: str = "start", bold: bool = False, colour: str = INK,
+        turned: bool = False,
+    ) -> None:  # fmt: skip
+        """Words, their base line at ``y``; ``turned`` reads upwards."""
+        weight = ' font-weight="700"' if bold else ""
+        turn = f' transform="rotate(-90 {x:.1f} {y:.1f})"' if turned else ""
+        self.marks.append(
+            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"{weight}{turn}>{escape(words)}</text>'
+        )
+
+    def svg(self) -> str:
+        """The picture, to stand in a page as it is."""
+        return (
+            f'<svg class="plot" role="img" xmlns="http://www.w3.org/2000/svg" width="{self.width_mm:g}mm" '
+            f'height="{self.height_mm:g}mm" viewBox="0 0 {self.width_mm * SCALE:g} {self.height_mm * SCALE:g}" '
+            f'font-family="DejaVu Sans, sans-serif" font-size="{LETTER:g}"><title>{escape(self.title)}</title>'
+            f"{''.join(self.marks)}</svg>"
+        )
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A rectangle of a drawing with its two scales: left, top, width and height, and the ranges that they show."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+    across: tuple[float, float]
+    up: tuple[float, float]
+
+    def x(self, value: float) -> float:
+        """Where a value lies from left to right."""
+        return self.left + self.width * (value - self.across[0]) / (self.across[1] - self.across[0])
+
+    def y(self, value: float) -> float:
+        """Where a value lies from top to bottom."""
+        return self.top + self.height * (self.up[1] - value) / (self.up[1] - self.up[0])
+
+    def frame(
+        self, on: Drawing, across: str, up: str, *, ticks: int = 5, named: dict[float, str] | None = None
+    ) -> None:
+        """Axes with ticks and names; ``named`` ticks across take the place of numbers."""
+        bottom = self.top + self.height
+        shown = {at: _number(at) for at in nice_ticks(*self.across, ticks)} if named is None else named
+        for value, words in shown.items():
+            at = self.x(value)
+            on.line(at, bottom, at, bottom + 8, MID, 2)
+            on.text(at, bottom + 12 + LETTER, words, anchor="middle")
+        for value in nice_ticks(*self.up, ticks + 1):
+            at = self.y(value)
+            on.line(self.left, at, self.left + self.width, at, PALE, 1.5)
+            on.line(self.left - 8, at, self.left, at, MID, 2)
+            on.text(self.left - 13, at + 0.36 * LETTER, _number(value), anchor="end")
+        if self.up[0] < 0.0 < self.up[1]:
+            on.line(self.left, self.y(0.0), self.left + self.width, self.y(0.0), MID, 2.4)
+        on.path(
+            f"M{self.left:g} {self.top:g}L{self.left:g} {bottom:g}L{self.left + self.width:g} {bottom:g}",
+            stroke=MID, width=2.4,
+        )  # fmt: skip
+        on.text(self.left + self.width / 2, bottom + 18 + 2.1 * LETTER, across, anchor="middle")
+        on.text(self.left - 66, self.top + self.height / 2, up, anchor="middle", turned=True)
+
+
+def nice_ticks(low: float, high: float, most: int) -> list[float]:
+    """At most ``most`` round numbers between two ends, a step of 1, 2 or 5 times a power of ten apart."""
+    if not high > low:
+        return [low]
+    least = (high - low) / most
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(one * power for one in (1.0, 2.0, 5.0, 10.0) if one * power >= least * (1.0 - 1e-9))
+    first = math.ceil(low / step - 1e-9)
+    return [place * step for place in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("-", "\N{MINUS SIGN}") if abs(value) > 1e-12 else "0"

@@ -1,0 +1,194 @@
+"""When will the volumetric error leave its limit: the longest of many vectors that follow all parameters together.
+
+Each parameter is extrapolated by its own line (``trend``), and the lines and the scatter about them are correlated as
+the residuals of the days are. The longest vector is no linear function of the parameters: it is simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.statistics.checks import as_probability, as_vector
+from monitor.statistics.forecast import Crossing, predict
+from monitor.statistics.trend import Trend
+
+#: Simulated futures: the probability at a check is good to 0.011 (one standard deviation at 0.5).
+DRAWS = 2000
+#: Times looked at between now and the horizon, denser near now; crossings are interpolated between them.
+TIMES = 60
+#: Fewest days without which the correlation of the parameters is taken as none.
+FEWEST_DAYS = 4
+
+
+@dataclass(frozen=True)
+class LengthForecast:
+    """``crossing`` of the limit by the lines; ``probability`` (c,) that a run is in tolerance at ``checks`` (c,).
+
+    ``predicted`` (c,) is the median of the longest vector of a run, ``interval`` (c, 2) holds it with ``level``;
+    ``recommended_interval`` is the longest time from now on with which a run stays in tolerance with ``reliability``
+    (infinite beyond ``horizon``). ``latest`` is the length at ``now`` by the lines.
+    """
+
+    now: float
+    latest: float
+    crossing: Crossing
+    checks: Array
+    predicted: Array
+    interval: Array
+    probability: Array
+    recommended_interval: float
+    reliability: float
+    level: float
+    horizon: float
+
+
+def residual_correlation(
+    residuals: npt.ArrayLike, days: npt.ArrayLike
+) -> tuple[npt.NDArray[np.float64], float, int]:
+    """Correlation (p, p) of the day means of ``residuals`` (n, p), shrunk towards none, the shrinkage and the days.
+
+    Rows with a NaN are left out. With few days a correlation matrix is mostly noise: it is shrunk by the share that
+    its own sampling variance has (Schäfer and Strimmer, Stat. Appl. Genet. Mol. Biol. 4 (2005) 32). Fewer than 4
+    days: the unit matrix, shrinkage 1.
+    """
+    rows = np.asarray(residuals, dtype=np.float64)
+    whole = np.isfinite(rows).all(axis=1)
+    rows, labels = rows[whole], np.asarray(days)[whole]
+    count = len(np.unique(labels))
+    p = rows.shape[1]
+    if count < FEWEST_DAYS:
+        return np.eye(p), 1.0, count
+    index = np.unique(labels, return_inverse=True)[1]
+    means = np.zeros((count, p))
+    np.add.at(means, index, rows)
+    means /= np.bincount(index)[:, np.newaxis]
+    means -= means.mean(axis=0)
+    sd = means.std(axis=0, ddof=1)
+    scaled = means / np.where(sd > 0.0, sd, np.inf)
+    products = scaled[:, :, np.newaxis] * scaled[:, np.newaxis, :]
+    r = products.sum(axis=0) / (count - 1)
+    variance = count / (count - 1.0) ** 3 * ((products - products.mean(axis=0)) ** 2).sum(axis=0)
+    off = ~np.eye(p, dtype=np.bool_)
+    square = float((r[off] ** 2).sum())
+    shrink = 1.0 if square == 0.0 else float(np.clip(variance[off].sum() / square, 0.0, 1.0))
+    return np.where(off, (1.0 - shrink) * r, 1.0), shrink, count
+
+
+def _draws(
+    lines: Sequence[Trend], correlation: Array, rng: np.random.Generator, count: int
+) -> tuple[Array, Array, Array]:
+    """Deviations (count, p) of level and slope of each line and of a run about it; each a t of the line's freedom."""
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    z = rng.standard_normal((3, count, len(lines))) @ root.T
+    u = rng.uniform(size=count)
+    dof = np.array([line.dof for line in lines])
+    heavy = np.sqrt(dof / stats.chi2.isf(u[:, np.newaxis], dof))
+    roots = np.array([np.linalg.cholesky(line.covariance + 1e-30 * np.eye(2)) for line in lines])
+    level = z[0] * roots[:, 0, 0]
+    slope = z[0] * roots[:, 1, 0] + z[1] * roots[:, 1, 1]
+    return level * heavy, slope * heavy, z[2] * np.array([line.run_sd for line in lines]) * heavy
+
+
+def _longest(parameters: Array, sensitivity: Array, offset: Array) -> Array:
+    """Longest of the vectors of each row (m, p) of parameters, (m,)."""
+    k = len(offset)
+    vectors = parameters @ sensitivity.reshape(3 * k, -1).T + offset.reshape(-1)
+    return np.asarray(np.sqrt((vectors.reshape(len(parameters), k, 3) ** 2).sum(axis=2)).max(axis=1))
+
+
+def _first_crossing(times: Array, lengths: Array, limit: float) -> Array:
+    """First time at which each row (m, t) of lengths reaches the limit; infinite where none does."""
+    beyond = lengths >= limit
+    place = beyond.argmax(axis=1)
+    rows = np.arange(len(lengths))
+    before = np.maximum(place - 1, 0)
+    low, high = lengths[rows, before], lengths[rows, place]
+    share = (limit - low) / np.where(high > low, high - low, 1.0)
+    at = times[before] + share * (times[place] - times[before])
+    at = np.where(place == 0, times[0], at)
+    return np.asarray(np.where(beyond.any(axis=1), at, np.inf))
+
+
+def forecast_longest(
+    lines: Sequence[Trend],
+    correlation: Array,
+    sensitivity: Array,
+    offset: Array,
+    limit: float,
+    now: float,
+    checks: npt.ArrayLike,
+    *,
+    rng: np.random.Generator,
+    reliability: float = 0.95,
+    level: float = 0.95,
+    horizon: float,
+    draws: int = DRAWS,
+) -> LengthForecast:
+    """Forecast of the longest of k vectors ``offset + sensitivity @ parameters`` against ``limit``.
+
+    ``lines`` (p) of the parameters, in the unit of their values over days or any unit of time; ``correlation``
+    (p, p); ``sensitivity`` (k, 3, p) in the unit of the limit per unit of the parameters, ``offset`` (k, 3) the
+    vectors with all parameters at zero. Raises DataError for a limit that is not above zero, a check before now,
+    or a horizon that is not after it. Neglected: changes yet to come, correlation of the days in time, and products
+    of errors (1e-4 of a vector). A longest vector found with uncertainty is on average longer than the true one; so
+    is that of every run that will be measured, which is what the probability is about.
+    """
+    if not (np.isfinite(limit) and limit > 0.0):
+        raise DataError(f"limit is {limit}; the longest vector needs a limit above zero.")
+    at = as_vector(checks, "checks", least=0)
+    if at.size and at.min() < now:
+        raise DataError(f"checks holds {at.min()}; a planned check cannot lie before now, {now}.")
+    if not horizon > now:
+        raise DataError(f"horizon is {horizon}; it must lie after now, {now}.")
+    as_probability(reliability, "reliability")
+    tail = (1.0 - as_probability(level, "level")) / 2.0
+    level_dev, slope_dev, run_dev = _draws(lines, correlation, rng, draws)
+    centre = np.array([line.at for line in lines])
+
+    def best(t: float) -> Array:
+        return np.array([float(predict(line, t)[0]) for line in lines])
+
+    # Only points that are the worst of some future need be followed.
+    times = now + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, TIMES)]) * (horizon - now)
+    kept: set[int] = set()
+    for t in [*times[:: TIMES // 6], *at]:
+        future = best(t) + (level_dev + slope_dev * (t - centre) + run_dev)[:100]
+        vectors = np.tensordot(np.vstack([future, best(t)]), sensitivity, axes=([1], [2])) + offset
+        kept |= set((vectors**2).sum(axis=2).argmax(axis=1).tolist())
+    chosen = sorted(kept)
+    s, v = sensitivity[chosen], offset[chosen]
+
+    def lengths(t: float, of_runs: bool) -> Array:
+        deviation = level_dev + slope_dev * (t - centre)
+        return _longest(best(t) + deviation + (run_dev if of_runs else 0.0), s, v)
+
+    of_lines = np.column_stack([lengths(t, False) for t in times])
+    certain = np.array([[_longest(best(t)[np.newaxis], s, v)[0] for t in times]])
+    first = np.sort(_first_crossing(times, of_lines, limit))
+    crossing = float(_first_crossing(times, certain, limit)[0])
+    # Order statistics: an interpolated quantile of infinities is not a number.
+    ends = (float(first[int(tail * draws)]), float(first[min(int(np.ceil((1.0 - tail) * draws)), draws) - 1]))
+    inside = np.array([float((lengths(t, True) <= limit).mean()) for t in times])
+    out = np.flatnonzero(inside < reliability)
+    runs = [lengths(t, True) for t in at]
+    return LengthForecast(
+        now=now,
+        latest=float(certain[0, 0]),
+        crossing=Crossing(limit, None if np.isinf(crossing) else crossing, ends),
+        checks=at,
+        predicted=np.array([float(np.median(one)) for one in runs]),
+        interval=np.array([np.quantile(one, [tail, 1.0 - tail]) for one in runs]).reshape(-1, 2),
+        probability=np.array([float((one <= limit).mean()) for one in runs]),
+        recommended_interval=np.inf if not out.size else float(times[max(int(out[0]) - 1, 0)] - now),
+        reliability=reliability,
+        level=level,
+        horizon=horizon,
+    )

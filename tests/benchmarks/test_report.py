@@ -1,0 +1,75 @@
+"""The weekly report of a fleet in processor time and memory: machines are copies of the example campaigns.
+
+``python tests/benchmarks/test_report.py MACHINES`` reports so many machines twice, first with everything to compute,
+then with everything stored, and prints processor time, time, peak memory and size; one machine in five lacks an effect,
+with ``all`` after the number every one does. As a test two machines are reported. No test asserts a time.
+"""
+
+from __future__ import annotations
+
+import re
+import resource
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from monitor.store import Database
+from monitor.workflow.campaigns import import_folders
+from monitor.workflow.health import report
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+QUIET = "nothing-hidden"
+LACKING = ("hidden-reversal-x", "hidden-b-indexing", "hidden-spindle-growth")
+#: The week that holds 16 of the 20 runs of these campaigns.
+WEEK = "2026-W10"
+
+
+def fill(db: Database, machines: int, folder: Path, *, all_lack: bool = False) -> None:
+    """So many machines with one campaign each."""
+    for place in range(machines):
+        lacks = all_lack or place % 5 == 0
+        example = LACKING[place % len(LACKING)] if lacks else QUIET
+        name = f"M{place:04d}"
+        own = folder / name
+        shutil.copytree(EXAMPLES / example, own)
+        text = (own / "campaign.toml").read_text(encoding="utf-8")
+        text = re.sub('campaign = ".*?"', f'campaign = "{name}"', text, count=1).replace("HU40-T", name, 1)
+        (own / "campaign.toml").write_text(text, encoding="utf-8")
+        import_folders(db, [own])
+        shutil.rmtree(own)
+
+
+def test_two_machines_are_reported(tmp_path: Path) -> None:
+    with Database(tmp_path / "fleet.duckdb", threads=1) as db:
+        fill(db, 2, tmp_path)
+        found = report(db, WEEK, out=tmp_path)
+    assert [row["state"] for row in found["machines"]] == ["model fails", "no change seen"]
+
+
+def main(machines: int, *, all_lack: bool) -> None:
+    """Print what a report costs, computed and stored."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with Database(folder / "fleet.duckdb", threads=1) as db:
+            fill(db, machines, folder, all_lack=all_lack)
+            for what in ("computed", "stored"):
+                before, clock = _processor(), time.perf_counter()
+                found = report(db, WEEK, out=folder / what)
+                peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+                size = sum(Path(file).stat().st_size for file in found["files"]) / 1e6
+                print(
+                    f"{machines} machines, {what}: {_processor() - before:.0f} s of processor time, "
+                    f"{time.perf_counter() - clock:.0f} s, peak {peak:.0f} MB, files {size:.1f} MB",
+                    flush=True,
+                )
+
+
+def _processor() -> float:
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100, all_lack="all" in sys.argv[2:])

@@ -1,0 +1,145 @@
+"""How often the search finds what a robot hides, over many seeds; the results are in ``docs/trials-robots.md``.
+
+    python tests/benchmarks/trial_robots.py --seeds 10
+
+Each trial is a run of 1 000 poses of three reflectors with 20 µm of noise, of a robot with other errors, in another
+frame. Nothing, one, two or three effects are hidden, of random kind, joint and size. A hidden effect counts as
+found where a finding names it first, and as held where it is among those that a finding does not rule out. What is
+found besides is a false finding, unless it names a hidden one among its rivals.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from simulator import robot_campaign as robots
+
+from monitor.discovery import explain
+from monitor.methods import tracker
+from monitor.readers import read_campaign
+
+OWN = dict(zip(("J1", "J2", "J3", "J4", "J5", "J6"), "CBBABA", strict=True))
+# Sizes that move the tool by some hundredths to tenths of a millimetre.
+KINDS = ("compliance", "harmonic", "gear", "lag", "reversal", "drift")
+
+
+@dataclass
+class Tally:
+    """Counts over trials with equally many hidden effects."""
+
+    trials: int = 0
+    hidden: int = 0
+    found: int = 0
+    held: int = 0
+    false: int = 0
+    missed: tuple[str, ...] = ()
+    identify_s: tuple[float, ...] = ()
+    explain_s: tuple[float, ...] = ()
+    held_out_um: tuple[float, ...] = ()
+
+
+def hide(rng: np.random.Generator, count: int) -> tuple[robots.Hidden, list[str]]:
+    """So many different effects, and their names as the product writes them (the beginning of them)."""
+    hidden, names = robots.Hidden(), []
+    for kind in rng.choice(KINDS, count, replace=False):
+        joint = str(rng.choice(["J1", "J2", "J3", "J4", "J5"]))
+        term = f"E{OWN[joint]}{joint}"
+        if kind == "compliance":
+            joint = str(rng.choice(["J2", "J3"]))
+            hidden = replace(hidden, compliance={joint: float(rng.uniform(1e-4, 4e-4))})
+            names.append(f"E{OWN[joint]}{joint}:compliance@gravity")
+        elif kind == "harmonic":
+            order = int(rng.integers(1, 3))
+            hidden = replace(
+                hidden, harmonic={joint: (order, rng.uniform(1e-4, 3e-4), rng.uniform(0.0, 6.3))}
+            )
+            names.append(f"{term}:harmonic{order}")
+        elif kind == "gear" and not hidden.harmonic:
+            order = int(rng.integers(40, 200))
+            hidden = replace(
+                hidden, harmonic={joint: (order, rng.uniform(5e-5, 2e-4), rng.uniform(0.0, 6.3))}
+            )
+            names.append(f"{term}:harmonic{order}")
+        elif kind == "lag":
+            hidden = replace(hidden, lag={joint: float(rng.uniform(5e-5, 2e-4))})
+            names.append(f"{term}:lag")
+        elif kind == "reversal":
+            hidden = replace(hidden, reversal={joint: float(rng.uniform(5e-5, 2e-4))})
+            names.append(f"{term}:reversal")
+        elif kind == "drift":
+            hidden = replace(hidden, drift_mm=tuple(rng.uniform(-0.1, 0.1, 3).tolist()))
+            names.append("tracker:shift")
+    return hidden, names
+
+
+def trial(seed: int, count: int, poses: int, tally: Tally) -> None:
+    """One robot."""
+    rng = np.random.default_rng([seed, count])
+    hidden, names = hide(rng, count)
+    made = robots.track(rng, hidden, poses=poses, fixed_every=50)
+    with tempfile.TemporaryDirectory() as folder:
+        campaign = read_campaign(robots.write_tracked(Path(folder) / "robot", made))
+    begun = time.process_time()
+    tracker.identify(campaign)
+    middle = time.process_time()
+    told = explain(campaign, tracker.problem_of(campaign), "tracker", rng=np.random.default_rng(1))
+    tally.identify_s += (middle - begun,)
+    tally.explain_s += (time.process_time() - middle,)
+    tally.trials += 1
+    tally.hidden += len(names)
+    groups = [[one.effect, *(rival.effect for rival in one.rivals)] for one in told.missing]
+    for name in names:
+        tally.found += any(group[0].startswith(name) for group in groups)
+        inside = any(one.startswith(name) for group in groups for one in group)
+        tally.held += inside
+        if not inside:
+            tally.missed += (f"seed {seed}: {name}",)
+    for group in groups:
+        if not any(one.startswith(name) for name in names for one in group):
+            tally.false += 1
+            tally.missed += (f"seed {seed}: false {group[0]} (hidden: {', '.join(names) or 'nothing'})",)
+    if told.missing and told.missing[-1].held_out_after is not None:
+        tally.held_out_um += (1e3 * told.missing[-1].held_out_after,)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--poses", type=int, default=1000)
+    options = parser.parse_args()
+    print(
+        "| hidden | robots | effects | named first | not ruled out | false findings | identify / s | explain / s |"
+    )
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    notes: tuple[str, ...] = ()
+    for count in range(4):
+        tally = Tally()
+        for seed in range(options.seeds):
+            trial(seed, count, options.poses, tally)
+        notes += tally.missed
+        print(
+            f"| {count} | {tally.trials} | {tally.hidden} | {tally.found} | {tally.held} | {tally.false} | "
+            f"{np.median(tally.identify_s):.2f} (at most {max(tally.identify_s):.2f}) | "
+            f"{np.median(tally.explain_s):.2f} (at most {max(tally.explain_s):.2f}) |",
+            flush=True,
+        )
+        if tally.held_out_um:
+            print(
+                f"  held-out error with all found: median {np.median(tally.held_out_um):.2f} µm",
+                file=sys.stderr,
+            )
+    for note in notes:
+        print(note, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,137 @@
+"""Hidden effects of an exact robot, one, two and three at once, found from outside; what one run cannot decide.
+
+A few seeds at a third of the usual size; rates over many at full size are in ``tests/benchmarks/trial_robots.py``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from monitor.discovery import Explanation, explain, fit
+from monitor.discovery.held_out import held_out_error, pose_parts
+from monitor.discovery.version_error import version_error
+from monitor.discovery.visible import see
+from monitor.methods import tracker
+from monitor.methods.model import Model
+from monitor.readers import read_campaign
+
+SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
+
+
+@pytest.fixture(scope="module")
+def robots() -> ModuleType:
+    """The simulator of tracked robots, loaded by path."""
+    if "simulator" not in sys.modules:
+        spec = importlib.util.spec_from_file_location(
+            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
+        )
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    return importlib.import_module("simulator.robot_campaign")
+
+
+def explained(robots: ModuleType, folder: Path, seed: int, hidden: Any, **options: Any) -> Explanation:
+    made = robots.track(np.random.default_rng(seed), hidden, poses=options.pop("poses", 300), **options)
+    campaign = read_campaign(robots.write_tracked(folder / f"robot-{seed}", made))
+    return explain(campaign, tracker.problem_of(campaign), "tracker", rng=np.random.default_rng(1))
+
+
+def names(told: Explanation) -> list[set[str]]:
+    """For every finding the effect and those that the data do not rule out."""
+    return [{one.effect, *(rival.effect for rival in one.rivals)} for one in told.missing]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_nothing_is_missing_where_nothing_is_hidden(robots, tmp_path, seed):
+    told = explained(robots, tmp_path, seed, robots.Hidden(), fixed_every=30)
+    assert told.missing == ()
+    assert told.suspect == ()
+    assert told.comparison.verdict == "explained"
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_one_joint_that_gives_way(robots, tmp_path, seed):
+    told = explained(robots, tmp_path, seed, robots.Hidden(compliance={"J2": 2e-4}))
+    (found,) = told.missing
+    assert any("EBJ2:compliance@gravity" in group for group in names(told))
+    if found.effect == "EBJ2:compliance@gravity":
+        assert abs(found.amplitude - 2e-7) < 5.0 * found.u
+    assert found.rms_after < 0.021
+    assert found.held_out_before is not None
+    assert found.held_out_after is not None
+    # Readings that were left out are predicted to their noise, and were not before.
+    assert found.held_out_after < 0.022 < found.held_out_before
+
+
+def test_two_at_once(robots, tmp_path):
+    hidden = robots.Hidden(compliance={"J2": 3e-4}, harmonic={"J3": (1, 1.5e-4, 0.7)})
+    told = explained(robots, tmp_path, 5, hidden)
+    groups = names(told)
+    assert len(groups) == 2
+    for wanted in ("EBJ2:compliance@gravity", "EBJ3:harmonic1"):
+        assert any(wanted in group for group in groups)
+
+
+def test_three_at_once(robots, tmp_path):
+    hidden = robots.Hidden(compliance={"J2": 3e-4}, harmonic={"J4": (2, 2e-4, 0.7)}, lag={"J1": 1e-4})
+    told = explained(robots, tmp_path, 6, hidden)
+    groups = names(told)
+    assert len(groups) == 3
+    for wanted in ("EBJ2:compliance@gravity", "EAJ4:harmonic2", "ECJ1:lag"):
+        assert any(wanted in group for group in groups)
+
+
+def test_a_gear_of_unknown_ratio(robots, tmp_path):
+    told = explained(robots, tmp_path, 7, robots.Hidden(harmonic={"J3": (121, 1e-4, 0.7)}))
+    (found,) = told.missing
+    assert found.effect == "EBJ3:harmonic121"
+    assert found.searched is not None
+    assert found.searched.name == "periods a turn"
+    assert found.searched.value == pytest.approx(121.0, abs=0.2)
+    assert abs(found.amplitude - 1e-4) < 5.0 * found.u
+
+
+def test_a_drifting_tracker_and_a_joint_with_play(robots, tmp_path):
+    hidden = robots.Hidden(reversal={"J1": 8e-5}, drift_mm=(0.1, -0.2, 0.05))
+    told = explained(robots, tmp_path, 8, hidden, fixed_every=15)
+    groups = names(told)
+    assert any("ECJ1:reversal" in group for group in groups)
+    assert any(name.startswith("tracker:shift") for group in groups for name in group)
+
+
+def test_blocks_of_poses_left_out_against_brute_force(robots, tmp_path):
+    made = robots.track(np.random.default_rng(9), robots.Hidden(compliance={"J2": 2e-4}), poses=120)
+    campaign = read_campaign(robots.write_tracked(tmp_path / "robot", made))
+    problem = tracker.problem_of(campaign, Model("one", added=("EBJ2:compliance@gravity",)))
+    whole = fit(problem)
+    parts = pose_parts(whole)
+    assert parts is not None
+    rows = parts.reshape(-1, 3)[:, 0]
+    assert set(rows.tolist()) == set(range(10))
+    # Rows of one pose are left out together.
+    poses = np.unique(np.column_stack([*campaign.probings.readings.values()]), axis=0, return_inverse=True)[1]
+    assert all(len(set(rows[poses.ravel() == pose].tolist())) == 1 for pose in range(120))
+    total = 0.0
+    for part in range(10):
+        without = fit(problem, rows == part, whole)
+        total += float(np.sum((without.vectors[rows == part] / 0.02) ** 2))
+    seen = see(whole, [])
+    fast = held_out_error(whole, seen, seen.added, np.zeros(1, dtype=np.int64))
+    assert fast == pytest.approx(0.02 * np.sqrt(total / whole.readings), rel=1e-3)
+    assert version_error(whole).held_out_rms == pytest.approx(fast)
+
+
+def test_few_poses_have_no_held_out_error(robots, tmp_path):
+    made = robots.track(np.random.default_rng(10), poses=15)
+    campaign = read_campaign(robots.write_tracked(tmp_path / "robot", made))
+    assert pose_parts(fit(tracker.problem_of(campaign))) is None
