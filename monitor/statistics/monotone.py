@@ -18,7 +18,6 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_vector
 
-
 #: Standard deviation of the estimated correlation times the root of the number of values: simulated 1.33 for 10 values,
 #: 1.2 for 20 (Bartlett's first order, J. R. Stat. Soc. Suppl. 8 (1946) 27, says at most 1).
 SCATTER = 1.25
