@@ -42,6 +42,8 @@ LARGEST_TILT = 0.2
 # the location errors to the radius, so from 50 µm and 10 mm it is 3 nm after two.
 DIRECTIONS = 3
 base_effects = rotary_base
+#: What counts as known, so that no reading speaks of its errors.
+TAKEN_AS_KNOWN = ("the linear axes", "the stylus tip")
 
 
 @dataclass(frozen=True)

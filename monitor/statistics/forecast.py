@@ -197,7 +197,8 @@ def backtest(
     for day in range(first + ahead - 1, len(order)):
         past = rank <= day - ahead
         target = int(np.flatnonzero(rank == day)[0])
-        line = trend(y[past], t[past], u=None if own is None else own[past], days=index[past], level=level)
+        known = None if own is None else own[past]
+        line = trend(y[past], t[past], u=known, days=index[past], level=level, ranks=False)
         value, _, spread = predict(line, t[target])
         error = float(y[target] - value)
         errors.append(error)

@@ -17,8 +17,6 @@ from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.methods import method_named
 from monitor.methods.problem import ChainProblem
 from monitor.records import Array
-from monitor.reporting.figure_style import save
-from monitor.reporting.figures_trend import selections_side_by_side
 from monitor.store import (
     Database,
     StoredModel,
@@ -149,6 +147,9 @@ def side_by_side(db: Database, names: Sequence[str], model: str | None = None, p
 
 def side_by_side_figure(document: Document, folder: Path) -> list[str]:
     """The expanded uncertainties of the selections, bars side by side."""
+    # The drawing library takes longer to load than most commands to run.
+    from monitor.reporting.figure_style import save
+    from monitor.reporting.figures_trend import selections_side_by_side
     from monitor.workflow.figures import ENDINGS, make_folder
 
     make_folder(folder)

@@ -219,6 +219,7 @@ def evaluate(
         inputs, of_axes = _with_linear_axes(one, inputs, at, names, linear_axes)
         words += "; and the errors of the linear axes as stated"
         contributions = [*of_axes, *contributions]
+    words += _left_out(getattr(method_named(loaded.method), "TAKEN_AS_KNOWN", ()), linear_axes is not None)
     framework = _framework(at, readings_only, names, units, p, contributions)
     mcm = validation = None
     if method != "guf":
@@ -261,6 +262,14 @@ def _refuse_too_many(readings: int, method: str) -> None:
             f"a Monte Carlo of {readings} readings would take hours (up to {MOST_READINGS_MCM} are done here); write "
             "--method guf: errors of 1 mrad leave products of 1 µrad, so that first order is as good"
         )
+
+
+def _left_out(known: tuple[str, ...], axes_stated: bool) -> str:
+    """What a method takes as known and nobody stated the errors of, for people who read u."""
+    left = [what for what in known if not (axes_stated and what == "the linear axes")]
+    if not left:
+        return ""
+    return f"; errors of {' and '.join(left)} are no part of u: the method takes them as known"
 
 
 def _with_linear_axes(

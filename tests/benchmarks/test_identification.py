@@ -9,12 +9,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
-from monitor.methods import free_form, rotary_probing, samba
+from monitor.methods import METHODS, free_form, rotary_probing, samba
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def _examples() -> list[Path]:
+    return sorted(
+        path.parent for path in EXAMPLES.glob("*/campaign.toml") if (path.parent / "runs.csv").exists()
+    )
+
+
+@pytest.mark.parametrize("folder", _examples(), ids=lambda folder: folder.name)
+def test_every_example(benchmark: Any, folder: Path) -> None:
+    """Every method is asked for less than a second a run."""
+    campaign = read_campaign(folder)
+    found = benchmark(METHODS[campaign.method].identify, campaign)
+    assert len(found.runs) == len(campaign.runs)
 
 
 def test_all_44_runs_of_hot_cold(benchmark: Any) -> None:
