@@ -24,7 +24,7 @@ def geometric_errors(found: Evaluated) -> tuple[GeometricErrors, dict[str, str]]
         if isinstance(effect, ChainEffect) and all(name in found.framework.names for name in own):
             effects.append(effect)
             names += own
-        else:
+        elif isinstance(effect, ChainEffect):
             left_out |= {name: "it has no number in this run" for name in own if name not in left_out}
     places = [found.framework.names.index(name) for name in names]
     local = [problem.base_names.index(name) for name in names]
@@ -48,6 +48,17 @@ def geometric_errors(found: Evaluated) -> tuple[GeometricErrors, dict[str, str]]
     covariance[: len(places), : len(places)] = found.framework.covariance[np.ix_(places, places)]
     if len(solution.common):
         covariance += _of_shared(found, local, shared)
+    run = int(np.flatnonzero(problem.runs == found.run)[0])
+    for effect, name in problem.known_errors:
+        # Measured by other means: its uncertainty is the stated one, and what the others share with it is first order.
+        place = problem.local_names.index(name)
+        effects.append(effect)
+        names.append(name)
+        estimate.append(float(solution.local[run, place]))
+        beside = np.zeros(len(covariance))
+        beside[: len(local)] = solution.local_covariance[run, place, local]
+        own_variance = solution.local_covariance[run, place, place]
+        covariance = np.block([[covariance, beside[:, None]], [beside[None, :], own_variance]])
     return (
         GeometricErrors(
             effects=tuple(effects),
@@ -56,7 +67,7 @@ def geometric_errors(found: Evaluated) -> tuple[GeometricErrors, dict[str, str]]
             covariance=covariance,
             context=context,
             run=found.run,
-            tip=solution.local[int(np.flatnonzero(problem.runs == found.run)[0]), -3:],
+            tip=problem.ends(problem.own_of(solution.local))[1][int(np.argmax(context.run == found.run))],
             degrees_of_freedom=float(np.min(found.framework.dof_by_output)),
         ),
         left_out,
