@@ -20,8 +20,9 @@ from monitor.statistics import control_false_discoveries
 
 # More than this many effects hidden together in one campaign are beyond what a plan can separate.
 MOST_EFFECTS = 6
-# Steps of a scan, exchanges and mergers among them.
-MOST_STEPS = 2 * MOST_EFFECTS
+# Effects that are merged and found again in turn would go round for ever; a search that has not settled by then is
+# told as it is.
+MOST_STEPS = 4 * MOST_EFFECTS
 # An exchange must be worth more than the noise of the comparison.
 WORTH_EXCHANGING = 1.0
 
@@ -81,7 +82,6 @@ def scan(
     pool = Pool(tuple(one for one in visible.candidates if one.share > SMALLEST_SHARE))
     families = len({candidate.family for candidate in pool.candidates})
     chosen: list[Candidate] = []
-    # Merging may undo what the next step finds again: a scan that goes round in circles is told as it is.
     for _ in range(MOST_STEPS):
         found = best_of_families(_weighed(visible, pool, chosen, allowed))
         if not found or len(chosen) >= most:

@@ -15,6 +15,9 @@ _DIRECTIONS = {
     "B": ("Y", True),
     "C": ("Z", True),
 }
+#: An error of a table at a place, ``EXX(-88)``, and a point of a shape, ``shape(W7)``.
+_AT = re.compile(r"(?P<symbol>E[XYZABC]0?(?P<axis>[XYZUVWABC]\d*))\((?P<place>[^()]+)\)")
+_SHAPE = re.compile(r"shape\((?P<point>.+)\)")
 _SYMBOL = re.compile(r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*)(?::(?P<rest>.+))?")
 
 
@@ -24,10 +27,16 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
     Location errors after ISO 230-1:2012 3.7 (orientation and position of an axis), error motions after 3.4
     to 3.6. A first-order positioning error of a linear axis is its gain. In English without ``texts``.
     """
+    say = texts or texts_of()
+    if (point := _SHAPE.fullmatch(symbol)) is not None:
+        return say("terms.shape", point=point["point"])
+    if (at := _AT.fullmatch(symbol)) is not None:
+        unit = "deg" if at["axis"][0] in "ABC" else "mm"
+        plain = describe(f"{at['symbol']}:table", texts).removesuffix(" (table)")
+        return f"{plain} {say(f'terms.at_{unit}', place=at['place'])}"
     match = _SYMBOL.fullmatch(symbol)
     if match is None:
         return symbol
-    say = texts or texts_of()
     direction, turns = _DIRECTIONS[match["direction"]]
     axis, rest = match["axis"], match["rest"]
     spindle = len(axis) > 1 and axis[0] in "ABC"
