@@ -80,6 +80,7 @@ def explain(
 
     Raises DataError where the model cannot be fitted.
     """
+    problem = problem.foreseen()
     first = fit(problem)
     surroundings = _surroundings(campaign, problem)
     drivers, runs = surroundings.drivers, surroundings.runs

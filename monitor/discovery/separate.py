@@ -84,6 +84,7 @@ def _context(
     return replace(
         context,
         positions=positions,
+        expected=None,
         run=pose,
         sequence=np.arange(count),
         time=np.zeros(count),

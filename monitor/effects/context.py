@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,13 +16,19 @@ from monitor.units import DEGREE
 
 # ISO 1:2022: the reference temperature of geometrical specifications.
 REFERENCE_TEMPERATURE_DEGC = 20.0
+# A smaller move (mm, rad) reverses nothing: an axis that is sent to the same place again comes back to a micrometre or
+# a few microradians, and play and friction of guides and gears take a few of each to be turned round.
+SMALLEST_MOVE_MM = 10e-3
+SMALLEST_MOVE_RAD = 50e-6
 
 
 @dataclass(frozen=True)
 class Context:
     """n probings as effects see them.
 
-    ``positions`` (n, J) physical displacements in mm and rad; ``run`` (n,) the run's number; ``sequence`` (n,);
+    ``positions`` (n, J) physical displacements in mm and rad as read; ``expected`` (n, J) the same free of each
+    row's own noise, where a method can tell, for what follows fine steps; ``run`` (n,) the run's number;
+    ``sequence`` (n,);
     ``time`` (n,) s since the run began; ``day_time`` (n,) s since the first run of the day began; ``run_time``
     (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
     the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
@@ -40,24 +45,46 @@ class Context:
     target: npt.NDArray[np.str_]
     nominal: Array
     columns: Mapping[str, Array]
+    expected: Array | None = None
 
     def __len__(self) -> int:
         return len(self.run)
+
+    @property
+    def places(self) -> Array:
+        """Where every axis stood (n, J) as effects see it: ``expected`` where there is one, else as read.
+
+        Where a measured axis stops depends on the noise of that touch. An effect that looked at the reading would see
+        the noise that it is to explain.
+        """
+        return self.positions if self.expected is None else self.expected
+
+    def expecting(self, expected: Array) -> Context:
+        """The same probings with ``expected`` (n, J), in the columns of the axes' readings too."""
+        columns = dict(self.columns)
+        for place, joint in enumerate(self.chain.joints):
+            name = f"{joint.name.lower()}_{'deg' if joint.turns else 'mm'}"
+            if name in columns and not np.array_equal(expected[:, place], self.positions[:, place]):
+                columns[name] = joint.sign * expected[:, place] / (DEGREE.factor if joint.turns else 1.0)
+        return replace(self, expected=expected, columns=columns)
 
     @cached_property
     def travel(self) -> Array:
         """Sign (n, J) of every axis's last travel; before an axis has moved in a run, that of its position.
 
-        The controller references every axis at zero, so a first position is reached from there.
+        The controller references every axis at zero, so a first position is reached from there. Moves are counted from
+        where the last one ended; too small a one leaves the sign as it was.
         """
-        signs = np.zeros_like(self.positions)
+        turning = np.array([joint.turns for joint in self.chain.joints], dtype=bool)
+        smallest = np.where(turning, SMALLEST_MOVE_RAD, SMALLEST_MOVE_MM)
+        places = self.places
+        signs = np.zeros_like(places)
         for run in np.unique(self.run):
-            rows = np.flatnonzero(self.run == run)
-            last = np.sign(self.positions[rows[0]])
-            signs[rows[0]] = last
-            for before, row in itertools.pairwise(rows):
-                step = np.sign(self.positions[row] - self.positions[before])
-                last = np.where(step != 0, step, last)
+            ended, last = np.zeros(places.shape[1]), np.zeros(places.shape[1])
+            for row in np.flatnonzero(self.run == run):
+                moved = np.abs(places[row] - ended) > smallest
+                last = np.where(moved, np.sign(places[row] - ended), last)
+                ended = np.where(moved, places[row], ended)
                 signs[row] = last
         return signs
 
@@ -67,11 +94,11 @@ class Context:
 
         Zero at the first pose of a run: nobody recorded where the axes were before.
         """
-        moves = np.zeros_like(self.positions)
+        moves = np.zeros_like(self.places)
         for run in np.unique(self.run):
             rows = np.flatnonzero(self.run == run)
-            steps = np.diff(self.positions[rows], axis=0)
-            last = np.zeros(self.positions.shape[1])
+            steps = np.diff(self.places[rows], axis=0)
+            last = np.zeros(self.places.shape[1])
             for row, step in zip(rows[1:], steps, strict=True):
                 last = step if np.any(step) else last
                 moves[row] = last

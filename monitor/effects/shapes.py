@@ -67,7 +67,7 @@ class Poly:
     labels: ClassVar[tuple[str, ...]] = ("",)
 
     def columns(self, context: Context, joint: int) -> Array:
-        return context.positions[:, joint, None] ** self.order
+        return context.places[:, joint, None] ** self.order
 
     def unit(self, base: Unit, joint: Joint) -> Unit:
         length = RADIAN if joint.turns else METRE
@@ -87,7 +87,7 @@ class Harmonic:
         if not context.chain.joints[joint].turns:
             name = context.chain.joints[joint].name
             raise EffectError(f"harmonic{self.order:g} belongs to a rotary axis; for {name} write cyclic20mm")
-        angle = self.order * context.positions[:, joint]
+        angle = self.order * context.places[:, joint]
         return np.column_stack([np.cos(angle), np.sin(angle)])
 
     def unit(self, base: Unit, joint: Joint) -> Unit:
@@ -108,7 +108,7 @@ class Cyclic:
             raise EffectError(f"cyclic{self.pitch:g}mm belongs to a linear axis; for {name} write harmonic1")
         if self.pitch <= 0:
             raise EffectError(f"the pitch of cyclic{self.pitch:g}mm must be above 0 mm")
-        phase = 2.0 * np.pi * context.positions[:, joint] / self.pitch
+        phase = 2.0 * np.pi * context.places[:, joint] / self.pitch
         return np.column_stack([np.cos(phase), np.sin(phase)])
 
     def unit(self, base: Unit, joint: Joint) -> Unit:
@@ -171,7 +171,7 @@ class Table:
     def columns(self, context: Context, joint: int) -> Array:
         if self.nodes < 2:
             raise EffectError(f"table{self.nodes} has too few nodes; write table or table2 and above")
-        q = context.positions[:, joint]
+        q = context.places[:, joint]
         grid = np.linspace(q.min(), q.max(), self.nodes)
         step = grid[1] - grid[0]
         if step == 0:
@@ -205,7 +205,7 @@ class Nodes:
 
     def columns(self, context: Context, joint: int) -> Array:
         axis = context.chain.joints[joint]
-        reading = axis.sign * context.positions[:, joint] / (DEGREE.factor if axis.turns else 1.0)
+        reading = axis.sign * context.places[:, joint] / (DEGREE.factor if axis.turns else 1.0)
         free = [number for number, (_, held) in enumerate(self.places) if not held]
         hats = np.eye(len(self.places))
         return np.column_stack(

@@ -106,6 +106,7 @@ def planned_context(
     return replace(
         template,
         positions=positions,
+        expected=None,
         run=np.full(count, int(template.run[0])),
         sequence=np.arange(1, count + 1),
         time=pose.astype(float),

@@ -89,7 +89,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> FreeFormProb
             f"of a linear axis, such as {at(plane.term(plane.u, plane.u), nodes[plane.u.name][-1])}"
         )
     whole = Model(model.name, texts, model.added)
-    return FreeFormProblem(
+    problem = FreeFormProblem(
         context=context_of(campaign, chain),
         base=whole.base_of(chain),
         added=whole.added_to(chain),
@@ -102,6 +102,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> FreeFormProb
         nodes=nodes,
         first_angle=first_angle,
     )
+    return problem.foreseen() if problem.added else problem
 
 
 def _known(name: str, there: set[str], where: str) -> str:

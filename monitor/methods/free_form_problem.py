@@ -142,7 +142,13 @@ class FreeFormProblem(ChainProblem):
         for joint in (self.plane.u, self.plane.v):
             along = off @ np.array(joint.direction)
             positions[:, chain.index(joint.name)] += along if joint.branch == "work" else -along
-        return replace(self, context=replace(self.context, positions=positions))
+        return replace(self, context=replace(self.context, positions=positions, expected=None))
+
+    def foreseen(self) -> FreeFormProblem:
+        """Added effects look at the nominal points too, as the tables do."""
+        if self.context.expected is not None:
+            return self
+        return replace(self, context=self.context.expecting(self.nominal.context.positions))
 
     @cached_property
     def _at_nominal(self) -> Evaluation:

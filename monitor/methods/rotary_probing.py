@@ -178,7 +178,9 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProble
         ball=ball,
         tip=tip,
     )
-    return _directed(problem, tips) if ball.any() else problem
+    if ball.any():
+        problem = _directed(problem, tips)
+    return problem.foreseen() if problem.added else problem
 
 
 def _directed(problem: RotaryProblem, tips: Array) -> RotaryProblem:

@@ -217,6 +217,7 @@ def _commanded(known: GeometricErrors, positions: Array, inside: bool) -> Contex
     return replace(
         old,
         positions=np.concatenate([old.positions, pairs]),
+        expected=None if old.expected is None else np.concatenate([old.expected, pairs]),
         run=np.concatenate([old.run, np.full(count, known.run)]),
         sequence=np.concatenate([old.sequence, np.arange(count) + int(old.sequence.max()) + 1]),
         time=joined(old.time, float(np.mean(old.time[own]))),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -62,6 +62,29 @@ def test_table_hats_add_to_one_everywhere(make: Callable[..., Context]) -> None:
     assert hats.shape == (101, shapes.TABLE_NODES)
     np.testing.assert_allclose(hats.sum(axis=1), 1.0, rtol=0, atol=1e-12)
     assert hats.min() >= 0.0
+
+
+def test_a_move_within_the_repeatability_of_a_touch_reverses_nothing(make: Callable[..., Context]) -> None:
+    context = make({"X": [50.0, 50.002, 49.999, 49.995, 49.985, 49.987, 50.1]})
+    joint = next(place for place, one in enumerate(context.chain.joints) if one.name == "X")
+    # 5 µm back, but 15 µm from where the move ended: creeping does not go unseen.
+    np.testing.assert_array_equal(context.travel[:, joint], [1, 1, 1, 1, -1, -1, 1])
+
+
+def test_shapes_look_where_the_axis_is_expected(make: Callable[..., Context]) -> None:
+    context = make({"X": [10.0, 20.0]}, columns={"x_mm": [10.0, 20.0]})
+    joint = next(place for place, one in enumerate(context.chain.joints) if one.name == "X")
+    expected = context.positions.copy()
+    expected[:, joint] += 0.25
+    moved = context.expecting(expected)
+    np.testing.assert_array_equal(
+        moved.columns["x_mm"], context.chain.joints[joint].sign * expected[:, joint]
+    )
+    np.testing.assert_array_equal(moved.positions, context.positions)
+    for text in ("EXX:poly2", "EXX:cyclic20mm"):
+        effect = parse_effect(text, context.chain)
+        there = replace(context, positions=expected)
+        np.testing.assert_array_equal(effect.basis(moved).columns, effect.basis(there).columns)
 
 
 def test_reversal_keeps_the_sign_of_the_last_travel(make: Callable[..., Context]) -> None:

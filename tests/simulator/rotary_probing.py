@@ -130,8 +130,10 @@ def touch(
     tip: tuple[float, float, float] = (0.0, 0.0, 0.0),
     tip_radius: float = 3.0,
     linear: Callable[[np.ndarray], np.ndarray] | None = None,
+    motion: Mapping[str, np.ndarray] | None = None,
 ) -> dict[str, np.ndarray]:
-    """Readings (n,) of every axis (mm, degrees) of one run. ``location`` holds (6,) X Y Z A B C of axes by name.
+    """Readings (n,) of every axis (mm, degrees) of one run. ``location`` holds (6,) X Y Z A B C of axes by name,
+    ``motion`` their error motions (n, 6) at every touch, which act behind the axis's own turn.
 
     ``linear`` maps readings (n, 3) X Y Z to the shift (n, 3) mm of the tip against the work side that the errors of
     the linear axes cause, in the machine's directions.
@@ -148,8 +150,9 @@ def touch(
 
     def tip_in_work(now: dict[str, np.ndarray], wrong: dict[str, np.ndarray]) -> np.ndarray:
         """The tip's centre (n, 3) in the table's frame."""
-        work = branch_matrix(chain.work, now, wrong, {}, count)
-        at = carried(branch_matrix(chain.tool, now, wrong, {}, count), tips)
+        moving = (motion or {}) if wrong is errors else {}
+        work = branch_matrix(chain.work, now, wrong, moving, count)
+        at = carried(branch_matrix(chain.tool, now, wrong, moving, count), tips)
         if linear is not None and wrong is errors:
             xyz = np.column_stack([now[axis.name] for axis in chain.linear])
             bent = linear(xyz)

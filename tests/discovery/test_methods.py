@@ -1,0 +1,82 @@
+"""The search on methods that tell one number a touch: no noise is taken for an effect, and what is hidden is found.
+
+A few seeds; rates over many are in ``tests/benchmarks/trial_methods.py``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from monitor.methods import rotary_probing
+from monitor.methods.problem import solve_problem
+
+TESTS = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="module")
+def trial(virtual_campaigns: ModuleType) -> ModuleType:
+    """The scenes of the trial, loaded by path."""
+    virtual_campaigns.simulator()
+    spec = importlib.util.spec_from_file_location("trial_methods", TESTS / "benchmarks/trial_methods.py")
+    assert spec is not None
+    assert spec.loader is not None
+    before = list(sys.path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["trial_methods"] = module
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path[:] = before
+    return module
+
+
+def named(trial: ModuleType, effect: str):
+    return next(one for one in trial.ROTARY if one.name == effect)
+
+
+@pytest.mark.parametrize("perfect", [False, True])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_rotary_probing_nothing_is_missing(trial, perfect, seed):
+    told = trial.explained(trial.rotary(np.random.default_rng(seed), 4, perfect=perfect))
+    assert trial.groups(told) == []
+    assert told.comparison.verdict == "explained"
+
+
+def test_free_form_nothing_is_missing(trial):
+    assert trial.groups(trial.explained(trial.pocket(np.random.default_rng(3), 2))) == []
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_points_ten_millimetres_apart_make_no_cycle_of_ten(trial, seed):
+    """Was: EZZ:cyclic5mm of 0.8 mm and reversals of 0.3 to 0.4 mm beside what is hidden, out of the touches' noise."""
+    campaign = trial.rotary(np.random.default_rng([seed, 9]), 6, named(trial, "EYZ:poly1"), perfect=True)
+    told = trial.explained(campaign)
+    (group,) = trial.groups(told)
+    assert "EYZ:poly1" in group
+    # What is left is the noise, and no less.
+    assert told.final.scale == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("effect", ["ECC:harmonic1", "EAC:harmonic2", "EZZ:poly2"])
+def test_hidden_effects_of_8_um_are_found(trial, effect):
+    (group,) = trial.groups(trial.explained(trial.rotary(np.random.default_rng(5), 4, named(trial, effect))))
+    assert effect in group
+
+
+def test_expected_places_leave_nothing_and_are_their_own(trial):
+    """What is expected holds no part of a row's residual: read there, the fit leaves nothing and expects the same."""
+    campaign = trial.rotary(np.random.default_rng([4, 1]), 3)
+    noisy = rotary_probing.problem_of(campaign)
+    expected = noisy.foreseen().context.places
+    assert 0.3e-3 < np.abs(expected - noisy.context.positions).max() < 4e-3
+    quiet = replace(noisy, context=replace(noisy.context, positions=expected))
+    solution = solve_problem(quiet)
+    assert np.abs(quiet.vectors(solution.local, solution.common)).max() < 1e-6
+    np.testing.assert_allclose(quiet.foreseen().context.places, expected, rtol=0, atol=1e-6)
