@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check format bench trials wheel clean distclean
+.PHONY: real-data help setup demo test check format bench trials wheel clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -10,7 +10,7 @@ PYTEST := $(RUN) -m pytest
 MAY_BE_EMPTY := || test $$? -eq 5
 
 help:  ## what there is
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 18
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
 
 setup:
 	@PYTHON='$(PYTHON)' sh tests/setup/prepare.sh
@@ -33,9 +33,14 @@ format: setup  ## put the sources into the project's format
 bench: setup  ## how long things take (tests/benchmarks)
 	@$(PYTEST) tests/benchmarks --benchmark-only $(ARGS) $(MAY_BE_EMPTY)
 
+real-data: setup  ## docs/real-data.md and its pictures, from the measured series of NIST
+	@OMP_NUM_THREADS=1 $(RUN) tests/curves/real_data.py $(ARGS)
+
 trials: setup  ## slow trials over many seeds, an hour; their last results are in docs/trials-*.md
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_robots.py --seeds 10
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_curve.py --seeds 40
 
 wheel: setup  ## build the wheel and run the tests against it, away from the checkout
 	@$(RUN) tests/setup/installed_wheel.py $(ARGS)

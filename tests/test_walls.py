@@ -53,6 +53,7 @@ KEEPERS: dict[str, set[str]] = {
     "weasyprint": {"reporting"},
     "matplotlib": {"reporting"},
     "pyhanko": {"reporting"},
+    "pkcs11": {"reporting"},
     "fastapi": {"web"},
     "starlette": {"web"},
     "uvicorn": {"web"},

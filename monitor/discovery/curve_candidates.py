@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import cast
 
@@ -19,7 +20,7 @@ from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Variant, Visibl
 from monitor.effects import ChainEffect
 from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, curve_columns, group_names
 from monitor.effects.curve_words import CALENDAR
-from monitor.methods.curve import CurveFit, CurveProblem, grid
+from monitor.methods.curve import SHORTEST_CONSTANT, CurveFit, CurveProblem, grid
 from monitor.records import Array
 from monitor.statistics.noise import Noise
 
@@ -257,18 +258,24 @@ def separable(problem: CurveProblem) -> Callable[[Sequence[Candidate], Candidate
     spans = {name: float(np.ptp(values)) for name, values in problem.inputs.numbers.items()}
     known = [(one.column, 1.0 / one.value) for one in problem.effects if one.shape == "sin" and one.value]
 
+    @lru_cache(maxsize=1)
+    def taken(chosen: tuple[CurveEffect, ...]) -> dict[str, list[float]]:
+        """The rates of the periods by input; the same for thousands of candidates in a row."""
+        rates: dict[str, list[float]] = {name: [] for name in spans}
+        for column, rate in known:
+            rates[column].append(rate)
+        for other in chosen:
+            if other.shape == "sin" and other.value:
+                rates[other.column].append(1.0 / other.value)
+        return rates
+
     def apart(chosen: Sequence[Candidate], one: Candidate) -> bool:
         effect = effect_of(one)
         if effect.shape != "sin" or effect.value is None:
             return True
         rate, least = 1.0 / effect.value, APART / spans[effect.column]
-        others = [effect_of(other) for other in chosen]
-        taken = [
-            (other.column, 1.0 / other.value) for other in others if other.shape == "sin" and other.value
-        ]
-        return all(
-            abs(other - rate) >= least for column, other in (*known, *taken) if column == effect.column
-        )
+        rates = taken(tuple(effect_of(other) for other in chosen))[effect.column]
+        return all(abs(other - rate) >= least for other in rates)
 
     return apart
 
@@ -293,15 +300,18 @@ def at_best(scene: Scene, visible: Visible, chosen: Sequence[Candidate], place: 
         return -found[0].explained
 
     rate = 1.0 / effect.value
-    x = scene.fit.problem.inputs.numbers[effect.column]
-    width = 1.0 / (3.0 * float(np.ptp(x))) if effect.shape == "sin" else 0.35 * abs(rate)
-    low, high = (
-        (rate - width, rate + width)
-        if effect.shape != "sin"
-        else (max(rate - width, 0.3 * rate), rate + width)
-    )
+    x = np.unique(scene.fit.problem.inputs.numbers[effect.column])
+    span = float(x[-1] - x[0])
+    if effect.shape == "sin":
+        low, high = max(rate - 1.0 / (3.0 * span), 1.0 / span), rate + 1.0 / (3.0 * span)
+    else:
+        # Between the neighbours on the grid, and never shorter than the distance of the rows.
+        most = 1.0 / (SHORTEST_CONSTANT * float(np.median(np.diff(x))))
+        low, high = sorted((0.6 * rate, float(np.clip(1.6 * rate, -most, most))))
+    if high <= low:
+        return _named(candidate, effect)
     best = optimize.minimize_scalar(
-        badness, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * width, "maxiter": 40}
+        badness, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * (high - low), "maxiter": 40}
     )
     better = effect.at(1.0 / float(best.x)) if best.fun <= badness(rate) else effect
     return _named(scene.candidate(better, tries), better)

@@ -8,6 +8,7 @@ effect), and the error on rows that took no part in its fit.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,6 +17,7 @@ import numpy as np
 from scipy import linalg
 
 from monitor.discovery.curve_candidates import (
+    POWERS,
     Scene,
     at_best,
     effect_of,
@@ -29,7 +31,7 @@ from monitor.discovery.evidence import Evidence, Pool, orthonormal, weigh, witho
 from monitor.discovery.held_out import held_out_rms
 from monitor.discovery.scan import Finding, ScanResult, scan
 from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Visible
-from monitor.effects.curve import CurveEffect, coefficient_names
+from monitor.effects.curve import SEARCHED, CurveEffect, coefficient_names
 from monitor.effects.curve_words import calendar_period, describe_curve
 from monitor.effects.words import Words
 from monitor.methods.curve import CurveFit, CurveProblem, fit, inverse_normal
@@ -46,7 +48,9 @@ FOLDS, DEAL = 10, 20261121
 UNDECIDED = 12.0
 #: Effects that are asked together whether they, rather than noise, make neighbours resemble each other, and the level
 #: of that question (docs/trials-curve.md has how often it is wrong).
-MOST_TOGETHER = 3
+MOST_TOGETHER = 5
+#: Fewer cycles than these over the range of an input can be a bend.
+MOST_BENDS = 2.0
 AGAINST_NOISE = 0.05
 COINCIDES = 0.999
 
@@ -111,6 +115,24 @@ class _Acceptance:
     rate: float
     p_values: dict[str, float] = field(default_factory=dict)
     known: dict[tuple[str, ...], float] = field(default_factory=dict)
+    odds: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = field(default_factory=dict)
+
+    def is_a_bend(self, others: Sequence[Candidate], found: Candidate) -> bool:
+        """Whether a polynomial in the same input does as well at its price as a cycle, an exponential or a step: then
+        it is the simpler answer and has its turn."""
+        effect = effect_of(found)
+        x = self.scene.fit.problem.inputs.numbers.get(effect.column, np.zeros(1))
+        many = effect.shape == "sin" and float(np.ptp(x)) > MOST_BENDS * float(effect.value or 1.0)
+        if effect.shape not in SEARCHED or many:
+            return False
+        problem, rows = self.scene.fit.settled, self.scene.fit.problem.order
+        y = problem.curve.measured[rows]
+        chosen = [effect_of(one) for one in others]
+        ends = []
+        for last in (effect, *(CurveEffect(effect.column, f"poly{power}") for power in POWERS[1:])):
+            left, rank = _left(y, problem.columns([*problem.effects, *chosen, last])[2][rows])
+            ends.append(len(y) * np.log(max(left, 1e-300)) + (rank + (last is effect)) * np.log(len(y)))
+        return bool(min(ends[1:]) <= ends[0])
 
     def line(self, others: Sequence[Candidate], found: Candidate) -> Candidate | None:
         """The straight line in the same input, where it is not in the model yet: a bend must say something beside it,
@@ -158,32 +180,58 @@ class _Acceptance:
         return self.known[key]
 
     def stands(self, others: Sequence[Candidate], found: Candidate) -> bool:
-        """Whether correlated noise is no better explanation: either the effect stands out from it, or the noise turns
-        out independent once this effect, and up to two more of its kind, are in the model."""
+        """Whether correlated noise is no better explanation.
+
+        Alone: the effect stands out from the noise that its model leaves, and its model is likelier than noise
+        alone. In company: cycles of one input look like correlated noise as long as one of them is not in the model,
+        so they are asked together, and the rows have to be independent once all are in.
+        """
         asked = found.family
         found = at_best(self.scene, self.visible, [*others, found], len(others))
         p = self.p_values[asked] = self.p_values[found.family] = self.p_value(others, found)
-        if p * self.families <= self.rate:
+        if p * self.families <= self.rate and self.likelier(others, [found], AGAINST_NOISE):
             return True
-        fitted, rows = self.scene.fit, self.scene.fit.problem.order
-        x = np.column_stack([fitted.design, *(self.scene.columns(effect_of(one)) for one in others)])[rows]
-        y = fitted.problem.curve.measured[rows]
-        together, price = [found], 1.0
-        while True:
-            added = np.column_stack([self.scene.columns(effect_of(one)) for one in together])[rows]
-            price *= together[-1].variant.tries / len(together)
-            if p_value_against_noise(y, x, added) * price <= AGAINST_NOISE:
-                if assess(y, np.column_stack([x, added])).noticed:
-                    return False
-                rest = np.column_stack([x, added[:, found.columns.shape[1] :]])
-                alone = p_value_in_noise(y, rest, added[:, : found.columns.shape[1]], white=True)
-                return alone * found.variant.tries * self.families <= self.rate
-            if len(together) == MOST_TOGETHER:
-                return False
-            more = self.next_one([*others, *together])
+        if effect_of(found).shape != "sin" or self.alone(others, found) * self.families > self.rate:
+            return False
+        kind = (effect_of(found).column, "sin")
+        same = [one for one in others if (effect_of(one).column, effect_of(one).shape) == kind]
+        rest = [one for one in others if one not in same]
+        together = [found, *same]
+        while len(together) <= max(MOST_TOGETHER, len(same) + 1):
+            enough = len(together) > 1 and self.likelier(rest, together, AGAINST_NOISE)
+            if enough and not self.noise_after([*rest, *together]).noticed:
+                return True
+            more = self.next_one([*rest, *together])
             if more is None:
                 return False
             together.append(more)
+        return False
+
+    def design(self, others: Sequence[Candidate]) -> tuple[Array, Array]:
+        """Response (m,) and columns (m, c) of the model with others, rows in the order of time."""
+        fitted, rows = self.scene.fit, self.scene.fit.problem.order
+        columns = [fitted.design, *(self.scene.columns(effect_of(one)) for one in others)]
+        return fitted.problem.curve.measured[rows], np.column_stack(columns)[rows]
+
+    def likelier(self, others: Sequence[Candidate], together: Sequence[Candidate], level: float) -> bool:
+        """Whether effects together, their search paid for, explain the rows better than noise alone."""
+        key = tuple(sorted(one.family for one in others)), tuple(sorted(one.family for one in together))
+        if key not in self.odds:
+            y, x = self.design(others)
+            added = np.column_stack([self.scene.columns(effect_of(one)) for one in together])
+            price = np.prod([float(one.variant.tries) for one in together]) / math.factorial(len(together))
+            self.odds[key] = p_value_against_noise(y, x, added[self.scene.fit.problem.order]) * float(price)
+        return self.odds[key] <= level
+
+    def alone(self, others: Sequence[Candidate], found: Candidate) -> float:
+        """p-value in independent noise, the search paid for."""
+        y, x = self.design(others)
+        own = self.scene.columns(effect_of(found))[self.scene.fit.problem.order]
+        return p_value_in_noise(y, x, own, white=True) * found.variant.tries
+
+    def noise_after(self, chosen: Sequence[Candidate]) -> Assessed:
+        """The noise that is left with the chosen ones in the model."""
+        return assess(*self.design(chosen))
 
     def next_one(self, chosen: Sequence[Candidate]) -> Candidate | None:
         """The most convincing candidate of the kind of the last one, beside the chosen ones, at its best value."""
@@ -205,7 +253,7 @@ class _Acceptance:
         line = self.line(others, found)
         if line is not None and not self.stands([*others, line], found):
             return False
-        if not self.stands(others, found) or not self.falls(others, found):
+        if not self.stands(others, found) or not self.falls(others, found) or self.is_a_bend(others, found):
             return False
         before = np.concatenate([self.visible.added, *(one.columns for one in others)], axis=1)
         after = np.concatenate([before, found.columns], axis=1)
@@ -230,9 +278,21 @@ class _Round:
     acceptance: _Acceptance
     under: CurveFit
 
-    @property
-    def effects(self) -> list[CurveEffect]:
-        return [effect_of(one.candidate) for one in self.result.findings]
+    def alone(self) -> _Round:
+        """The round with those findings only that stand out from correlated noise by themselves."""
+        kept, ask = list(self.result.findings), self.acceptance
+        while kept:
+            candidates = [one.candidate for one in kept]
+            p = [ask.p_value([o for o in candidates if o is not one], one) for one in candidates]
+            worst = int(np.argmax(p))
+            if p[worst] * ask.families <= ask.rate:
+                break
+            kept.pop(worst)
+        if len(kept) == len(self.result.findings):
+            return self
+        found = [effect_of(one.candidate) for one in kept]
+        under = fit(self.scene.fit.settled.with_effects(found)) if found else self.scene.fit
+        return replace(self, result=replace(self.result, findings=tuple(kept)), under=under)
 
 
 class _Views:
@@ -298,6 +358,10 @@ def explain_curve(problem: CurveProblem, *, rate: float = 0.01, most: int = MOST
     suspect: tuple[Outlier, ...] = ()
     now, suspect = _exhausted(_Views(problem, rate, WHITE), suspect, most)
     noise = _noise_of(now.under)
+    if noise.noticed:
+        # Some cycles were taken for the sake of company that did not come: each has to stand alone now.
+        now = now.alone()
+        noise = _noise_of(now.under)
     rounds = [now]
     if noise.noticed:
         # What independent rows would show was found; now what stands out once the resemblance is filtered out.

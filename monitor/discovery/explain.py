@@ -142,8 +142,8 @@ def _scanned(
 ) -> tuple[Visible, ScanResult]:
     """The scan of a fit; where gears stand out of what it leaves, once more with them."""
     gears: list[Variant] = []
+    visible = see(now, variants)
     while True:
-        visible = see(now, [*variants, *gears])
         result = scan(
             visible,
             rate=rate,
@@ -157,6 +157,7 @@ def _scanned(
         if not new or len(gears) > MOST_GEARS:
             return visible, result
         gears += new
+        visible = replace(visible, candidates=(*visible.candidates, *see(now, new).candidates))
 
 
 def _driven(now: Fit, drivers: Sequence[str], found: Candidate) -> Sequence[Candidate]:

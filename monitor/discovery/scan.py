@@ -20,6 +20,9 @@ from monitor.statistics import control_false_discoveries
 
 # More than this many effects hidden together in one campaign are beyond what a plan can separate.
 MOST_EFFECTS = 6
+# Effects that are merged and found again in turn would go round for ever; a search that has not settled by then is
+# told as it is.
+MOST_STEPS = 4 * MOST_EFFECTS
 # An exchange must be worth more than the noise of the comparison.
 WORTH_EXCHANGING = 1.0
 
@@ -79,7 +82,7 @@ def scan(
     pool = Pool(tuple(one for one in visible.candidates if one.share > SMALLEST_SHARE))
     families = len({candidate.family for candidate in pool.candidates})
     chosen: list[Candidate] = []
-    while True:
+    for _ in range(MOST_STEPS):
         found = best_of_families(_weighed(visible, pool, chosen, allowed))
         if not found or len(chosen) >= most:
             break

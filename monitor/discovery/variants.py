@@ -9,6 +9,7 @@ from monitor.discovery.visible import Variant
 from monitor.effects import ArtefactEffect, ChainEffect, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, WarmUp, parse_driver
 from monitor.effects.shapes import Compliance
+from monitor.effects.weight import Load
 from monitor.machine import COMPONENTS, Chain
 
 # Warm-up takes from ten minutes (a small spindle) to a shift (a machine bed); neighbours differ by a factor of
@@ -30,7 +31,12 @@ def variants_of(effect: ChainEffect | ArtefactEffect) -> list[Variant]:
             Variant(effect.text, with_time_constant(effect, tau), len(TIME_CONSTANTS_S))
             for tau in TIME_CONSTANTS_S
         ]
-    return [Variant(effect.text, effect)]
+    odds = 1.0
+    if isinstance(effect, ChainEffect) and isinstance(effect.shape, Compliance):
+        # A drive gives way before a bearing does, and one load is simpler than the weight of every link.
+        simple = isinstance(effect.driver, Load) and effect.term.component == 3 + effect.joint.main
+        odds = 1.0 if simple else ODDS_OF_A_DRIVER
+    return [Variant(effect.text, effect, odds=odds)]
 
 
 def cycles_of_unknown_pitch(chain: Chain) -> list[Variant]:

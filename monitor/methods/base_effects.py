@@ -126,9 +126,13 @@ def _generic_jacobian_outside(chain: Chain) -> tuple[Array, Array]:
 
 
 @cache
-def base_effects(chain: Chain) -> tuple[str, ...]:
-    """The effects of a complete and minimal model of a chain, location errors in chain order, then gains."""
-    outside = len(chain.of_kind("linear")) < 3
+def base_effects(chain: Chain, outside: bool | None = None) -> tuple[str, ...]:
+    """The effects of a complete and minimal model of a chain, location errors in chain order, then gains.
+
+    ``outside`` says whether the chain is looked at from outside; None: where it cannot touch a target at will.
+    """
+    if outside is None:
+        outside = len(chain.of_kind("linear")) < 3
     by_error, known = (_generic_jacobian_outside if outside else _generic_jacobian)(chain)
     basis = np.linalg.qr(known / np.linalg.norm(known, axis=0))[0]
     chosen: set[tuple[str, int]] = set()

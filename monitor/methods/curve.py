@@ -47,6 +47,7 @@ CONVERGED = 1e-13
 FREQUENCY_STEPS = 3.0
 CONSTANTS = tuple(0.02 * 50.0 ** (step / 9.0) for step in range(10))
 FEWEST_ON_A_SIDE = 3
+SHORTEST_CONSTANT = 1.0
 MOST_PLACES = 400
 
 
@@ -125,7 +126,9 @@ def grid(effect: CurveEffect, inputs: Inputs) -> Array:
         count = int(FREQUENCY_STEPS * (len(x) - 1) / 2.0)
         return span / np.arange(FREQUENCY_STEPS, max(count, FREQUENCY_STEPS) + 1.0) * FREQUENCY_STEPS
     if effect.shape == "exp":
+        # A constant shorter than the distance of the rows would follow single values of the input.
         constants = span * np.array(CONSTANTS)
+        constants = constants[constants >= SHORTEST_CONSTANT * float(np.median(np.diff(x)))]
         return np.concatenate([constants, -constants])
     ordered = np.sort(inputs.numbers[effect.column])
     middles = (x[1:] + x[:-1]) / 2.0
@@ -316,12 +319,13 @@ def _refined(
 
 def _bounds(problem: CurveProblem, effect: CurveEffect) -> tuple[float, float]:
     """How far the frequency or rate of a searched value may go from where it begins: half of what two periods have to
-    differ by to be told apart, so that they do not run into each other; a factor of a hundred for a constant."""
+    differ by to be told apart, so that they do not run into each other; a factor of ten or a hundred for a constant."""
     rate = 1.0 / float(effect.value or 1.0)
     if effect.shape == "sin":
-        half = 0.5 / float(np.ptp(problem.inputs.numbers[effect.column]))
-        return max(rate - half, 0.1 * rate), rate + half
-    return min(rate / 100.0, rate * 100.0), max(rate / 100.0, rate * 100.0)
+        # A cycle longer than the range is a bend, not a cycle.
+        least = 1.0 / float(np.ptp(problem.inputs.numbers[effect.column]))
+        return max(rate - 0.5 * least, min(least, rate)), rate + 0.5 * least
+    return min(rate / 100.0, rate * 10.0), max(rate / 100.0, rate * 10.0)
 
 
 def _searched(problem: CurveProblem, effects: Sequence[CurveEffect], place: int) -> CurveEffect:

@@ -17,6 +17,7 @@ import numpy as np
 
 from monitor.effects import context_of
 from monitor.exceptions import DataError
+from monitor.machine import Chain
 from monitor.methods.free_form_axes import WORKPIECE_CONDITIONS, all_conditions, at, base_texts, plane_of
 from monitor.methods.free_form_problem import FreeFormProblem
 from monitor.methods.free_form_rank import nullity, reason_of
@@ -33,6 +34,13 @@ DEFAULT_MODEL = Model("free-form")
 FEWEST_ANGLES = 3
 # A reading so far from nominal is no error of shape or machine: the frame, a sign or a target is another one.
 FARTHEST_OFF = 5.0
+
+
+def base_effects(chain: Chain) -> tuple[str, ...]:
+    """What is free in every run; the nodes of the tables are those of each campaign."""
+    plane = plane_of(chain)
+    tables = [f"{symbol}:table" for symbol in (*plane.axis_terms, *plane.table_terms)]
+    return (*tables, plane.squareness, "shape")
 
 
 def angles_of(campaign: Campaign, table: str) -> tuple[float, ...]:

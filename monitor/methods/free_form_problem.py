@@ -7,9 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from monitor.effects import parse_effect
+from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.artefact import normals_of
-from monitor.effects.effect import ChainBasis
 from monitor.effects.shapes import nodes_text
 from monitor.machine import Evaluation, Term, evaluate, parse_term
 from monitor.methods.free_form_axes import WORKPIECE_CONDITIONS, Plane, all_conditions, at
@@ -49,15 +48,21 @@ class FreeFormProblem(ChainProblem):
         _, first = np.unique(self._run, return_index=True)
         return self.known[first, None].copy()
 
-    @cached_property
-    def _length_effect(self) -> tuple[Term, Array]:
-        """Which error is the known one, and the part of it (n,) that acts at every probing."""
+    @property
+    def known_errors(self) -> tuple[tuple[ChainEffect, str], ...]:
+        """The known error, at its node."""
         symbol, _, rest = self.length.parameter.partition("(")
         chain = self.context.chain
         nodes = self.nodes[chain.joints[parse_term(symbol, chain).joint].name]
         only = nodes_text(nodes, [place for place in nodes if at("", place) != f"({rest}"])
-        basis = parse_effect(f"{symbol}:{only}", chain).basis(self.context)
-        assert isinstance(basis, ChainBasis)
+        effect = parse_effect(f"{symbol}:{only}", chain)
+        assert isinstance(effect, ChainEffect)
+        return ((effect, self.length.parameter),)
+
+    @cached_property
+    def _length_effect(self) -> tuple[Term, Array]:
+        """Which error is the known one, and the part of it (n,) that acts at every probing."""
+        basis = self.known_errors[0][0].basis(self.context)
         return basis.term, basis.columns[:, 0]
 
     @property
@@ -148,7 +153,7 @@ class FreeFormProblem(ChainProblem):
         return evaluate(self.context.chain, nominal.context.positions, none, *ends, jacobian=True)
 
     @cached_property
-    def _as_read(self) -> Array:
+    def as_read(self) -> Array:
         """What the readings tell (n, 1) in mm of a machine and workpiece without errors, exactly (Eq. 3)."""
         none = np.zeros((len(self.context), len(self.context.chain.joints), 2, 6))
         ends = self.ends(self.own_start)
@@ -176,7 +181,7 @@ class FreeFormProblem(ChainProblem):
 
     def vectors(self, local: Array, common: Array) -> Array:
         """Residuals (n, 1) in mm: what was read, and what the errors do to it at the nominal points (Eq. 14)."""
-        found: Array = self._as_read + np.einsum("nip,np->ni", self._rows, local[self._run])
+        found: Array = self.as_read + np.einsum("nip,np->ni", self._rows, local[self._run])
         seen, place = self._at_nominal, 0
         assert seen.by_error is not None
         for added in self.shared:

@@ -19,14 +19,14 @@ class Model:
     base: tuple[str, ...] = ()
     added: tuple[str, ...] = ()
 
-    def base_of(self, chain: Chain) -> tuple[ChainEffect | ArtefactEffect, ...]:
-        """The effects that are free in every run."""
-        return tuple(parse_effect(text, chain) for text in (self.base or base_effects(chain)))
+    def base_of(self, chain: Chain, outside: bool | None = None) -> tuple[ChainEffect | ArtefactEffect, ...]:
+        """The effects that are free in every run; ``outside`` as for ``base_effects``."""
+        return tuple(parse_effect(text, chain) for text in (self.base or base_effects(chain, outside)))
 
-    def added_to(self, chain: Chain) -> tuple[ChainEffect | ArtefactEffect, ...]:
+    def added_to(self, chain: Chain, outside: bool | None = None) -> tuple[ChainEffect | ArtefactEffect, ...]:
         """The effects that all runs share; EffectError where one is in the base already or named twice."""
         effects = tuple(parse_effect(text, chain) for text in self.added)
-        texts = [effect.text for effect in (*self.base_of(chain), *effects)]
+        texts = [effect.text for effect in (*self.base_of(chain, outside), *effects)]
         twice = sorted({text for text in texts if texts.count(text) > 1})
         if twice:
             raise EffectError(f"model {self.name} has {twice[0]} already; name an effect once")

@@ -122,6 +122,11 @@ class ChainProblem(ABC):
         return None
 
     @property
+    def known_errors(self) -> tuple[tuple[ChainEffect, str], ...]:
+        """Errors of the machine that are own unknowns, because they were measured by other means: effect and name."""
+        return ()
+
+    @property
     def largest_error(self) -> float:
         """The location angle (rad) or gain from which on the readings contradict the machine file."""
         return LARGEST_ERROR

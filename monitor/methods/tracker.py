@@ -52,8 +52,8 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     return TrackingProblem(
         context=replace(context, nominal=carried),
-        base=model.base_of(chain),
-        added=model.added_to(chain),
+        base=model.base_of(chain, outside=True),
+        added=model.added_to(chain, outside=True),
         sigma=np.full((len(context), 3), campaign.probe.standard_uncertainty),
         reflectors=tuple((float(x), float(y), float(z)) for x, y, z in places),
         fixed=fixed,

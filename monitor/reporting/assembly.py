@@ -13,16 +13,14 @@ from monitor.exceptions import NotFoundError
 from monitor.records import Campaign, Machine, Run
 from monitor.reporting.certificate import CertificateRecord, Condition, Item, MethodUsed, Reference
 from monitor.reporting.laboratory import LaboratoryFile
-from monitor.reporting.numbers import decimal_of, written
+from monitor.reporting.numbers import decimal_of
 from monitor.reporting.results import ResultSet
+from monitor.reporting.texts import ENGLISH, Texts, texts_of
+from monitor.reporting.volumetric_result import VolumetricResult
 from monitor.units import COLUMN_UNITS
 
 #: What a condition's name says in words; other names are printed as recorded.
-_CONDITION_WORDS = {
-    "ambient_degC": "ambient temperature",
-    "humidity_percent": "relative humidity",
-    "pressure_hPa": "air pressure",
-}
+_CONDITION_WORDS = {"ambient_degC": "ambient", "humidity_percent": "humidity", "pressure_hPa": "pressure"}
 
 
 def certificate_record(
@@ -35,15 +33,17 @@ def certificate_record(
     issued_on: date | None,
     model: str | None,
     method_name: str | None = None,
+    volumetric: Sequence[VolumetricResult] = (),
 ) -> CertificateRecord:
     """The record for one run of a campaign. ``model`` is the stored model's name and version.
 
-    ``method_name`` replaces the campaign's word for its method. Nothing is checked here: see
-    ``check_complete``. Raises NotFoundError where the campaign has no such run.
+    ``method_name`` replaces the campaign's word for its method. The words around the numbers are in the laboratory's
+    language. Nothing is checked here: see ``check_complete``. Raises NotFoundError where the campaign has no such run.
     """
     chosen = _run_of(campaign, run)
     day = chosen.started_at.date()
     machine = campaign.machine
+    texts = texts_of(laboratory.language or ENGLISH)
     return CertificateRecord(
         title=laboratory.title,
         laboratory=laboratory.laboratory,
@@ -57,8 +57,8 @@ def certificate_record(
             software=f"machine-health-monitor {__version__}",
         ),
         item=Item(
-            description=laboratory.item_description or _description(machine),
-            identification=laboratory.item_identification or _identification(machine),
+            description=laboratory.item_description or _description(machine, texts),
+            identification=laboratory.item_identification or _identification(machine, texts),
             condition=laboratory.item_condition,
         ),
         received_on=laboratory.received_on,
@@ -71,14 +71,16 @@ def certificate_record(
         authorised_by=laboratory.authorised_by,
         external_results=laboratory.external_results,
         reproduction=laboratory.reproduction,
-        conditions=_conditions(campaign, chosen),
+        conditions=_conditions(campaign, chosen, texts),
         traceability=laboratory.traceability,
-        references=_references(laboratory, campaign),
+        references=_references(laboratory, campaign, texts),
         adjustment=laboratory.adjustment,
         conformity=laboratory.conformity,
         opinions=laboratory.opinions,
         accreditation=laboratory.accreditation,
         country=laboratory.country,
+        volumetric=tuple(volumetric),
+        language=texts.language,
     )
 
 
@@ -90,40 +92,52 @@ def _run_of(campaign: Campaign, run: int) -> Run:
     raise NotFoundError(f"campaign {campaign.name} has no run {run}; it has {there}")
 
 
-def _description(machine: Machine) -> str:
+def _description(machine: Machine, texts: Texts) -> str:
     """Maker and model where the campaign names them, and always the chain that was calibrated."""
-    maker = [machine.manufacturer or "", machine.model or ""]
-    return ", ".join(filter(None, [" ".join(filter(None, maker)), f"chain {machine.topology}"]))
+    maker = " ".join(filter(None, [machine.manufacturer, machine.model]))
+    return ", ".join(filter(None, [maker, texts("record.chain", topology=machine.topology)]))
 
 
-def _identification(machine: Machine) -> str:
-    return f"{machine.id}, serial number {machine.serial_number}" if machine.serial_number else machine.id
+def _identification(machine: Machine, texts: Texts) -> str:
+    if not machine.serial_number:
+        return machine.id
+    return texts("record.serial_number", id=machine.id, serial=machine.serial_number)
 
 
-def _conditions(campaign: Campaign, run: Run) -> tuple[Condition, ...]:
+def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, ...]:
     recorded = [
-        Condition(_CONDITION_WORDS.get(name, _in_words(name)), _with_unit(name, value))
+        Condition(
+            texts(f"record.{_CONDITION_WORDS[name]}") if name in _CONDITION_WORDS else _in_words(name),
+            _with_unit(name, value, texts),
+        )
         for name, value in run.conditions.items()
     ]
     offset = run.started_at.strftime("%z")
-    start = f"{run.started_at:%Y-%m-%d %H:%M} (UTC{offset[:3]}:{offset[3:5]})" if offset else None
-    state = "warming up" if run.warm_up else "run not marked as warm-up"
-    touched = int((campaign.probings.run == run.run).sum())
-    return (
-        Condition(
-            "run", f"{run.run} of campaign {campaign.name}, day {run.day}, begun {start}" if start else None
-        ),
-        Condition("machine", state),
-        *recorded,
-        Condition("plan", f"{touched} probings of {_targets(campaign, run)}"),
-        Condition("artefact", campaign.artefact.id),
+    start = texts(
+        "record.run_of",
+        run=run.run,
+        campaign=campaign.name,
+        day=run.day,
+        start=f"{texts.day(run.started_at.date())} {run.started_at:%H:%M}",
+        offset=f"{offset[:3]}:{offset[3:5]}",
     )
-
-
-def _targets(campaign: Campaign, run: Run) -> str:
-    if campaign.artefact.balls:
-        return f"{len(campaign.artefact.balls)} balls"
-    return f"{len(set(campaign.probings.target[campaign.probings.run == run.run].tolist()))} targets"
+    touched = int((campaign.probings.run == run.run).sum())
+    balls = len(campaign.artefact.balls)
+    targets = len(set(campaign.probings.target[campaign.probings.run == run.run].tolist()))
+    plan = (
+        texts("record.plan_of", probings=touched, balls=balls)
+        if balls
+        else texts("record.plan_of_targets", probings=touched, targets=targets)
+    )
+    return (
+        Condition(texts("record.run"), start if offset else None),
+        Condition(
+            texts("record.machine"), texts("record.warming_up" if run.warm_up else "record.not_warming_up")
+        ),
+        *recorded,
+        Condition(texts("record.plan"), plan),
+        Condition(texts("record.artefact"), campaign.artefact.id),
+    )
 
 
 def _in_words(name: str) -> str:
@@ -131,19 +145,19 @@ def _in_words(name: str) -> str:
     return (stem if stem and suffix in COLUMN_UNITS else name).replace("_", " ")
 
 
-def _with_unit(name: str, value: float) -> str:
+def _with_unit(name: str, value: float, texts: Texts) -> str:
     stem, _, suffix = name.rpartition("_")
     unit = COLUMN_UNITS.get(suffix) if stem else None
-    number = written(decimal_of(value, name))
+    number = texts.number(decimal_of(value, name))
     return f"{number}\N{NO-BREAK SPACE}{unit.name}" if unit else number
 
 
-def _references(laboratory: LaboratoryFile, campaign: Campaign) -> tuple[Reference, ...]:
+def _references(laboratory: LaboratoryFile, campaign: Campaign, texts: Texts) -> tuple[Reference, ...]:
     probe, bar = campaign.probe, campaign.artefact.scale_bar
-    found = [Reference(f"probe {probe.id} ({probe.model})", probe.certificate or laboratory.probe)]
+    name = texts("record.probe", id=probe.id, model=probe.model)
+    found = [Reference(name, probe.certificate or laboratory.probe)]
     if bar is not None:
-        balls = " and ".join(bar.balls)
-        found.insert(
-            0, Reference(f"scale bar between balls {balls}", bar.certificate or laboratory.scale_bar)
-        )
+        first, second = bar.balls
+        name = texts("record.bar", first=first, second=second)
+        found.insert(0, Reference(name, bar.certificate or laboratory.scale_bar))
     return tuple(found)

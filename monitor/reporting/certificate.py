@@ -14,6 +14,8 @@ from datetime import date
 
 from monitor.exceptions import InputError
 from monitor.reporting.results import ResultSet
+from monitor.reporting.texts import ENGLISH
+from monitor.reporting.volumetric_result import VolumetricResult
 
 _EITHER = " or that it does not apply"
 
@@ -99,6 +101,16 @@ class ConformityStatement:
 
 
 @dataclass(frozen=True)
+class Replaced:
+    """The certificate that this one replaces, why, and the SHA-256 of its document (7.8.8.1 and 7.8.8.3)."""
+
+    number: str | None
+    issued_on: date | None
+    reason: str | None
+    sha256: str | None
+
+
+@dataclass(frozen=True)
 class MissingItem:
     """An item that the certificate lacks: the clause, what it is, and what of it is missing (may be empty)."""
 
@@ -148,15 +160,22 @@ ITEMS: Mapping[str, tuple[str, str]] = {
     "opinions": ("7.8.4.1 f", "opinions and interpretations" + _EITHER),
 }
 
+#: What only a certificate that replaces another has to say.
+AMENDMENT = ("7.8.8.1 and 7.8.8.3", "reference to the certificate that it replaces, with the reason")
+
 
 @dataclass(frozen=True, kw_only=True)
 class CertificateRecord:
     """One certificate. Nothing in it is computed here, nothing is filled in.
 
+    What the laboratory says in words is in its own ``language`` (ISO 639-1), and so is what is printed around it.
+    A ``ConformityVerdict`` keeps the English word, which is translated where it is printed.
+
     ``performed_on`` are the first and last day of the calibration. ``ITEMS`` names the clause
     that asks for each field. ``accreditation`` is printed where a laboratory has one;
     ``country`` (ISO 3166-1, two letters) is what a digital certificate asks for besides.
-    ``replaces`` names the certificate that this one amends, and why (7.8.8.3).
+    ``replaces`` is the certificate that this one amends. ``volumetric`` maps follow from the ``results``; they are
+    printed where one was asked for.
     """
 
     title: str | None
@@ -184,7 +203,9 @@ class CertificateRecord:
     opinions: str | NotApplicable | None
     accreditation: str | None = None
     country: str | None = None
-    replaces: str | None = None
+    replaces: Replaced | None = None
+    volumetric: tuple[VolumetricResult, ...] = ()
+    language: str = ENGLISH
 
 
 def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
@@ -192,6 +213,8 @@ def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
     found: list[MissingItem] = []
     for name, (clause, item) in ITEMS.items():
         found += [MissingItem(clause, item, part) for part in _gaps(getattr(record, name))]
+    if record.replaces is not None:
+        found += [MissingItem(*AMENDMENT, part) for part in _gaps(record.replaces)]
     return tuple(found)
 
 

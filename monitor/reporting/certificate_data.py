@@ -12,9 +12,12 @@ from typing import Any, Literal
 import numpy as np
 
 from monitor.reporting.certificate import CertificateRecord
+from monitor.reporting.certificate_volumetric import POINTS_FILE
 from monitor.reporting.dcc import dcc_xml
 from monitor.reporting.documents import to_document
 from monitor.reporting.results import ResultSet
+from monitor.reporting.texts import texts_of
+from monitor.reporting.volumetric_result import VolumetricResult
 
 
 @dataclass(frozen=True)
@@ -30,26 +33,32 @@ class Attached:
 def certificate_files(
     record: CertificateRecord, inputs: Mapping[str, Any] | None = None
 ) -> tuple[Attached, ...]:
-    """The whole record as JSON, and for every result set the estimates and the covariance as CSV.
+    """The whole record as JSON; for every result set the estimates and the covariance as CSV, for every map its points.
 
     A record that names the laboratory's country has its digital calibration certificate beside them. ``inputs``
     say what the results were computed from (hashes of the raw files, model, software).
     """
+    texts = texts_of(record.language)
     whole = {"certificate": to_document(record), "inputs": dict(inputs or {})}
     text = json.dumps(whole, ensure_ascii=False, allow_nan=False, indent=1)
-    files = [Attached("certificate.json", text.encode(), "the record of this certificate", "Source")]
+    files = [Attached("certificate.json", text.encode(), texts("files.record"), "Source")]
     if record.country is not None:
-        files.append(
-            Attached("certificate.dcc.xml", dcc_xml(record), "digital calibration certificate", "Alternative")
-        )
+        files.append(Attached("certificate.dcc.xml", dcc_xml(record), texts("files.dcc"), "Alternative"))
     for place, result in enumerate(record.results or (), start=1):
-        files.append(Attached(f"results-{place}.csv", _estimates(result), f"results, {result.state}", "Data"))
-        files.append(
-            Attached(
-                f"covariance-{place}.csv", _covariance(result), f"covariance matrix, {result.state}", "Data"
-            )
-        )
+        words = texts("files.results", state=result.state)
+        files.append(Attached(f"results-{place}.csv", _estimates(result), words, "Data"))
+        words = texts("files.covariance", state=result.state)
+        files.append(Attached(f"covariance-{place}.csv", _covariance(result), words, "Data"))
+    for place, found in enumerate(record.volumetric, start=1):
+        words = texts("files.map", state=found.state)
+        files.append(Attached(POINTS_FILE.format(place=place), _points(found), words, "Data"))
     return tuple(files)
+
+
+def _points(found: VolumetricResult) -> bytes:
+    head = [f"{axis}_mm" for axis in found.axes] + ["error_x_um", "error_y_um", "error_z_um", "expanded_um"]
+    numbers = np.column_stack([found.readings_mm, found.vectors_um, found.expanded_um])
+    return _table([head, *([repr(float(number)) for number in row] for row in numbers)])
 
 
 def _estimates(result: ResultSet) -> bytes:

@@ -18,6 +18,7 @@ from typing import Any
 from matplotlib import rc_context, rcdefaults, rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import ScalarFormatter
 
 from monitor.exceptions import InputError
 
@@ -102,6 +103,25 @@ def caption(figure: Figure, text: str) -> None:
     figure.supxlabel(
         textwrap.fill(_kept_together(text), letters), x=0.008, ha="left", fontsize=_CAPTION_SIZE, color=INK
     )
+
+
+class _Decimals(ScalarFormatter):
+    """Numbers along an axis with the decimal sign of a language; the locale of the machine takes no part."""
+
+    def __init__(self, sign: str) -> None:
+        super().__init__()
+        self._sign = sign
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return str(super().__call__(x, pos)).replace(".", self._sign)
+
+
+def decimal_sign(axes: Axes, sign: str) -> None:
+    """Write the numbers along both axes with another decimal sign than the point."""
+    if sign != ".":
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), ScalarFormatter):  # not where words stand
+                axis.set_major_formatter(_Decimals(sign))
 
 
 def zero_line(axes: Axes, *, vertical: bool = False) -> None:

@@ -24,6 +24,7 @@ from monitor.reporting.figure_style import (
     style,
     zero_line,
 )
+from monitor.reporting.figure_style import decimal_sign as set_decimal_sign
 
 _ROW_MM = 3.9
 
@@ -37,6 +38,7 @@ def parameter_intervals(
     title: str = "",
     tolerances: npt.ArrayLike | None = None,
     width_mm: float = PAGE_WIDTH_MM / 2,
+    decimal_sign: str = ".",
 ) -> Figure:
     """Estimates (m,) with intervals of half-width ``expanded`` (m,), one panel a unit.
 
@@ -77,6 +79,7 @@ def parameter_intervals(
             axes.spines["left"].set_visible(False)
             axes.grid(axis="y", color=FAINT, linewidth=3.0)
             axes.margins(x=0.06)
+            set_decimal_sign(axes, decimal_sign)
     return figure
 
 

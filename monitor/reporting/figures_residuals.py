@@ -19,10 +19,12 @@ from monitor.reporting.figure_style import (
     PAGE_WIDTH_MM,
     PALE,
     caption,
+    decimal_sign,
     new_figure,
     reference_line,
     style,
 )
+from monitor.reporting.texts import Texts, texts_of
 
 #: A residual's arrow: the longest is this part of the workspace's longest edge.
 _LONGEST_ARROW = 0.2
@@ -36,15 +38,17 @@ def residual_bars(
     title: str = "",
     width_mm: float = PAGE_WIDTH_MM,
     height_mm: float = 62.0,
+    texts: Texts | None = None,
 ) -> Figure:
     """RMS residuals in µm as bars, one panel a grouping: ``{"target": (labels, rms_um), ...}``.
 
     ``level_um`` is the probe's repeatability or stated uncertainty, drawn as a line named ``level_name``.
-    Bars above twice the level are marked.
+    Bars above twice the level are marked. The words around them are those of ``texts``, English without.
     """
     if not groups:
         raise DataError("groups is empty; a grouping such as 'target' with its labels and RMS is needed")
     counts = [max(len(labels), 3) for labels, _ in groups.values()]
+    say = texts or texts_of()
     with style():
         figure = new_figure(width_mm, height_mm, title)
         marked = False
@@ -70,16 +74,18 @@ def residual_bars(
             fitting = 30 * len(labels) / sum(counts) * width_mm / PAGE_WIDTH_MM * room
             step = max(1, math.ceil(len(labels) / max(2 if room < 1.0 else 4, fitting)))
             axes.set_xticks(np.arange(len(labels))[::step], list(labels)[::step])
-            axes.set_xlabel(f"by {kind}", labelpad=2)
+            axes.set_xlabel(say("figures.by", kind=kind), labelpad=2)
             axes.grid(axis="y", color=PALE, linewidth=0.4)
             axes.margins(x=0.02 if len(labels) > 8 else 0.08)
             if level_um is not None:
                 reference_line(axes, level_um)
             marked = marked or bool(np.any(high))
         if level_um is not None:
-            more = "; hatched: more than twice as large" if marked else ""
-            caption(figure, f"dashed: {level_name}, {level_um:.2g} µm{more}")
-        panels[0].set_ylabel("RMS residual / µm")
+            more = say("figures.hatched") if marked else ""
+            level = f"{level_um:.2g}".replace(".", say.decimal_sign)
+            caption(figure, say("figures.dashed", name=level_name, level=level) + more)
+        panels[0].set_ylabel(say("figures.residual_axis"))
+        decimal_sign(panels[0], say.decimal_sign)
         top = max(float(np.nanmax(np.asarray(rms, dtype=np.float64))) for _, rms in groups.values())
         panels[0].set_ylim(0.0, 1.18 * max(top, level_um or 0.0) or 1.0)
     return figure

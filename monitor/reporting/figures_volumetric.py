@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -19,12 +21,16 @@ from monitor.reporting.figure_style import (
     ORANGE,
     PAGE_WIDTH_MM,
     caption,
+    decimal_sign,
     new_figure,
     style,
 )
+from monitor.reporting.texts import Texts, texts_of
 
 #: From paper to blue: the darker, the larger, in grey too.
 _LENGTHS = LinearSegmentedColormap.from_list("lengths", ["#ffffff", "#8fb0cf", BLUE])
+#: The same without colour, light enough for the arrows to stay visible.
+_GREYS = LinearSegmentedColormap.from_list("greys", ["#ffffff", "#9a9a9a"])
 #: Numbers are written at so many nodes of a slice, the corners and the middle of a grid of three.
 _NUMBERS = 3
 
@@ -37,11 +43,14 @@ def volumetric_slices(
     names: Sequence[str],
     title: str,
     note: str = "",
+    texts: Texts | None = None,
+    grey: bool = False,
 ) -> Figure:
     """Three slices through the middle of a regular grid of points (n, 3), one across each axis.
 
     ``vectors_um`` (n, 3) is the error along the machine's axes, ``expanded_um`` (n,) the expanded uncertainty of its
-    length. Colour is the length of the error, arrows are its part in the slice.
+    length. Colour is the length of the error (grey bands in a ``grey`` figure), arrows are its part in the slice. The
+    words are those of ``texts``, English without.
     """
     places = np.asarray(readings_mm, dtype=np.float64)
     vectors = np.asarray(vectors_um, dtype=np.float64)
@@ -61,17 +70,35 @@ def volumetric_slices(
     lengths = np.linalg.norm(cube, axis=-1)
     longest = float(lengths.max())
     scale = Normalize(0.0, longest if longest > 0.0 else 1.0)
+    say = texts or texts_of()
+    bands = np.asarray(MaxNLocator(8).tick_values(0.0, float(scale.vmax or 1.0))) if grey else None
+    look = _Look(_GREYS if grey else _LENGTHS, scale, say, bands)
     with style():
-        figure = new_figure(PAGE_WIDTH_MM, 86.0, title)
+        figure = new_figure(PAGE_WIDTH_MM, 86.0 if title else 62.0, title)
         panels = figure.subplots(1, 3)
         for across, axes in zip((2, 1, 0), panels, strict=True):
-            _slice(axes, across, levels, cube, lengths, spread, scale, names)
+            _slice(axes, across, levels, cube, lengths, spread, look, names)
         colours = figure.colorbar(panels[0].collections[0], ax=list(panels), shrink=0.8, aspect=24, pad=0.015)
-        colours.set_label("length of the error / µm")
+        colours.set_label(say("figures.length"))
+        decimal_sign(colours.ax, say.decimal_sign)
         colours.outline.set_linewidth(0.4)
         if note:
             caption(figure, note)
     return figure
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What all slices share: the colours of a length, their scale, the words.
+
+    With ``bands`` lengths are drawn as areas between these: lines and areas only, since a picture smoothed by the
+    reader (``/Interpolate``) has no place in PDF/A (ISO 19005-3:2012, 6.2.8).
+    """
+
+    colours: LinearSegmentedColormap
+    scale: Normalize
+    say: Texts
+    bands: Array | None
 
 
 def _slice(
@@ -81,7 +108,7 @@ def _slice(
     cube: Array,
     lengths: Array,
     spread: Array,
-    scale: Normalize,
+    look: _Look,
     names: Sequence[str],
 ) -> None:
     along = [axis for axis in range(3) if axis != across]
@@ -90,7 +117,12 @@ def _slice(
     flat = np.take(lengths, middle, axis=across)
     part = np.take(cube, middle, axis=across)
     sure = np.take(spread, middle, axis=across)
-    axes.pcolormesh(first, second, flat.T, cmap=_LENGTHS, norm=scale, shading="gouraud", rasterized=True)
+    if look.bands is not None:
+        axes.contourf(first, second, flat.T, levels=look.bands, cmap=look.colours)
+    else:
+        axes.pcolormesh(
+            first, second, flat.T, cmap=look.colours, norm=look.scale, shading="gouraud", rasterized=True
+        )
     x, y = np.meshgrid(first, second, indexing="ij")
     longest = float(np.abs(np.linalg.norm(cube, axis=-1)).max())
     length = 0.16 * max(np.ptp(first), np.ptp(second)) / (longest if longest > 0.0 else 1.0)
@@ -101,10 +133,11 @@ def _slice(
     picks = [np.unique(np.linspace(0, len(level) - 1, _NUMBERS).astype(int)) for level in (first, second)]
     for i in picks[0]:
         for j in picks[1]:
+            number = f"±{sure[i, j]:.1f}".replace(".", look.say.decimal_sign)
             axes.annotate(
-                f"±{sure[i, j]:.1f}", (first[i], second[j]), xytext=(0, -7), textcoords="offset points",
+                number, (first[i], second[j]), xytext=(0, -7), textcoords="offset points",
                 ha="center", va="top", fontsize=5.5, color=INK, zorder=5,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75},
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
             )  # fmt: skip
     room = [0.18 * float(np.ptp(level)) for level in (first, second)]
     axes.set_xlim(float(first[0]) - room[0], float(first[-1]) + room[0])

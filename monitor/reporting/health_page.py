@@ -201,11 +201,12 @@ def _drift(one: ParameterHealth) -> str:
     slope, low, high = (
         in_words(value, u, sign=True)[0] for value in (one.drift.per_year, *one.drift.between)
     )
-    words = f"trend {slope} {one.unit} a year ({low} to {high})"
+    words = f"{slope} ({low} to {high}) {one.unit}/year"
     if one.drift.crosses_at is not None:
         first, last = one.drift.crosses_between
-        ends = f", between {first or 'now'} and {last or 'never'}" if first or last else ""
-        words += f"; reaches the tolerance about {one.drift.crosses_at}{ends}"
+        when = f" ({first} at the earliest)" if first else ""
+        when = f" ({first} to {last})" if first and last else when
+        words += f"; tolerance reached about {one.drift.crosses_at}{when}"
     return words
 
 

@@ -15,10 +15,11 @@ from typing import Any
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate import NotApplicable, Party, Person
+from monitor.reporting.texts import languages
 
 #: Every section and its keys.
 SECTIONS: Mapping[str, tuple[str, ...]] = {
-    "laboratory": ("name", "address", "contact", "accreditation", "country"),
+    "laboratory": ("name", "address", "contact", "accreditation", "country", "language"),
     "customer": ("name", "address", "contact"),
     "item": ("description", "identification", "condition", "place", "received_on"),
     "method": ("document",),
@@ -85,6 +86,7 @@ class LaboratoryFile:
     opinions: Statement | None
     authorised_by: tuple[Person, ...] | None
     country: str | None = None
+    language: str | None = None
 
 
 def read_laboratory(path: str | Path) -> LaboratoryFile:
@@ -109,6 +111,7 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         customer=_party("customer", found),
         accreditation=found.get("laboratory.accreditation"),
         country=found.get("laboratory.country"),
+        language=found.get("laboratory.language"),
         item_description=found.get("item.description"),
         item_identification=found.get("item.identification"),
         item_condition=found.get("item.condition"),
@@ -174,6 +177,10 @@ def _answer(name: str, value: Any, faults: list[str]) -> Any:
         if isinstance(value, date) and not isinstance(value, datetime):
             return value
         faults.append(f"{name} is a date without quotes, for example 2026-03-02, but is {value!r}")
+    elif name == "laboratory.language":
+        if value in languages():
+            return value
+        faults.append(f"{name} is one of {', '.join(languages())}, but is {value!r}")
     elif isinstance(value, str):
         return value
     else:

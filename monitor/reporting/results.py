@@ -16,6 +16,7 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.symbols import describe
+from monitor.reporting.texts import Texts
 from monitor.units import Unit
 
 
@@ -121,10 +122,12 @@ def result_set(
     trials: int | None = None,
     validation: str | None = None,
     tolerances: Mapping[str, float] | None = None,
+    texts: Texts | None = None,
 ) -> ResultSet:
     """A result to print from ``estimate`` (m,) and ``covariance`` (m, m) in internal units.
 
     Parameters named in ``refused`` are left out of the numbers. ``tolerances`` are in display units by name.
+    What has no word in ``descriptions`` is described in the language of ``texts`` (English without).
     Raises DataError where shapes differ, a number is not finite, a factor is not positive or a variance is
     not positive: such a result cannot be certified.
     """
@@ -150,7 +153,7 @@ def result_set(
     return ResultSet(
         state=state,
         names=chosen,
-        descriptions=tuple(words.get(name, describe(name)) for name in chosen),
+        descriptions=tuple(words.get(name, describe(name, texts)) for name in chosen),
         units=tuple(units[place].name for place in kept),
         estimate=shown,
         covariance=spread,

@@ -1,7 +1,6 @@
-"""Electronic signatures on certificates: PAdES baseline B-B (ETSI EN 319 142-1:2016, 6) by pyHanko, an optional extra.
+"""What a certificate's electronic signature says: does it cover the whole file, fit it, and lead to a trusted one?
 
-The signature is appended to the PDF, which stays as it was below it: PDF/A, its attachments, every byte. It
-certifies the document: no change is allowed afterwards.
+By pyHanko, an optional extra. Making signatures is ``signing``.
 """
 
 from __future__ import annotations
@@ -14,9 +13,8 @@ from typing import Any
 
 from monitor.exceptions import InputError
 
-_FIELD = "Signature"
-#: Where the signature's own bytes are kept; a certificate chain of three with RSA 4096 needs about 12 000.
-_ROOM_BYTES = 32_768
+#: Any of these bytes says that a file carries a signature, or did before somebody changed it.
+_MARKS = (b"/ByteRange", b"/ETSI.CAdES.detached", b"/Adobe.PPKLite", b"/Type /Sig")
 
 
 @dataclass(frozen=True)
@@ -28,34 +26,9 @@ class SignatureFinding:
     faults: tuple[str, ...]
 
 
-def sign(pdf: bytes, key_file: Path, passphrase: str | None) -> bytes:
-    """The PDF with a signature by the key and certificates of a PKCS#12 file.
-
-    Raises InputError where pyHanko is not installed, or the file cannot be read or opened with the passphrase.
-    """
-    _needed()
-    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
-    from pyhanko.sign import fields, signers
-
-    try:
-        content = key_file.read_bytes()
-    except OSError as error:
-        raise InputError(f"the key file {key_file} cannot be read: {error.strerror or error}") from error
-    signer = _signer(signers, content, passphrase)
-    if signer is None:
-        raise InputError(f"{key_file} is no PKCS#12 file with a key, or its passphrase is another")
-    meta = signers.PdfSignatureMetadata(
-        field_name=_FIELD,
-        md_algorithm="sha256",
-        subfilter=fields.SigSeedSubFilter.PADES,
-        certify=True,
-        docmdp_permissions=fields.MDPPerm.NO_CHANGES,
-    )
-    out = io.BytesIO()
-    signers.sign_pdf(
-        IncrementalPdfFileWriter(io.BytesIO(pdf)), meta, signer=signer, output=out, bytes_reserved=_ROOM_BYTES
-    )
-    return out.getvalue()
+def is_signed(pdf: bytes) -> bool:
+    """Whether a file carries a signature, whole or broken."""
+    return any(mark in pdf for mark in _MARKS)
 
 
 def check_signature(pdf: bytes, trusted: Path | None = None) -> SignatureFinding:
@@ -65,7 +38,7 @@ def check_signature(pdf: bytes, trusted: Path | None = None) -> SignatureFinding
     said of who signed beyond the name in the certificate. Never raises for the file's own faults: they are the
     finding. Raises InputError where pyHanko is not installed or ``trusted`` cannot be read.
     """
-    _needed()
+    need_pyhanko()
     from pyhanko.pdf_utils.reader import PdfFileReader
     from pyhanko.sign.validation import validate_pdf_signature
     from pyhanko.sign.validation.status import SignatureCoverageLevel
@@ -77,7 +50,9 @@ def check_signature(pdf: bytes, trusted: Path | None = None) -> SignatureFinding
     try:
         found = PdfFileReader(io.BytesIO(pdf)).embedded_signatures
         if not found:
-            return SignatureFinding(None, None, ())
+            lost = is_signed(pdf)
+            words = ("the file carries a signature that is no field of it any more: altered",) if lost else ()
+            return SignatureFinding(False if lost else None, None, words)
         (one,) = found
         status = validate_pdf_signature(one, signer_validation_context=context)
         signer = one.signer_cert.subject.human_friendly
@@ -116,21 +91,12 @@ def _room_is_clean(pdf: bytes, covered: list[int]) -> bool:
     return room[:1] == b"<" and room[-1:] == b">" and digits in (exact, exact.upper())
 
 
-def _needed() -> None:
+def need_pyhanko() -> None:
+    """Raise InputError, with what to type, where the extra is not installed."""
     try:
         import pyhanko  # noqa: F401
     except ImportError as error:
         raise InputError("signatures need pyHanko: pip install 'machine-health-monitor[sign]'") from error
-
-
-def _signer(signers: Any, content: bytes, passphrase: str | None) -> Any:
-    logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
-    try:
-        return signers.SimpleSigner.load_pkcs12_data(
-            content, other_certs=[], passphrase=None if passphrase is None else passphrase.encode()
-        )
-    except Exception:  # the library below raises by kind of fault; all mean the same to the user
-        return None
 
 
 def _context(trusted: Path | None) -> Any:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from monitor.reporting.texts import Texts, texts_of
+
 #: Direction letter of a symbol: the axis of the machine frame, and whether the error turns.
 _DIRECTIONS = {
     "X": ("X", False),
@@ -13,47 +15,55 @@ _DIRECTIONS = {
     "B": ("Y", True),
     "C": ("Z", True),
 }
+#: An error of a table at a place, ``EXX(-88)``, and a point of a shape, ``shape(W7)``.
+_AT = re.compile(r"(?P<symbol>E[XYZABC]0?(?P<axis>[XYZUVWABC]\d*))\((?P<place>[^()]+)\)")
+_SHAPE = re.compile(r"shape\((?P<point>.+)\)")
 _SYMBOL = re.compile(r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*)(?::(?P<rest>.+))?")
 
 
-def describe(symbol: str) -> str:
+def describe(symbol: str, texts: Texts | None = None) -> str:
     """A symbol such as ``EA0B``, ``EXX`` or ``EYX:poly2`` in words; a symbol of another kind stays as it is.
 
     Location errors after ISO 230-1:2012 3.7 (orientation and position of an axis), error motions after 3.4
-    to 3.6. A first-order positioning error of a linear axis is its gain.
+    to 3.6. A first-order positioning error of a linear axis is its gain. In English without ``texts``.
     """
+    say = texts or texts_of()
+    if (point := _SHAPE.fullmatch(symbol)) is not None:
+        return say("terms.shape", point=point["point"])
+    if (at := _AT.fullmatch(symbol)) is not None:
+        unit = "deg" if at["axis"][0] in "ABC" else "mm"
+        plain = describe(f"{at['symbol']}:table", texts).removesuffix(" (table)")
+        return f"{plain} {say(f'terms.at_{unit}', place=at['place'])}"
     match = _SYMBOL.fullmatch(symbol)
     if match is None:
         return symbol
     direction, turns = _DIRECTIONS[match["direction"]]
     axis, rest = match["axis"], match["rest"]
-    if match["location"]:
-        if turns:
-            kind = "zero angle" if match["direction"] == axis[0] else f"orientation about {direction}"
-        else:
-            kind = f"position in {direction}"
-        return f"{kind} of {_named(axis)}{_shape(rest)}"
+    spindle = len(axis) > 1 and axis[0] in "ABC"
+    named = say("terms.spindle" if spindle else "terms.axis", name=axis)
+    kind = (
+        _location(match["direction"], axis, turns)
+        if match["location"]
+        else _motion(match["direction"], axis, turns, rest)
+    )
+    shape = "" if kind == "gain" or not rest else f" ({rest})"
+    return say(f"terms.{kind}", direction=direction, axis=named) + shape
+
+
+def _location(direction: str, axis: str, turns: bool) -> str:
+    if not turns:
+        return "position"
+    return "zero_angle" if direction == axis[0] else "orientation"
+
+
+def _motion(direction: str, axis: str, turns: bool, rest: str | None) -> str:
     rotary = axis[0] in "ABC"
-    if match["direction"] == axis[0]:
+    if direction == axis[0]:
         if not rotary and rest in (None, "poly1"):
-            return f"positioning gain of {_named(axis)}"
-        kind = "angular positioning error" if rotary else "positioning error"
-    elif turns:
-        kind = "roll" if direction == axis[0] else f"tilt about {direction}"
-    elif rotary:
-        kind = (
-            "axial displacement"
-            if "XYZ"["ABC".index(axis[0])] == direction
-            else f"displacement in {direction}"
-        )
-    else:
-        kind = f"straightness error in {direction}"
-    return f"{kind} of {_named(axis)}{_shape(rest)}"
-
-
-def _named(axis: str) -> str:
-    return f"spindle {axis}" if len(axis) > 1 and axis[0] in "ABC" else f"axis {axis}"
-
-
-def _shape(rest: str | None) -> str:
-    return f" ({rest})" if rest else ""
+            return "gain"
+        return "angular_positioning" if rotary else "positioning"
+    if turns:
+        return "roll" if _DIRECTIONS[direction][0] == axis[0] else "tilt"
+    if rotary:
+        return "axial" if "XYZ"["ABC".index(axis[0])] == direction else "displacement"
+    return "straightness"

@@ -11,6 +11,7 @@ from monitor.store.analyses import (
     list_analyses,
     load_analysis,
     save_analysis,
+    stored_analyses,
 )
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
@@ -99,6 +100,7 @@ __all__ = [
     "save_model",
     "save_selection",
     "snapshot",
+    "stored_analyses",
     "take_backup",
     "verify_audit",
 ]

@@ -112,7 +112,31 @@ def load_analysis(
     method: str | None = None,
 ) -> StoredAnalysis:
     """The latest result of a kind; what is named narrows the choice. Raises NotFoundError."""
-    found = db.rows(
+    found = stored_analyses(
+        db, kind, campaign=campaign, machine=machine, run=run, model=model, model_version=model_version,
+        method=method, most=1,
+    )  # fmt: skip
+    if not found:
+        named = [campaign, machine, None if run is None else f"run {run}", model, method]
+        about = ", ".join(name for name in named if name is not None)
+        raise NotFoundError(f"there is no stored {kind} result{' of ' + about if about else ''} yet")
+    return found[0]
+
+
+def stored_analyses(
+    db: Database,
+    kind: str,
+    *,
+    campaign: str | None = None,
+    machine: str | None = None,
+    run: int | None = None,
+    model: str | None = None,
+    model_version: int | None = None,
+    method: str | None = None,
+    most: int = 20,
+) -> tuple[StoredAnalysis, ...]:
+    """The latest results of a kind, the latest first, at ``most`` so many; what is named narrows the choice."""
+    rows = db.rows(
         """
         SELECT a.analysis_id, a.kind, a.machine, c.campaign, a.run, a.model, a.model_version, a.method, a.seed,
                a.document, a.software_version, a.computed_at
@@ -122,7 +146,7 @@ def load_analysis(
           AND ($machine IS NULL OR coalesce(a.machine, c.machine) = $machine)
           AND ($run IS NULL OR a.run = $run) AND ($model IS NULL OR a.model = $model)
           AND ($version IS NULL OR a.model_version = $version) AND ($method IS NULL OR a.method = $method)
-        ORDER BY a.analysis_id DESC LIMIT 1
+        ORDER BY a.analysis_id DESC LIMIT $most
         """,
         {
             "kind": kind,
@@ -132,28 +156,32 @@ def load_analysis(
             "model": model,
             "version": model_version,
             "method": method,
+            "most": most,
         },
     )
-    if not found:
-        named = [campaign, machine, None if run is None else f"run {run}", model, method]
-        about = ", ".join(name for name in named if name is not None)
-        raise NotFoundError(f"there is no stored {kind} result{' of ' + about if about else ''} yet")
-    *head, seed, document, version, computed_at = found[0]
-    number, kind, machine, campaign, run, model, model_version, method = head
-    return StoredAnalysis(
+    found = []
+    for (
         number,
         kind,
         machine,
         campaign,
         run,
         model,
-        model_version,
-        method,
-        None if seed is None else int(seed),
-        json.loads(document),
         version,
-        computed_at,
-    )
+        method,
+        seed,
+        document,
+        software,
+        moment,
+    ) in rows:
+        drawn = None if seed is None else int(seed)
+        found.append(
+            StoredAnalysis(
+                number, kind, machine, campaign, run, model, version, method, drawn, json.loads(document),
+                software, moment,
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def list_analyses(db: Database, kind: str | None = None) -> pd.DataFrame:

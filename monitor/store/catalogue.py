@@ -31,7 +31,8 @@ def described_machines(db: Database) -> tuple[Machine, ...]:
     return tuple(
         machine_record(text)
         for (text,) in db.rows(
-            "SELECT arg_max(machine_description, campaign_id) FROM campaign GROUP BY machine ORDER BY machine"
+            "SELECT arg_max(machine_description, campaign_id) FROM campaign WHERE method <> 'curve' "
+            "GROUP BY machine ORDER BY machine"
         )
     )
 

@@ -145,6 +145,16 @@ def _slope(effect: Effect, context: Context, axis: int) -> Array:
     return slope
 
 
+def _slant(joint: Joint) -> list[tuple[int, float]]:
+    """Turns (axis, rad), the outer one first, that take the main direction of a joint into its own."""
+    main, second, third = (joint.main, (joint.main + 1) % 3, (joint.main + 2) % 3)
+    along = np.array(joint.direction)
+    if along[main] == 1.0:
+        return []
+    tilt = float(np.arccos(np.clip(along[main], -1.0, 1.0)))
+    return [(main, float(np.arctan2(along[second], -along[third]))), (second, tilt)]
+
+
 def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int, Array]]]) -> list[_Step]:
     chain = run.problem.context.chain
     count = run.probings
@@ -161,10 +171,14 @@ def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int
         return steps
 
     def motion(place: int, joint: Joint, sign: float) -> list[_Step]:
-        axis = int(np.argmax(np.abs(joint.direction)))
+        axis = joint.main
+        move = _Step(SHIFT_READING, axis, sign, np.zeros(count), reading=places.get(place, -1))
         if joint.turns:
-            return [_Step(TURN_SET, axis, sign, run.problem.context.positions[:, place])]
-        return [_Step(SHIFT_READING, axis, sign, np.zeros(count), reading=places[place])]
+            move = _Step(TURN_SET, axis, sign, run.problem.context.positions[:, place])
+        # A slanted axis: turned into place, moved, turned back; the inverse of that is the same with the move inverted.
+        there = [_Step(TURN_SET, about, 1.0, np.full(count, angle)) for about, angle in _slant(joint)]
+        back = [_Step(TURN_SET, about, 1.0, np.full(count, -angle)) for about, angle in _slant(joint)[::-1]]
+        return [*there, move, *back]
 
     def offset(joint: Joint, sign: float) -> list[_Step]:
         return [

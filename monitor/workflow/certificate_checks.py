@@ -3,26 +3,33 @@
 from __future__ import annotations
 
 import hashlib
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from monitor import __version__
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.certificate import CertificateRecord
 from monitor.reporting.dcc import dcc_xml
 from monitor.reporting.documents import from_document
 from monitor.reporting.render import certificate_pdf
-from monitor.reporting.signature import SignatureFinding, check_signature
+from monitor.reporting.signature import SignatureFinding, check_signature, is_signed
 from monitor.store import (
     Database,
+    StoredCertificate,
     find_certificate,
     list_certificates,
     load_certificate,
     verify_audit,
 )
-from monitor.workflow.certificate_files import path_of, write_file
+from monitor.workflow.certificate_files import font_hashes, path_of, write_file
 
 Document = dict[str, Any]
+#: The identifier that a certificate's file bears, its number (ISO 32000-2:2020, 14.4).
+_IDENTIFIER = re.compile(rb"/ID ?\[ ?\(([^()\\]*)\)")
 
 
 def summary(db: Database, number: str) -> Document:
@@ -47,16 +54,22 @@ def show(db: Database, number: str | None = None) -> Document:
     return {"certificates": [summary(db, str(one)) for one in list_certificates(db)["number"]]}
 
 
-def remake(db: Database, number: str, path: Path | None = None) -> Document:
+def remake(db: Database, number: str, path: Path | None = None, fonts: Sequence[Path] = ()) -> Document:
     """Make a certificate again from its stored record and compare it, byte for byte, with the stored document.
 
     A signature is no part of what can be made again: it is appended to the document, which has to lie unchanged
-    below it. ``path`` is a folder or a file for the document that was made again. Raises NotFoundError.
+    below it. ``path`` is a folder or a file for the document that was made again. ``fonts`` are those that it was
+    made with besides ours. Raises NotFoundError, InputError where the fonts are others.
     """
     stored = load_certificate(db, number)
     record = from_document(CertificateRecord, stored.record)
-    pdf = certificate_pdf(record, inputs=stored.record.get("inputs"))
-    signed = _is_signed(stored.pdf)
+    inputs = stored.record.get("inputs") or {}
+    wanted = inputs.get("fonts", [])
+    if [one["sha256"] for one in font_hashes(fonts)] != [one["sha256"] for one in wanted]:
+        named = ", ".join(f"{one['name']} (SHA-256 {one['sha256']})" for one in wanted) or "no font but ours"
+        raise InputError(f"certificate {number} was made with {named}: give the same by --font")
+    pdf = certificate_pdf(record, fonts, inputs)
+    signed = is_signed(stored.pdf)
     same = stored.pdf.startswith(pdf) if signed else stored.pdf == pdf
     found = {**summary(db, number), "identical": same, "signed": signed, "file": None}
     if not same:
@@ -83,8 +96,37 @@ def digital(db: Database, number: str, path: Path) -> Document:
     return {**summary(db, number), "file": str(target)}
 
 
-def _is_signed(pdf: bytes) -> bool:
-    return b"/ByteRange" in pdf
+def stored_file(db: Database, number: str, path: Path) -> Document:
+    """Write the document of a certificate, as it was issued, to a file or into a folder. Raises NotFoundError."""
+    found = load_certificate(db, number)
+    target = path_of(path, number)
+    write_file(target, found.pdf)
+    return {**summary(db, number), "file": str(target)}
+
+
+def _no_longer(found: StoredCertificate) -> str:
+    """Why a genuine certificate is not valid."""
+    if found.state == "draft":
+        return "it is a draft"
+    replaced = f", replaced by {found.replaced_by}" if found.replaced_by else ""
+    return f"certificate {found.number} is {found.state}, no longer valid{replaced}: {found.reason}"
+
+
+def _claimed(db: Database, content: bytes) -> str:
+    """Which certificate an unknown document says that it is, and where it differs from that one."""
+    for number in {one.decode("utf-8", "replace") for one in _IDENTIFIER.findall(content)}:
+        try:
+            stored = load_certificate(db, number).pdf
+        except NotFoundError:
+            continue
+        common = min(len(content), len(stored))
+        both = (np.frombuffer(one[:common], dtype=np.uint8) for one in (content, stored))
+        first = next(iter(np.flatnonzero(np.not_equal(*both))), common)
+        return (
+            f"it bears the number {number}, but differs from the document of that certificate from byte "
+            f"{first} on ({len(content)} bytes, where the genuine one has {len(stored)})"
+        )
+    return "altered, or not from here"
 
 
 def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
@@ -99,10 +141,9 @@ def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
     number = find_certificate(db, hashlib.sha256(content).hexdigest())
     chain = verify_audit(db)
-    signature = check_signature(content, trusted) if _is_signed(content) else SignatureFinding(None, None, ())
-    state = None
-    if number is not None:
-        state = load_certificate(db, number).state
+    signature = check_signature(content, trusted) if is_signed(content) else SignatureFinding(None, None, ())
+    found = None if number is None else load_certificate(db, number)
+    state = None if found is None else found.state
     checks = {
         "hash": number is not None,
         "chain": chain.ok,
@@ -110,13 +151,11 @@ def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
         "database": state == "issued",
     }
     faults = [*signature.faults, *chain.faults]
-    if number is None:
-        why = "altered, or not from here" if content.startswith(b"%PDF-") else "it is no PDF"
+    if found is None:
+        why = _claimed(db, content) if content.startswith(b"%PDF-") else "it is no PDF"
         faults.insert(0, f"no certificate of this database has the content of {file.name}: {why}")
     elif state != "issued":
-        faults.insert(
-            0, f"certificate {number} is {state}, no longer valid" if state != "draft" else "it is a draft"
-        )
+        faults.insert(0, _no_longer(found))
     ok = all(value for value in checks.values() if value is not None)
     return {
         "number": number,

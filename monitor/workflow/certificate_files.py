@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from monitor.exceptions import InputError
@@ -16,6 +19,14 @@ def path_of(out: Path | None, number: str) -> Path:
     return out if out.suffix.lower() == ".pdf" else out / name
 
 
+def font_hashes(fonts: Sequence[Path]) -> list[dict[str, str]]:
+    """Name and SHA-256 of fonts that are not ours: they are too large to be kept with every certificate."""
+    try:
+        return [{"name": one.name, "sha256": hashlib.sha256(one.read_bytes()).hexdigest()} for one in fonts]
+    except OSError as error:
+        raise InputError(f"the font {error.filename} cannot be read: {error.strerror or error}") from error
+
+
 def keep_issued(db: Database, path: Path) -> None:
     """Refuse to write over the file of an issued certificate."""
     there = (
@@ -25,12 +36,40 @@ def keep_issued(db: Database, path: Path) -> None:
         raise InputError(f"{path} is certificate {there}; name another file")
 
 
-def write_file(path: Path, pdf: bytes) -> None:
+def prepared(path: Path, content: bytes) -> Path:
+    """The content, whole on the disk, beside ``path`` under a name that is no certificate's.
+
+    Raises InputError where it cannot be written, or ``path`` is a folder.
+    """
+    part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Written beside and moved, so that no half of a certificate is ever seen.
-        part = path.with_name(path.name + ".part")
-        part.write_bytes(pdf)
-        part.replace(path)
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        with part.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
     except OSError as error:
         raise InputError(f"the certificate cannot be written to {path}: {error.strerror or error}") from error
+    return part
+
+
+def publish(part: Path, path: Path, number: str) -> None:
+    """Give a prepared file its name. Raises InputError, saying where the certificate is, where that fails."""
+    try:
+        part.replace(path)
+    except OSError as error:
+        raise InputError(
+            f"certificate {number} is in the database, but its file cannot be written to {path}: "
+            f"{error.strerror or error}; `monitor certificate show {number} --pdf PATH` writes it"
+        ) from error
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Write a file that is never seen half. Raises InputError where that fails."""
+    part = prepared(path, content)
+    try:
+        part.replace(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}") from error

@@ -1,41 +1,208 @@
-"""The results that a certificate prints, from the evaluation of a run."""
+"""The results that a certificate prints, from the evaluation of a run and its stored Monte Carlo result."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from monitor.discovery import compare
 from monitor.discovery.compare import SOMETHING_IS_MISSING
-from monitor.exceptions import DataError
+from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.records import Array
+from monitor.reporting.numbers import decimal_of, round_to_place, written_factor
 from monitor.reporting.results import RefusedParameters, ResidualSummary, ResultSet, result_set
+from monitor.reporting.texts import Texts
+from monitor.store import Database, stored_analyses
 from monitor.units import MICROMETRE
 from monitor.workflow.uncertainty import LACK_OF_FIT, Evaluated
 
+METHODS = ("guf", "mcm")
+#: What two evaluations of the same readings may differ by, relative to u: the last digits of double precision.
+_SAME = 1e-6
 
-def _evaluation(found: Evaluated) -> str:
+
+@dataclass(frozen=True)
+class StoredMonteCarlo:
+    """The latest stored Monte Carlo result of a run and what it says of the framework; ``number`` in v_analyses.
+
+    ``estimate`` (m,) and ``covariance`` (m, m) are in internal units.
+    """
+
+    number: int
+    trials: int
+    seed: int
+    estimate: Array
+    covariance: Array
+    k_p: float
+    k_q: float
+    verdict: str | None
+    differing: tuple[str, ...]
+
+
+def stored_monte_carlo(db: Database, found: Evaluated) -> StoredMonteCarlo | None:
+    """The latest stored Monte Carlo result that belongs to what is certified, None where there is none.
+
+    It belongs where its framework result is the same: not one from a selection of runs, without the budget's line for
+    lack of fit, or for another probability.
+    """
+    for one in stored_analyses(
+        db, "uncertainty", campaign=found.campaign.name, run=found.run, model=found.model.name,
+        model_version=found.model.version,
+    ):  # fmt: skip
+        if "mcm" in one.document and _belongs(one.document, found):
+            return _stored(one.number, one.document, found)
+    return None
+
+
+def _belongs(document: Mapping[str, Any], found: Evaluated) -> bool:
     guf = found.framework
-    dof = (
-        ""
-        if np.isinf(guf.dof)
-        else f", factors with {guf.dof:.0f} effective degrees of freedom (t and Hotelling)"
+    if tuple(document["parameters"]) != guf.names or document["p"] != guf.p:
+        return False
+    u = np.array(
+        [unit.to_display(float(value)) for unit, value in zip(found.units, guf.u, strict=True)], dtype=float
     )
-    return (
-        "GUM uncertainty framework, JCGM 102:2011 clause 6; covariance of the readings from "
-        f"{found.input_covariance}{dof}. {_how_it_fits(found)}"
+    y = np.array(
+        [unit.to_display(float(value)) for unit, value in zip(found.units, guf.estimate, strict=True)]
+    )
+    own_u = np.array([document["guf"]["u"][name] for name in guf.names])
+    own_y = np.array([document["guf"]["estimate"][name] for name in guf.names])
+    return bool(np.all(abs(own_u - u) <= _SAME * u) and np.all(abs(own_y - y) <= _SAME * u))
+
+
+def _stored(number: int, document: Mapping[str, Any], found: Evaluated) -> StoredMonteCarlo:
+    mcm, checked = document["mcm"], document.get("validation")
+    factor = np.array([unit.factor for unit in found.units])
+    names = found.framework.names
+    u = np.array([mcm["u"][name] for name in names]) * factor
+    differing = () if checked is None else tuple(
+        name for name, value in checked["differences"].items() if abs(value) > checked["tolerances"][name]
+    )  # fmt: skip
+    return StoredMonteCarlo(
+        number=number,
+        trials=int(mcm["trials"]),
+        seed=int(mcm["seed"]),
+        estimate=np.array([mcm["estimate"][name] for name in names]) * factor,
+        covariance=np.asarray(mcm["correlation"], dtype=np.float64) * np.outer(u, u),
+        k_p=float(mcm["k_p"]),
+        k_q=float(mcm["k_q"]),
+        verdict=None if checked is None else str(checked["verdict"]),
+        differing=differing,
     )
 
 
-def _how_it_fits(found: Evaluated) -> str:
+def results_of(
+    found: Evaluated, texts: Texts, monte_carlo: StoredMonteCarlo | None = None, method: str = "guf"
+) -> ResultSet:
+    """The results that a certificate prints, by the GUM framework or by Monte Carlo.
+
+    The readings' covariance is known from few runs: both methods are printed with the factors that hold for so few
+    (Hotelling, Student), which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where
+    the method cannot be certified, DataError where there are too few runs for any joint region.
+    """
+    guf = found.framework
+    if method not in METHODS:
+        raise InputError(f"--method {method}: a certificate states guf or mcm")
+    if not np.isfinite(guf.k_p):
+        raise DataError(
+            f"{guf.dof:.0f} degrees of freedom bound no joint region of {len(guf.names)} parameters; "
+            "a certificate needs more repeated runs"
+        )
+    estimate, covariance, k_p, k_q = guf.estimate, guf.covariance, guf.k_p, guf.k_q
+    if method == "mcm":
+        monte_carlo = _certifiable(found, monte_carlo)
+        estimate, covariance = monte_carlo.estimate, monte_carlo.covariance
+        if not np.isfinite(guf.dof):
+            k_p, k_q = monte_carlo.k_p, monte_carlo.k_q
+    tolerances = {
+        name: limit for name, limit in found.campaign.machine.tolerances.items() if name in guf.names
+    }
+    return result_set(
+        guf.names,
+        found.units,
+        estimate,
+        covariance,
+        state=texts("record.as_found"),
+        p=guf.p,
+        k_p=k_p,
+        k_q=k_q,
+        rank=guf.rank,
+        evaluation=_evaluation(found, texts, monte_carlo, method),
+        refused=[RefusedParameters(one.parameters, one.why) for one in found.refused],
+        residuals=_by_target(found),
+        trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
+        validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
+        tolerances=tolerances or None,
+        texts=texts,
+    )
+
+
+def _certifiable(found: Evaluated, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:
+    if monte_carlo is None:
+        raise NotFoundError(
+            f"there is no stored Monte Carlo result of run {found.run} of campaign {found.campaign.name}; first: "
+            f"monitor uncertainty {found.campaign.name} --run {found.run} --method both"
+        )
+    if LACK_OF_FIT in {line.source for line in found.framework.budget}:
+        raise InputError(
+            "the model does not explain all of the measurement, and the Monte Carlo result holds no part for that: "
+            "certify the framework's result (--method guf), or complete the model"
+        )
+    return monte_carlo
+
+
+def _evaluation(found: Evaluated, texts: Texts, monte_carlo: StoredMonteCarlo | None, method: str) -> str:
+    """How the results were found, sentence by sentence, the last without its full stop."""
+    guf = found.framework
+    readings = texts.computed(found.input_covariance)
+    if method == "mcm" and monte_carlo is not None:
+        parts = [
+            texts(
+                "evaluation.monte_carlo", trials=monte_carlo.trials, seed=monte_carlo.seed, readings=readings
+            )
+        ]
+    else:
+        parts = [texts("evaluation.framework", readings=readings)]
+    if np.isfinite(guf.dof):
+        parts[0] += ", " + texts("evaluation.degrees_of_freedom", dof=f"{guf.dof:.0f}")
+        if method == "mcm" and monte_carlo is not None:
+            k_q, k_p = (written_factor(one, texts.decimal_sign) for one in (monte_carlo.k_q, monte_carlo.k_p))
+            parts[0] += "; " + texts("evaluation.known_covariance", k_q=k_q, k_p=k_p)
+    if monte_carlo is not None and monte_carlo.verdict is not None:
+        words = texts(
+            "evaluation.checked",
+            trials=monte_carlo.trials,
+            seed=monte_carlo.seed,
+            verdict=_verdict(monte_carlo, texts),
+        )
+        parts.append(words[:1].upper() + words[1:])
+    return ". ".join([*parts, _how_it_fits(found, texts)])
+
+
+def _verdict(monte_carlo: StoredMonteCarlo, texts: Texts) -> str | None:
+    if monte_carlo.verdict is None:
+        return None
+    if monte_carlo.verdict == "validated":
+        return texts("evaluation.validated")
+    if not monte_carlo.differing:
+        return texts("evaluation.undecided")
+    return texts("evaluation.not_validated", quantities=", ".join(monte_carlo.differing))
+
+
+def _how_it_fits(found: Evaluated, texts: Texts) -> str:
     """Whether the model explains the measurement, in a sentence that ends without its full stop."""
     compared = compare(found.fit, found.campaign.name, found.model.name)
-    fits = (
-        f"Over the campaign the model leaves {MICROMETRE.to_display(compared.rms):.2f} µm RMS, where "
-        f"{MICROMETRE.to_display(compared.expected_rms):.2f} µm are expected from the probe's statement"
+    rms, expected = (
+        texts.number(round_to_place(MICROMETRE.to_display(one), decimal_of(0.01)))
+        for one in (compared.rms, compared.expected_rms)
     )
+    fits = texts("evaluation.fit", rms=rms, expected=expected)
     if LACK_OF_FIT in {line.source for line in found.framework.budget}:
-        fits += "; what this lack of fit may do to the parameters is part of u"
+        fits += "; " + texts("evaluation.fit_counted")
     elif compared.verdict == SOMETHING_IS_MISSING:
-        fits += "; the model does not explain all of it, and u holds no part for that"
+        fits += "; " + texts("evaluation.fit_not_counted")
     return fits
 
 
@@ -53,32 +220,4 @@ def _by_target(found: Evaluated) -> ResidualSummary:
     )
     return ResidualSummary(
         "target", labels, rms, MICROMETRE.to_display(found.campaign.probe.standard_uncertainty)
-    )
-
-
-def results_of(found: Evaluated) -> ResultSet:
-    """The results that a certificate prints."""
-    guf = found.framework
-    tolerances = {
-        name: limit for name, limit in found.campaign.machine.tolerances.items() if name in guf.names
-    }
-    if not np.isfinite(guf.k_p):
-        raise DataError(
-            f"{guf.dof:.0f} degrees of freedom bound no joint region of {len(guf.names)} parameters; "
-            "a certificate needs more repeated runs"
-        )
-    return result_set(
-        guf.names,
-        found.units,
-        guf.estimate,
-        guf.covariance,
-        state="as found",
-        p=guf.p,
-        k_p=guf.k_p,
-        k_q=guf.k_q,
-        rank=guf.rank,
-        evaluation=_evaluation(found),
-        refused=[RefusedParameters(one.parameters, one.why) for one in found.refused],
-        residuals=_by_target(found),
-        tolerances=tolerances or None,
     )

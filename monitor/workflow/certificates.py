@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from monitor import __version__
-from monitor.exceptions import InputError, NotFoundError
-from monitor.records import LinearAxes
+from monitor.exceptions import InputError
+from monitor.records import Campaign, LinearAxes
 from monitor.reporting.assembly import certificate_record
+from monitor.reporting.certificate import CertificateRecord, Replaced
 from monitor.reporting.documents import to_document
-from monitor.reporting.laboratory import read_laboratory
+from monitor.reporting.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.render import certificate_pdf
-from monitor.reporting.signature import sign
+from monitor.reporting.signing import Key, sign
+from monitor.reporting.texts import ENGLISH, texts_of
 from monitor.store import (
     Database,
     list_certificates,
@@ -24,13 +27,37 @@ from monitor.store import (
     save_certificate,
 )
 from monitor.workflow.certificate_checks import summary
-from monitor.workflow.certificate_files import keep_issued, path_of, write_file
-from monitor.workflow.certificate_results import results_of
+from monitor.workflow.certificate_files import font_hashes, keep_issued, path_of, prepared, publish
+from monitor.workflow.certificate_map import volumetric_result
+from monitor.workflow.certificate_results import StoredMonteCarlo, results_of, stored_monte_carlo
 from monitor.workflow.conformity import statement_of
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty import Evaluated, evaluate
 
 Document = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wishes:
+    """What a certificate states besides the results, and how it is closed.
+
+    ``linear_axes`` are those of `monitor uncertainty`, for a method that takes these axes as known. ``method``: guf,
+    or mcm for the stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the
+    laboratory's word on conformity. ``with_map`` adds the volumetric error. ``key`` signs it. ``fonts`` are files with
+    letters that DejaVu Sans lacks. ``replaces`` is the number of the certificate that this one amends, for a
+    ``reason``: it says so on paper (ISO/IEC 17025:2017, 7.8.8.3), and the old one is marked with it.
+    """
+
+    model: str | None = None
+    linear_axes: LinearAxes | None = None
+    method: str = "guf"
+    draft: bool = False
+    conformity: str | None = None
+    with_map: bool = False
+    key: Key | None = None
+    fonts: tuple[Path, ...] = ()
+    replaces: str | None = None
+    reason: str = ""
 
 
 def next_number(db: Database, year: int) -> str:
@@ -49,85 +76,108 @@ def issue(
     out: Path | None = None,
     number: str | None = None,
     issued_on: date | None = None,
-    model: str | None = None,
-    draft: bool = False,
-    conformity: str | None = None,
-    key: Path | None = None,
-    passphrase: str | None = None,
-    replaces: str | None = None,
-    reason: str = "",
-    linear_axes: LinearAxes | None = None,
+    **wishes: Any,
 ) -> Document:
     """Issue a certificate for one run: PDF in ``out`` (a folder or a file), record and document in the database.
 
-    ``conformity`` names a decision rule where a statement of conformity is wanted; it replaces the laboratory's
-    word on conformity. ``key`` is a PKCS#12 file that signs it, opened by ``passphrase``.
-    ``linear_axes`` are those of `monitor uncertainty`, for a method that takes these axes as known.
-    ``replaces`` is the number of the certificate that this one amends, for a ``reason``: it says so on paper
-    (ISO/IEC 17025:2017, 7.8.8.3), and the old one is marked with it. Raises
-    IncompleteCertificateError with the list of what the laboratory's file and the campaign leave open, InputError
-    where the campaign states no tolerances or the key does not open.
+    ``wishes`` are the fields of ``Wishes``. Raises IncompleteCertificateError with the list of what the laboratory's
+    file and the campaign leave open, InputError where the campaign states no tolerances or the key does not open.
     """
+    wanted = Wishes(**wishes)
     stated = read_laboratory(laboratory)
-    found = evaluate(db, campaign, run, model=model, method="guf", linear_axes=linear_axes)
+    loaded = load_campaign(db, campaign)
     day = issued_on or date.today()
-    measured = next(one.started_at.date() for one in found.campaign.runs if one.run == run)
-    if day < measured:
-        raise InputError(f"run {run} was measured on {measured}; no certificate was issued of it on {day}")
+    _check_day(loaded, run, day)
+    replaced = None
+    if wanted.replaces is not None:
+        replaced = _replaced(db, wanted.replaces, wanted.reason, wanted.draft, loaded)
+    found = evaluate(db, campaign, run, model=wanted.model, method="guf", linear_axes=wanted.linear_axes)
     chosen = number or next_number(db, day.year)
-    record = certificate_record(
-        stated,
-        found.campaign,
-        run,
-        [results_of(found)],
-        number=chosen,
-        issued_on=day,
-        model=label(found.model),
-    )
-    if conformity is not None:
-        record = dataclasses.replace(record, conformity=statement_of(found, conformity))
-    if replaces is not None:
-        record = dataclasses.replace(record, replaces=_amendment(db, replaces, reason, draft))
-    if draft:
-        record = dataclasses.replace(record, title=f"DRAFT, not valid: {record.title}")
     path = path_of(out, chosen)
     keep_issued(db, path)
-    inputs = _inputs(found)
-    if linear_axes is not None:
-        inputs["linear_axes_mm"] = dataclasses.asdict(linear_axes)
-    pdf = certificate_pdf(record, inputs=inputs)
-    if key is not None:
-        pdf = sign(pdf, key, passphrase)
-    with db.transaction():
-        save_certificate(
-            db,
-            chosen,
-            "draft" if draft else "issued",
-            campaign,
-            [run],
-            {**to_document(record), "inputs": inputs},
-            pdf,
-        )
-        if replaces is not None:
-            mark_certificate(db, replaces, "amended", reason, chosen)
-        write_file(path, pdf)
+    monte_carlo = stored_monte_carlo(db, found)
+    record = _record(stated, found, monte_carlo, wanted, number=chosen, issued_on=day)
+    record = dataclasses.replace(record, replaces=replaced)
+    inputs = {**_inputs(found, monte_carlo), "fonts": font_hashes(wanted.fonts)}
+    if wanted.linear_axes is not None:
+        inputs["linear_axes_mm"] = dataclasses.asdict(wanted.linear_axes)
+    pdf = certificate_pdf(record, wanted.fonts, inputs)
+    if wanted.key is not None:
+        pdf = sign(pdf, wanted.key)
+    # The file is whole on the disk before the entry is, and gets its name after it: whenever this is killed, no file
+    # bears the name of a certificate that the database does not know.
+    part = prepared(path, pdf)
+    try:
+        with db.transaction():
+            state: Literal["draft", "issued"] = "draft" if wanted.draft else "issued"
+            document = {**to_document(record), "inputs": inputs}
+            save_certificate(db, chosen, state, campaign, [run], document, pdf)
+            if wanted.replaces is not None:
+                mark_certificate(db, wanted.replaces, "amended", wanted.reason, chosen)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    publish(part, path, chosen)
     return {**summary(db, chosen), "file": str(path)}
 
 
-def _amendment(db: Database, replaces: str, reason: str, draft: bool) -> str:
-    """The sentence that names the replaced certificate. Raises InputError where it cannot be replaced."""
-    old = load_certificate(db, replaces)
+def _check_day(campaign: Campaign, run: int, day: date) -> None:
+    measured = [one.started_at.date() for one in campaign.runs if one.run == run]
+    if measured and day < measured[0]:
+        raise InputError(f"run {run} was measured on {measured[0]}; no certificate was issued of it on {day}")
+
+
+def _record(
+    stated: LaboratoryFile,
+    found: Evaluated,
+    monte_carlo: StoredMonteCarlo | None,
+    wanted: Wishes,
+    *,
+    number: str,
+    issued_on: date,
+) -> CertificateRecord:
+    texts = texts_of(stated.language or ENGLISH)
+    result = results_of(found, texts, monte_carlo, wanted.method)
+    record = certificate_record(
+        stated,
+        found.campaign,
+        found.run,
+        [result],
+        number=number,
+        issued_on=issued_on,
+        model=label(found.model),
+        volumetric=[volumetric_result(found, result.state)] if wanted.with_map else [],
+    )
+    if wanted.conformity is not None:
+        statement = statement_of(
+            result, wanted.conformity, texts, campaign=found.campaign.name, dof=found.framework.dof
+        )
+        record = dataclasses.replace(record, conformity=statement)
+    if wanted.draft and record.title:
+        record = dataclasses.replace(record, title=texts("record.draft", title=record.title))
+    return record
+
+
+def _replaced(db: Database, number: str, reason: str, draft: bool, campaign: Campaign) -> Replaced:
+    """The certificate to be replaced. Raises InputError where it cannot be replaced by one of ``campaign``."""
+    old = load_certificate(db, number)
     if old.state != "issued":
-        raise InputError(f"certificate {replaces} is {old.state}; only an issued one can be replaced")
+        raise InputError(f"certificate {number} is {old.state}; only an issued one can be replaced")
     if draft:
         raise InputError("a draft replaces nothing; leave --replaces out until it is issued")
     if not reason.strip():
-        raise InputError(f"say why certificate {replaces} is replaced: --reason TEXT")
-    issued_on = old.record.get("issued_on")
-    return f"It replaces certificate {replaces}{f' of {issued_on}' if issued_on else ''}: {reason.strip()}"
+        raise InputError(f"say why certificate {number} is replaced: --reason TEXT")
+    machine = load_campaign(db, old.campaign).machine.id
+    if machine != campaign.machine.id:
+        raise InputError(
+            f"campaign {campaign.name} is of machine {campaign.machine.id}, certificate {number} of {machine}: "
+            "it cannot replace it"
+        )
+    issued_on = date.fromisoformat(str(old.record["issued_on"]))
+    return Replaced(number, issued_on, reason.strip(), old.pdf_sha256)
 
 
-def _inputs(found: Evaluated) -> Document:
+def _inputs(found: Evaluated, monte_carlo: StoredMonteCarlo | None) -> Document:
     """What the results were computed from: kept with the certificate and inside its PDF."""
     return {
         "campaign": found.campaign.name,
@@ -135,32 +185,34 @@ def _inputs(found: Evaluated) -> Document:
         "files": [{"name": file.name, "sha256": file.sha256} for file in found.campaign.files],
         "model": label(found.model),
         "model_effects": list(found.model.effects),
-        "seed": None,  # the GUM framework draws no random numbers
+        # The GUM framework draws no random numbers; the Monte Carlo that it was compared with does.
+        "seed": None if monte_carlo is None else monte_carlo.seed,
+        "stored_result": None if monte_carlo is None else monte_carlo.number,
         "software": f"machine-health-monitor {__version__}",
     }
 
 
-def withdraw(db: Database, number: str, reason: str, replaced_by: str | None = None) -> Document:
-    """Mark a certificate as withdrawn, or as amended where another number replaces it."""
-    if replaced_by is not None and replaced_by not in {str(one) for one in list_certificates(db)["number"]}:
-        raise NotFoundError(
-            f"there is no certificate {replaced_by} that could replace {number}; issue it first"
-        )
-    if replaced_by is not None:
-        _check_replacement(db, number, replaced_by)
-    mark_certificate(db, number, "amended" if replaced_by else "withdrawn", reason, replaced_by)
+def amend(
+    db: Database, replaces: str, laboratory: Path, reason: str, *, campaign: str | None = None,
+    run: int | None = None, **options: Any,
+) -> Document:  # fmt: skip
+    """Issue a new certificate that replaces another, of the same run unless ``campaign`` and ``run`` are given.
+
+    ``options`` are those of ``issue``. Raises what ``issue`` raises.
+    """
+    old = load_certificate(db, replaces)
+    return issue(
+        db,
+        campaign or old.campaign,
+        old.runs[0] if run is None else run,
+        laboratory,
+        replaces=replaces,
+        reason=reason,
+        **options,
+    )
+
+
+def withdraw(db: Database, number: str, reason: str) -> Document:
+    """Mark a certificate as withdrawn. Raises InputError where its state does not allow it, NotFoundError."""
+    mark_certificate(db, number, "withdrawn", reason)
     return summary(db, number)
-
-
-def _check_replacement(db: Database, number: str, replaced_by: str) -> None:
-    """InputError where a certificate cannot take another's place: not in force, or of another machine."""
-    old, new = load_certificate(db, number), load_certificate(db, replaced_by)
-    if new.state != "issued":
-        raise InputError(
-            f"certificate {replaced_by} is {new.state} and cannot replace {number}; issue a new one first"
-        )
-    machines = [load_campaign(db, one.campaign).machine.id for one in (old, new)]
-    if machines[0] != machines[1]:
-        raise InputError(
-            f"certificate {replaced_by} is of machine {machines[1]}, {number} of {machines[0]}: it cannot replace it"
-        )

@@ -21,6 +21,7 @@ from monitor.store import StoredIdentification
 from monitor.units import MICROMETRE
 from monitor.workflow.residuals import drivers_followed, in_machine_frame, mean_over_runs
 from monitor.workflow.residuals_against import against_effect
+from monitor.workflow.shape import shape_figure
 
 Document = dict[str, Any]
 ENDINGS = (".svg", ".png")
@@ -77,7 +78,7 @@ def comparison_figures(document: Document, found: Fit, folder: Path) -> list[str
             folder,
             f"residual-against-{name.split(' ')[0].lower()}",
         )  # fmt: skip
-    return files
+    return files + shape_figure(document["campaign"], found, folder)
 
 
 def explanation_figures(document: Document, found: Explanation, folder: Path) -> list[str]:

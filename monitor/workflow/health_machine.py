@@ -73,7 +73,7 @@ def machine_health(
     (method,) = db.rows("SELECT method FROM v_campaigns WHERE campaign = ?", [last.campaign])[0]
     model = resolve(db, settings.model, method)
     span = campaign_span(db, last.campaign, week)
-    identified(db, here, model, remarks)
+    identified(db, machine, method, runs, model, remarks)
     evaluated = uncertainty_of(db, last, model, span, remarks)
     explained = explanation_of(db, last.campaign, method, model, span, remarks)
     mapped = None if evaluated is None else map_of(db, last, model, span, remarks)

@@ -35,20 +35,30 @@ def kept(step: Callable[[], Document], failure: str, remarks: list[str]) -> Docu
         return None
 
 
-def identified(db: Database, here: list[PastRun], model: StoredModel, remarks: list[str]) -> None:
-    """Every run of the week identified under the model."""
+def identified(
+    db: Database, machine: str, method: str, runs: list[PastRun], model: StoredModel, remarks: list[str]
+) -> None:
+    """Every past run of a machine identified under the model: what came in since the last report, and the history of a
+    machine whose first report this is. Campaigns of another method have other parameters and are left alone."""
     done = set(
         db.rows(
-            "SELECT campaign, run FROM v_identified_runs WHERE model = ? AND model_version = ?",
-            [model.name, model.version],
+            "SELECT campaign, run FROM v_identified_runs WHERE machine = ? AND model = ? AND model_version = ?",
+            [machine, model.name, model.version],
         )
     )
-    for campaign in dict.fromkeys(one.campaign for one in here if (one.campaign, one.run) not in done):
-        kept(
-            lambda name=campaign: identify(db, name, label(model)),  # type: ignore[misc]
-            f"campaign {campaign} could not be identified",
-            remarks,
+    same = {
+        str(name)
+        for (name,) in db.rows(
+            "SELECT campaign FROM v_campaigns WHERE machine = ? AND method = ?", [machine, method]
         )
+    }
+    for campaign in dict.fromkeys(one.campaign for one in runs if (one.campaign, one.run) not in done):
+        if campaign in same:
+            kept(
+                lambda name=campaign: identify(db, name, label(model)),  # type: ignore[misc]
+                f"campaign {campaign} could not be identified",
+                remarks,
+            )
 
 
 def uncertainty_of(

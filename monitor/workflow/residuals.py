@@ -8,7 +8,6 @@ import numpy as np
 
 from monitor.discovery import Fit
 from monitor.discovery.anomalies import plan_places
-from monitor.machine import evaluate
 from monitor.records import Array
 from monitor.units import MICROMETRE
 
@@ -22,12 +21,15 @@ def in_machine_frame(found: Fit, vectors: Array | None = None) -> tuple[Array, A
 
     ``vectors`` (n, 3) mm are residuals in the frame of the last work axis, those of the fit where none are given.
     """
-    errors, target, tip = found.problem.state(found.solution.local, found.solution.common)
     context = found.problem.context
-    seen = evaluate(context.chain, context.positions, errors, target, tip)
+    seen = found.problem.evaluated(found.solution.local, found.solution.common)
     turned = np.einsum("nij,nj->ni", seen.work_rotation, seen.residual if vectors is None else vectors)
     linear = [place for place, joint in enumerate(context.chain.joints) if not joint.turns]
     places = np.zeros((len(context), 3))
+    if len(linear) < 3:
+        # Seen from outside: the measured points, carried into the machine's frame.
+        places += np.nan_to_num(context.nominal)
+        linear = []
     for place in linear:
         sign = 1.0 if place >= len(context.chain.work) else -1.0
         places += sign * context.positions[:, [place]] * np.array(context.chain.joints[place].direction)

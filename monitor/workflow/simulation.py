@@ -9,19 +9,27 @@ import numpy as np
 
 from monitor.exceptions import InputError
 from monitor.methods.virtual import virtual_campaign
+from monitor.methods.virtual_robot import virtual_robot
 from monitor.readers import write_campaign
 from monitor.units import MICROMETRE
 
 
-def simulate(out: Path, effect: str | None, peak_um: float, noise_um: float, seed: int) -> dict[str, Any]:
-    """Write a campaign folder named after ``out``; its hidden effect has the peak displacement ``peak_um``."""
+def simulate(
+    out: Path, effect: str | None, peak_um: float, noise_um: float | None, seed: int, robot: bool = False
+) -> dict[str, Any]:
+    """Write a campaign folder named after ``out``; its hidden effect has the peak displacement ``peak_um``.
+
+    A machine tool touched by ``samba`` (noise of 1 µm where none is given), or a ``robot`` tracked (20 µm).
+    """
+    make = virtual_robot if robot else virtual_campaign
+    noise_um = (20.0 if robot else 1.0) if noise_um is None else noise_um
     if noise_um <= 0 or not np.isfinite(noise_um):
         raise InputError(f"--noise {noise_um}: the noise of a reading must be above 0 µm")
     if not np.isfinite(peak_um) or peak_um <= 0:
         raise InputError(f"--peak {peak_um}: the peak must be a number of µm above 0")
     if seed < 0:
         raise InputError(f"--seed {seed}: a seed is a whole number from 0 on")
-    campaign = virtual_campaign(
+    campaign = make(
         out.resolve().name,
         np.random.default_rng(seed),
         effect=effect,
@@ -31,6 +39,7 @@ def simulate(out: Path, effect: str | None, peak_um: float, noise_um: float, see
     write_campaign(campaign, out)
     touches = len(campaign.probings) // len(campaign.runs)
     hidden = f"{effect} with a peak of {peak_um:g} µm is hidden" if effect else "nothing is hidden"
+    runs = f"{len(campaign.runs)} run{'s' if len(campaign.runs) > 1 else ''}"
     return {
         "folder": str(out),
         "campaign": campaign.name,
@@ -40,5 +49,5 @@ def simulate(out: Path, effect: str | None, peak_um: float, noise_um: float, see
         "seed": seed,
         "runs": len(campaign.runs),
         "probings": len(campaign.probings),
-        "message": f"{out}: {len(campaign.runs)} runs of {touches} probings; {hidden}",
+        "message": f"{out}: {runs} of {touches} probings; {hidden}",
     }

@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from monitor.effects import ChainEffect
 from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
-from monitor.methods.least_squares import eliminate
 from monitor.records import Array, Campaign
 from monitor.store import Database, save_analysis
 from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.campaign_parts import kind_of, method_of
+from monitor.workflow.known_errors import geometric_errors
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty import Evaluated, evaluate
 
@@ -46,76 +45,6 @@ class Mapped:
     left_out: dict[str, str]
 
 
-def geometric_errors(found: Evaluated) -> tuple[GeometricErrors, dict[str, str]]:
-    """What is known of the machine from one evaluated run, and what is not, with the reason."""
-    problem, solution = found.fit.problem, found.fit.solution
-    context = problem.context
-    fixed, coefficients = problem.resolved(solution.common)
-    left_out = {name: refusal.why for refusal in found.refused for name in refusal.parameters}
-    effects: list[ChainEffect] = []
-    names: list[str] = []
-    for effect in problem.base:
-        own = effect.parameters(context)
-        if isinstance(effect, ChainEffect) and all(name in found.framework.names for name in own):
-            effects.append(effect)
-            names += own
-        else:
-            left_out |= {name: "it has no number in this run" for name in own if name not in left_out}
-    places = [found.framework.names.index(name) for name in names]
-    local = [problem.base_names.index(name) for name in names]
-    estimate = [float(found.framework.estimate[place]) for place in places]
-    shared: list[int] = []
-    at = coefficient = 0
-    for one, plain in zip(problem.shared, fixed.added, strict=True):
-        own_places = range(at, at + one.size)
-        at += one.unknowns
-        if not isinstance(plain, ChainEffect):
-            left_out |= dict.fromkeys(one.names(), "it is no error of the machine")
-        elif not all(solution.common_free[list(own_places)]):
-            left_out |= dict.fromkeys(one.names(), "the plan does not determine it")
-        else:
-            effects.append(plain)
-            names += one.effect.parameters(context)
-            estimate += map(float, coefficients[coefficient : coefficient + one.size])
-            shared += own_places
-        coefficient += one.size
-    covariance = np.zeros((len(names), len(names)))
-    covariance[: len(places), : len(places)] = found.framework.covariance[np.ix_(places, places)]
-    if len(solution.common):
-        covariance += _of_shared(found, local, shared)
-    return (
-        GeometricErrors(
-            effects=tuple(effects),
-            names=tuple(names),
-            estimate=np.array(estimate),
-            covariance=covariance,
-            context=context,
-            run=found.run,
-            tip=solution.local[int(np.flatnonzero(problem.runs == found.run)[0]), -3:],
-            degrees_of_freedom=float(np.min(found.framework.dof_by_output)),
-        ),
-        left_out,
-    )
-
-
-def _of_shared(found: Evaluated, local: list[int], shared: list[int]) -> Array:
-    """What the uncertainty of the shared effects adds: their own, and what they pull the run's parameters by.
-
-    The parameters of a run answer a change of the shared ones by D = -pinv(A) B of the whitened Jacobians. For
-    white noise the shared ones and the run's at held shared ones are uncorrelated, because the former rest on
-    what the latter leave of the readings.
-    """
-    solution = found.fit.solution
-    place = int(np.flatnonzero(found.fit.problem.runs == found.run)[0])
-    space = eliminate(solution.last.local[[place]])
-    answer = -(space.inverse[0] @ (space.basis[0].T @ solution.last.common[place]))
-    count = len(solution.common)
-    both = np.concatenate([answer[local], np.eye(count)[shared]])
-    covariance = np.where(np.isfinite(solution.common_covariance), solution.common_covariance, 0.0)
-    added: Array = found.fit.scale**2 * both @ covariance @ both.T
-    return added
-
-
 def ranges_of(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, float]], bool]:
     """Readings of the linear axes: the strokes of the machine file if it has all, else what was visited."""
     linear = [joint.name for joint in chain.joints if not joint.turns]
@@ -141,6 +70,24 @@ def poses_of(chain: Chain, positions: Array) -> Array:
     return np.concatenate([at_zero, others])
 
 
+def map_of(found: Evaluated, points: int = POINTS, absolute: bool = False) -> Mapped:
+    """The volumetric error of one evaluated run on a grid of ``points`` along every linear axis at every rotary pose.
+
+    The workpiece's zero is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``.
+    Raises DataError where the run determines no error.
+    """
+    known, left_out = geometric_errors(found)
+    if not known.names:
+        raise DataError(
+            f"run {found.run} of campaign {found.campaign.name} determines no geometric error; there is nothing to map"
+        )
+    ranges, from_strokes = ranges_of(found.campaign, known.chain)
+    poses = poses_of(known.chain, known.context.positions)
+    datum = None if absolute else middle(known.chain, ranges)
+    error = volumetric_error(known, grid(known.chain, ranges, points, poses), datum)
+    return Mapped(found, known, ranges, from_strokes, poses, points, error, left_out)
+
+
 def volumetric_map(
     db: Database,
     campaign: str,
@@ -155,25 +102,15 @@ def volumetric_map(
 ) -> tuple[Document, Mapped]:
     """Map the volumetric error of one run (the last by default) over the strokes; the document is stored.
 
-    The grid of ``points`` along every linear axis is laid at every rotary pose of the plan. The workpiece's zero
-    is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``. Runs that began at or after
-    ``before`` (local time without a zone) take no part; the document is then stored as ``partial volumetric map``.
+    The grid is that of ``map_of``. Runs that began at or after ``before`` (local time without a zone) take no part;
+    the document is then stored as ``partial volumetric map``.
     """
     if not 2 <= points <= 41:
         raise InputError(f"--points {points}: choose 2 to 41 points along each axis")
     found = evaluate(
         db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty, before=before
     )
-    known, left_out = geometric_errors(found)
-    if not known.names:
-        raise DataError(
-            f"run {found.run} of campaign {campaign} determines no geometric error; there is nothing to map"
-        )
-    ranges, from_strokes = ranges_of(found.campaign, known.chain)
-    poses = poses_of(known.chain, known.context.positions)
-    datum = None if absolute else middle(known.chain, ranges)
-    error = volumetric_error(known, grid(known.chain, ranges, points, poses), datum)
-    mapped = Mapped(found, known, ranges, from_strokes, poses, points, error, left_out)
+    mapped = map_of(found, points, absolute)
     document = _document(mapped, p)
     save_analysis(
         db, kind_of("volumetric map", before), document, method=method_of("guf", before), campaign=campaign,

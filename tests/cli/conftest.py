@@ -110,3 +110,33 @@ def db(filled: Path, tmp_path: Path) -> Path:
 def laboratory() -> Path:
     """What a made-up laboratory states about itself."""
     return EXAMPLES / "laboratory.toml"
+
+
+@dataclass(frozen=True)
+class Issued:
+    """A database with the certificates 2026-0001 and 2026-0002 of five-days and 2026-0003 of cold-cold."""
+
+    db: Path
+    folder: Path
+
+    def file(self, number: str) -> Path:
+        return self.folder / f"certificate-{number}.pdf"
+
+
+@pytest.fixture(scope="session")
+def issued_once(filled: Path, laboratory: Path, tmp_path_factory: pytest.TempPathFactory) -> Issued:
+    folder = tmp_path_factory.mktemp("certificates") / "out folder ü"
+    path = folder.parent / "issued.duckdb"
+    shutil.copyfile(filled, path)
+    for campaign, run in (("five-days", 20), ("five-days", 19), ("cold-cold", 3)):
+        status = main(["--db", str(path), "certificate", "issue", campaign, "--run", str(run), "--date", "2026-03-10",
+                       "--laboratory", str(laboratory), "--out", str(folder)])  # fmt: skip
+        assert status == 0
+    return Issued(path, folder)
+
+
+@pytest.fixture
+def issued(issued_once: Issued, tmp_path: Path) -> Issued:
+    path = tmp_path / "issued.duckdb"
+    shutil.copyfile(issued_once.db, path)
+    return Issued(path, issued_once.folder)

@@ -124,9 +124,9 @@ def test_sigkill_in_the_middle_of_a_certificate(
         assert len(whole(db)) == 3
         with Database(db) as opened:
             numbers = {str(number) for (number,) in opened.rows("SELECT DISTINCT number FROM certificate")}
-        # Every certificate of the database has its file, and every file is a whole PDF.
+        # No file bears the name of a certificate that the database does not know, and every file is a whole PDF.
         files = {path.name for path in out.glob("*.pdf")}
-        assert {f"certificate-{number}.pdf" for number in numbers} <= files
+        assert files <= {f"certificate-{number}.pdf" for number in numbers}
         for path in out.glob("*.pdf"):
             assert path.read_bytes()[:5] == b"%PDF-"
             assert path.read_bytes().rstrip().endswith(b"%%EOF")

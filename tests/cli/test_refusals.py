@@ -133,7 +133,7 @@ WRONG = [
     (["certificate", "verify", "nope.pdf"], "nope.pdf cannot be read: No such file or directory"),
     (["certificate", "verify", "folder"], "folder cannot be read: Is a directory"),
     (["certificate", "withdraw", "2026-0001", "--reason", "x"], "there is no certificate '2026-0001'"),
-    (["certificate", "amend", "2026-0001", "--by", "2026-0002", "--reason", "x"], "there is no certificate 2026-0002"),
+    (["certificate", "amend", "2026-0001", "--laboratory", "x.toml", "--reason", "x"], "no certificate '2026-0001'"),
 ]  # fmt: skip
 
 

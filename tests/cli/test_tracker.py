@@ -77,3 +77,13 @@ def test_what_one_run_cannot_give_is_refused_plainly(typed: Any, robot: Path) ->
 def test_effects_of_robots_are_in_the_catalogue(typed: Any, robot: Path) -> None:
     told = typed("effects", "tracker", "--json").document
     assert "tracker:turn@run_time" in {one["effect"] for one in told["effects"]}
+
+
+def test_a_rehearsed_robot_tells_what_it_hides(typed: Any, tmp_path: Path) -> None:
+    made = typed("simulate", "arm", "--robot", "--effect", "EBJ3:harmonic2", "--peak", "150", "--seed", "3")
+    assert "arm: 1 run of 1500 probings; EBJ3:harmonic2 with a peak of 150 µm is hidden" in made.out
+    db = tmp_path / "arm.duckdb"
+    assert typed("import", "arm", db=db).status == 0
+    found = typed("explain", "arm", "--json", db=db).document
+    assert found["missing"][0]["effect"] == "EBJ3:harmonic2"
+    assert found["missing"][0]["peak_um"] == pytest.approx(150.0, rel=0.1)

@@ -20,7 +20,7 @@ from monitor.records import Campaign
 from monitor.units import DEGREE, MICROMETRE
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-FOLDERS = sorted(path.name for path in EXAMPLES.iterdir() if (path / "campaign.toml").is_file())
+FOLDERS = sorted(path.name for path in EXAMPLES.iterdir() if (path / "probings.csv").is_file())
 
 
 def assert_same(one: Campaign, other: Campaign) -> None:

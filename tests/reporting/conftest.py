@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import date, datetime
 
 import numpy as np
@@ -13,6 +14,8 @@ from monitor.reporting.assembly import certificate_record
 from monitor.reporting.certificate import CertificateRecord, NotApplicable, Party, Person
 from monitor.reporting.laboratory import LaboratoryFile
 from monitor.reporting.results import RefusedParameters, ResidualSummary, ResultSet, result_set
+from monitor.reporting.texts import texts_of
+from monitor.reporting.volumetric_result import Length, VolumetricResult
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
 
 NAMES = [
@@ -39,7 +42,7 @@ U = np.array([1.9, 1.7, 0.28, 2.0, 1.7, 2.3, 2.7, 2.2, 0.33, 0.36, 6.2, 5.7, 6.3
 def make_result() -> Callable[..., ResultSet]:
     """A result of m parameters with a full-rank correlation; those in ``refused`` have no number."""
 
-    def make(m: int = 13, refused: tuple[RefusedParameters, ...] = ()) -> ResultSet:
+    def make(m: int = 13, refused: tuple[RefusedParameters, ...] = (), language: str = "en") -> ResultSet:
         rng = np.random.default_rng(7)
         names = [NAMES[i] if i < 13 else f"EYX:table{i}@spindle_temperature_degC" for i in range(m)]
         units = [UNITS[i % 13] for i in range(m)]
@@ -60,7 +63,7 @@ def make_result() -> Callable[..., ResultSet]:
             units,
             estimate,
             covariance,
-            state="as found",
+            state=texts_of(language)("record.as_found"),
             p=0.95,
             k_p=4.73,
             k_q=2.95,
@@ -68,9 +71,38 @@ def make_result() -> Callable[..., ResultSet]:
             evaluation="GUM uncertainty framework (JCGM 102:2011, clause 6)",
             refused=refused,
             residuals=ResidualSummary("target", ("1", "2", "S1"), (1.12, 0.93, 2.41), 1.0),
+            texts=texts_of(language),
         )
 
     return make
+
+
+def _map(language: str) -> VolumetricResult:
+    """A volumetric error that grows from the middle of the strokes, where the workpiece's zero was set."""
+    steps = np.linspace(-1.0, 1.0, 5)
+    cube = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    vectors = cube @ np.array([[9.0, -3.0, 0.5], [2.0, 12.0, 0.0], [1.0, 4.0, -7.0]])
+    lengths = np.linalg.norm(vectors, axis=1)
+    corner = (("X", -250.0, "mm"), ("B", -90.0, "°"), ("Y", 200.0, "mm"), ("Z", 180.0, "mm"))
+    return VolumetricResult(
+        state=texts_of(language)("record.as_found"),
+        p=0.95,
+        k=2.13,
+        ranges=(("X", -250.0, 250.0), ("Y", -200.0, 200.0), ("Z", -180.0, 180.0)),
+        from_strokes=True,
+        each=5,
+        poses=12,
+        points=1500,
+        datum=(("X", 0.0, "mm"), ("Y", 0.0, "mm"), ("Z", 0.0, "mm")),
+        largest=Length(41.27, 1.06, 2.26, corner),
+        mean=Length(12.4, 0.8, 1.7),
+        rms=Length(15.1, 0.77, 1.64),
+        left_out=(("EXX", "the plan does not determine it"),),
+        axes=("X", "Y", "Z"),
+        readings_mm=cube * np.array([250.0, 200.0, 180.0]),
+        vectors_um=vectors,
+        expanded_um=0.8 + 0.05 * lengths,
+    )
 
 
 @pytest.fixture(scope="session")
@@ -132,17 +164,20 @@ def campaign() -> Campaign:
 def make_record(
     make_result: Callable[..., ResultSet], laboratory: LaboratoryFile, campaign: Campaign
 ) -> Callable[..., CertificateRecord]:
-    """A complete record over a result of m parameters."""
+    """A complete record over a result of m parameters, in a language, with so many maps of the volumetric error."""
 
-    def make(m: int = 13, refused: tuple[RefusedParameters, ...] = ()) -> CertificateRecord:
+    def make(
+        m: int = 13, refused: tuple[RefusedParameters, ...] = (), language: str = "en", maps: int = 0
+    ) -> CertificateRecord:
         return certificate_record(
-            laboratory,
+            replace(laboratory, language=language),
             campaign,
             1,
-            [make_result(m, refused)],
+            [make_result(m, refused, language)],
             number="K-2026-0042",
             issued_on=date(2026, 3, 3),
             model="samba, version 1",
+            volumetric=[_map(language)] * maps,
         )
 
     return make

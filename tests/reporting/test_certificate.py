@@ -17,6 +17,7 @@ from monitor.reporting.certificate import (
     CertificateRecord,
     IncompleteCertificateError,
     NotApplicable,
+    Replaced,
     check_complete,
     missing_items,
 )
@@ -36,6 +37,8 @@ def test_17025_every_letter_of_both_clauses_has_a_field() -> None:
         "accreditation",
         "country",
         "replaces",
+        "volumetric",
+        "language",
     }
 
 
@@ -90,6 +93,19 @@ def test_17025_result_without_state_or_evaluation_is_incomplete(make_record: Mak
     result = dataclasses.replace(record.results[0], state="", evaluation=" ")
     parts = [one.part for one in missing_items(dataclasses.replace(record, results=(result,)))]
     assert parts == ["state of the machine (as found, as left)", "how the uncertainty was evaluated"]
+
+
+def test_17025_7_8_8_a_replacing_certificate_without_number_or_reason_is_incomplete(
+    make_record: Make,
+) -> None:
+    record = make_record()
+    assert (
+        missing_items(dataclasses.replace(record, replaces=Replaced("N", date(2026, 1, 1), "why", "ab")))
+        == ()
+    )
+    missing = missing_items(dataclasses.replace(record, replaces=Replaced(None, None, " ", None)))
+    assert [one.part for one in missing] == ["number", "issued_on", "reason", "sha256"]
+    assert {one.clause for one in missing} == {"7.8.8.1 and 7.8.8.3"}
 
 
 def test_incomplete_certificate_is_refused_with_the_whole_list(make_record: Make) -> None:

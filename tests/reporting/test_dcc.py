@@ -19,8 +19,10 @@ from monitor.reporting.certificate import (
     ConformityStatement,
     ConformityVerdict,
     IncompleteCertificateError,
+    Replaced,
 )
-from monitor.reporting.dcc import DCC, SI, dcc_xml, unit_of
+from monitor.reporting.dcc import dcc_xml
+from monitor.reporting.dcc_results import DCC, SI, unit_of
 from monitor.reporting.render import certificate_pdf
 from monitor.reporting.results import RefusedParameters
 
@@ -74,8 +76,10 @@ def test_ptb_dcc_3_2_1_schema_validates_every_part(record: CertificateRecord, ma
     parser = etree.XMLParser()
     parser.resolvers.add(Local())
     schema = etree.XMLSchema(etree.parse(str(SCHEMAS / "dcc-3.2.1.xsd"), parser))
+    old = Replaced("K-2026-0041", record.issued_on, "wrong customer", "0" * 64)
     for one in (
         record,
+        dataclasses.replace(make_record(13, language="de", maps=1), country="DE", replaces=old),
         dataclasses.replace(make_record(30), country="FR"),
         dataclasses.replace(make_record(1), country="US"),
     ):
@@ -149,3 +153,56 @@ def test_what_is_missing_is_refused_and_not_invented(make_record: Make) -> None:
         dcc_xml(dataclasses.replace(make_record(), country="DE", place=None))
     with pytest.raises(InputError, match="unit furlong has no D-SI notation"):
         unit_of("furlong")
+
+
+def test_iso_17025_7_8_8_3_the_replaced_certificate_is_named_with_its_hash(make_record: Make) -> None:
+    made = make_record()
+    old = Replaced("K-2026-0041", made.issued_on, "wrong customer", "ab" * 32)
+    core = ET.fromstring(dcc_xml(dataclasses.replace(made, country="DE", replaces=old))).find(
+        ".//dcc:coreData", SPACES
+    )
+    assert core is not None
+    change = core.find("dcc:reportAmendedSubstituted", SPACES)
+    assert change is not None
+    assert [one.text for one in change] == ["substituted", "K-2026-0041"]
+    assert core.findtext("dcc:previousReport/dcc:procedure", None, SPACES) == "SHA-256"
+    assert core.findtext("dcc:previousReport/dcc:value", None, SPACES) == "ab" * 32
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_every_text_says_its_language(make_record: Make, language: str) -> None:
+    tree = ET.fromstring(
+        dcc_xml(dataclasses.replace(make_record(13, language=language, maps=1), country="DE"))
+    )
+    for name in ("usedLangCodeISO639_1", "mandatoryLangCodeISO639_1"):
+        assert tree.findtext(f".//dcc:{name}", None, SPACES) == language
+    said = [(one.get("lang"), one.text) for one in tree.iterfind(".//dcc:content", SPACES)]
+    assert len(said) > 40
+    assert {text for lang, text in said if lang != language} <= {"machine-health-monitor"}
+
+
+def test_d_si_2_1_the_volumetric_error_has_its_expanded_uncertainty(make_record: Make) -> None:
+    made = make_record(13, maps=1)
+    tree = ET.fromstring(dcc_xml(dataclasses.replace(made, country="DE")))
+    found = [
+        (float(str(one.findtext("si:value", None, SPACES))),
+         float(str(one.findtext("si:expandedUnc/si:uncertainty", None, SPACES))),
+         float(str(one.findtext("si:expandedUnc/si:coverageFactor", None, SPACES))))
+        for one in tree.iterfind(".//si:real", SPACES)
+    ]  # fmt: skip
+    (printed,) = made.volumetric
+    lengths = (printed.largest, printed.rms, printed.mean)
+    assert found == [(one.value_um, one.expanded_um, printed.k) for one in lengths]
+
+
+@pytest.mark.parametrize(
+    ("name", "notation"),
+    [
+        ("µm", r"\micro\metre"),
+        ("µrad/m", r"\micro\radian\per\metre"),
+        ("µm/m²", r"\micro\metre\per\metre\tothe{2}"),
+        ("µm/m/K", r"\micro\metre\per\metre\per\kelvin"),
+    ],
+)
+def test_d_si_2_1_units(name: str, notation: str) -> None:
+    assert unit_of(name) == notation

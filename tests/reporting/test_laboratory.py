@@ -58,15 +58,17 @@ def test_what_the_file_does_not_say_stays_unknown(tmp_path: Path) -> None:
     )
 
 
-def test_the_example_answers_every_question() -> None:
-    example = Path(__file__).resolve().parents[2] / "examples" / "laboratory.toml"
-    found = read_laboratory(example)
+@pytest.mark.parametrize(
+    ("name", "made_up"), [("laboratory.toml", "made up"), ("laboratory-de.toml", "erfunden")]
+)
+def test_the_examples_answer_every_question(name: str, made_up: str) -> None:
+    found = read_laboratory(Path(__file__).resolve().parents[2] / "examples" / name)
     # What the campaign knows (the machine, the bar's certificate) and what only some laboratories have.
     optional = {"accreditation", "item_description", "item_identification", "scale_bar"}
     unanswered = {name for name in found.__dataclass_fields__ if getattr(found, name) is None}
     assert unanswered == optional
     assert found.laboratory is not None
-    assert "made up" in str(found.laboratory.name)
+    assert made_up in str(found.laboratory.name)
 
 
 def test_all_faults_are_listed_together(tmp_path: Path) -> None:
@@ -78,6 +80,7 @@ def test_all_faults_are_listed_together(tmp_path: Path) -> None:
         statements = "none"
         [laboratory]
         nam = "x"
+        language = "tlh"
         address = "one line"
         [customer]
         name = 3
@@ -94,7 +97,8 @@ def test_all_faults_are_listed_together(tmp_path: Path) -> None:
         "there is no section [customers]; there are laboratory, customer, item, method, traceability, statements, "
         "authorised_by",
         "statements is a section: write [statements] and its keys below",
-        "[laboratory] has no key nam; it has name, address, contact, accreditation, country",
+        "[laboratory] has no key nam; it has name, address, contact, accreditation, country, language",
+        "laboratory.language is one of de, en, but is 'tlh'",
         'laboratory.address is a list of lines, for example ["1 Example Road", "Town"], but is \'one line\'',
         "customer.name is a text in quotes, but is 3",
         "item.received_on is a date without quotes, for example 2026-03-02, but is '1 March'",

@@ -27,6 +27,11 @@ from monitor.reporting.symbols import describe
         ("EZC1:const@warmup", "axial displacement of spindle C1 (const@warmup)"),
         ("EXC", "displacement in X of axis C"),
         ("ball:2:moved", "ball:2:moved"),
+        ("EXX(-88)", "positioning error of axis X at -88 mm"),
+        ("EYX(22)", "straightness error in Y of axis X at 22 mm"),
+        ("EX0C(75)", "position in X of axis C at 75°"),
+        ("ECC(75)", "angular positioning error of axis C at 75°"),
+        ("shape(W7)", "deviation of point W7 along its normal"),
     ],
 )
 def test_iso_230_1_symbol_in_words(symbol: str, words: str) -> None:

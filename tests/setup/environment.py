@@ -18,7 +18,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parents[2]
 VENV = CHECKOUT / ".venv"
 PYTHON = VENV / "bin" / "python"
-EXTRAS = "dev,sign,web,cluster"
+EXTRAS = "dev,sign,token,web,cluster"
 
 # What WeasyPrint opens at run time, and the Debian and Ubuntu package that holds it.
 LIBRARIES = {

@@ -35,7 +35,7 @@ def make_run():
 
     def make(topology, added=(), *, spindle=True, poses=12, noise=1e-3, size=1e-5, seed=1):
         rng = np.random.default_rng(seed)
-        chain = parse_topology(topology)
+        chain = parse_topology(topology) if isinstance(topology, str) else topology
         base = tuple(parse_effect(text, chain) for text in base_effects(chain))
         more = tuple(parse_effect(text, chain) for text in added)
         places = np.array([[100.0, 10, 150], [-5, 120, 160], [-110, -10, 100], [10, -115, 80], [0, 30, 20]])

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from monitor.machine import chain_of_axes
+from monitor.records import ChainAxis
 from monitor.uncertainty import sensitivity_of
 from monitor.uncertainty.kernel import LANES, gradient_of
 from monitor.uncertainty.program import compile_program
@@ -35,6 +37,22 @@ def compare(run, trials, size=1e-5, seed=2):
 @pytest.mark.parametrize("topology", TOPOLOGIES)
 def test_gradient_of_every_topology(make_run, topology):
     assert compare(make_run(topology), 5) < 1e-9
+
+
+SLANTED = chain_of_axes(
+    [
+        ChainAxis("X", "linear", "work", (0.8, -0.6, 0.0), (10.0, 0.0, 5.0)),
+        ChainAxis("B", "rotary", "work", (0.0, 0.6, -0.8), (0.0, -20.0, 0.0)),
+        ChainAxis("Y", "linear", "tool", (0.0, 1.0, 0.0)),
+        ChainAxis("Z", "linear", "tool", (0.0, 0.28, 0.96)),
+        ChainAxis("C", "rotary", "tool", (0.0, 0.0, -1.0), (0.0, 30.0, 0.0)),
+        ChainAxis("B2", "rotary", "tool", (0.0, 2**-0.5, 2**-0.5), (15.0, 0.0, 100.0)),
+    ]
+)
+
+
+def test_gradient_of_slanted_axes_with_offsets(make_run):
+    assert compare(make_run(SLANTED), 5) < 1e-9
 
 
 @pytest.mark.parametrize("trials", [1, LANES - 1, LANES, LANES + 1])

@@ -8,7 +8,7 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
-from datetime import UTC, date, datetime, timedelta
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +20,11 @@ from monitor.exceptions import InputError
 from monitor.readers import read_campaign
 from monitor.reporting.certificate import CertificateRecord, ConformityStatement
 from monitor.reporting.documents import from_document, to_document
-from monitor.reporting.render import certificate_pdf
-from monitor.reporting.signature import sign
+from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
-from monitor.workflow.certificate_checks import digital, remake, verify
+from monitor.workflow.certificate_checks import digital, remake
 from monitor.workflow.certificate_results import results_of
-from monitor.workflow.certificates import issue, withdraw
+from monitor.workflow.certificates import issue
 from monitor.workflow.conformity import statement_of
 from monitor.workflow.uncertainty import Evaluated, evaluate
 
@@ -111,7 +110,7 @@ def test_iso_19005_3_6_8_every_attached_file_stands_once_in_af_with_its_relation
 def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, found: Evaluated) -> None:
     attached = pypdf.PdfReader(guarded).attachments
     rows = list(csv.DictReader(io.StringIO(attached["results-1.csv"][0].decode())))
-    result = results_of(found)
+    result = results_of(found, texts_of())
     assert [row["parameter"] for row in rows] == list(result.names)
     assert [float(row["estimate"]) for row in rows] == result.estimate.tolist()
     assert [float(row["standard_uncertainty"]) for row in rows] == result.u.tolist()
@@ -138,8 +137,13 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: Evaluated) -> None:
     expanded = [
         unit.to_display(float(guf.expanded[place])) for unit, place in zip(units, places, strict=True)
     ]
+    result, english = results_of(found, texts_of()), texts_of()
+
+    def stated(rule: str) -> ConformityStatement:
+        return statement_of(result, rule, english, campaign="limited", dof=guf.dof)
+
     verdicts = {
-        rule: {one.name: one.verdict for one in statement_of(found, rule).verdicts}
+        rule: {one.name: one.verdict for one in stated(rule).verdicts}
         for rule in ("simple", "guard", "probability")
     }
     for name, value, width in zip(LIMITS, y, expanded, strict=True):
@@ -153,10 +157,10 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: Evaluated) -> None:
     assert verdicts["guard"]["EXX"] == "conditional pass"
     assert verdicts["guard"]["EA0B"] == "pass"
     assert verdicts["probability"]["EX0C"] == "fail"
-    for one in statement_of(found, "probability").verdicts:
+    for one in stated("probability").verdicts:
         assert (one.verdict == "pass") == (one.probability >= 0.95)
-    joint = statement_of(found, "simple").joint_probability
-    assert joint <= min(one.probability for one in statement_of(found, "simple").verdicts)
+    joint = stated("simple").joint_probability
+    assert joint <= min(one.probability for one in stated("simple").verdicts)
 
 
 def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(guarded: Path) -> None:
@@ -184,7 +188,7 @@ def test_remake_says_when_the_stored_document_is_another(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        "monitor.workflow.certificate_checks.certificate_pdf", lambda record, inputs: b"other"
+        "monitor.workflow.certificate_checks.certificate_pdf", lambda record, fonts, inputs: b"other"
     )
     again = remake(db, "G-1")
     assert again["identical"] is False
@@ -193,79 +197,3 @@ def test_remake_says_when_the_stored_document_is_another(
         pass
     assert main(["--db", str(tmp_path / "empty.duckdb"), "certificate", "show", "--remake", "x.pdf"]) == 2
     assert "--remake needs the number" in capsys.readouterr().err
-
-
-def test_a_signed_certificate_is_verified_check_by_check(db: Database, tmp_path: Path) -> None:
-    pytest.importorskip("pyhanko", reason="the extra [sign] is not installed")
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes
-    from cryptography.hazmat.primitives.asymmetric import rsa
-    from cryptography.hazmat.primitives.serialization import NoEncryption, pkcs12
-
-    key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
-    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "Made-up Laboratory")])
-    now = datetime.now(UTC)
-    certificate = (
-        x509.CertificateBuilder().subject_name(name).issuer_name(name).public_key(key.public_key()).serial_number(1)
-        .not_valid_before(now - timedelta(days=1)).not_valid_after(now + timedelta(days=9))
-        .add_extension(x509.KeyUsage(True, True, *[False] * 7), critical=True)
-        .sign(key, hashes.SHA256())
-    )  # fmt: skip
-    p12 = tmp_path / "lab.p12"
-    p12.write_bytes(pkcs12.serialize_key_and_certificates(b"lab", key, certificate, None, NoEncryption()))
-    made = issue(db, "limited", 20, LABORATORY, out=tmp_path, number="S-1", issued_on=DAY, key=p12)
-    file = Path(made["file"])
-    good = verify(db, file)
-    assert good["ok"] is True
-    assert good["checks"] == {"hash": True, "chain": True, "signature": True, "database": True}
-    assert good["signer"] == "Common Name: Made-up Laboratory"
-    assert remake(db, "S-1")["identical"] is True
-    whole = file.read_bytes()
-    altered = bytearray(whole)
-    altered[whole.index(b"stream", whole.index(b"/EmbeddedFile")) + 40] ^= 1
-    file.write_bytes(bytes(altered))
-    bad = verify(db, file)
-    assert bad["ok"] is False
-    assert bad["checks"] == {"hash": False, "chain": True, "signature": False, "database": False}
-    assert any("altered after it was signed" in fault for fault in bad["faults"])
-    # A forged copy with another good signature: the signature holds, the database does not know it.
-    forged = tmp_path / "forged.pdf"
-    record = from_document(CertificateRecord, load_certificate(db, "S-1").record)
-    forged.write_bytes(sign(certificate_pdf(record), p12, None))
-    assert verify(db, forged)["checks"] == {
-        "hash": False, "chain": True, "signature": True, "database": False
-    }  # fmt: skip
-    # What no hash says: a genuine file that was withdrawn.
-    file.write_bytes(whole)
-    withdraw(db, "S-1", "the bar was damaged")
-    late = verify(db, file)
-    assert late["checks"] == {"hash": True, "chain": True, "signature": True, "database": False}
-    assert late["ok"] is False
-
-
-def test_17025_7_8_8_3_an_amended_certificate_has_a_new_number_the_reason_and_names_the_old(
-    db: Database, tmp_path: Path
-) -> None:
-    issue(db, "limited", 20, LABORATORY, out=tmp_path, number="A-1", issued_on=DAY)
-    with pytest.raises(InputError, match="say why certificate A-1 is replaced"):
-        issue(db, "limited", 20, LABORATORY, out=tmp_path, number="A-2", issued_on=DAY, replaces="A-1")
-    with pytest.raises(InputError, match="a draft replaces nothing"):
-        issue(
-            db, "limited", 20, LABORATORY, out=tmp_path, issued_on=DAY, draft=True, replaces="A-1", reason="x"
-        )  # fmt: skip
-    made = issue(
-        db, "limited", 20, LABORATORY, out=tmp_path, number="A-2", issued_on=DAY, replaces="A-1",
-        reason="the customer's address was wrong",
-    )  # fmt: skip
-    page = " ".join(pypdf.PdfReader(made["file"]).pages[0].extract_text().split())
-    assert "It replaces certificate A-1 of 2026-03-12: the customer's address was wrong" in page
-    old = load_certificate(db, "A-1")
-    assert (old.state, old.replaced_by, old.reason) == ("amended", "A-2", "the customer's address was wrong")
-    assert verify(db, tmp_path / "certificate-A-1.pdf")["ok"] is False
-    assert verify(db, tmp_path / "certificate-A-2.pdf")["ok"] is True
-    assert remake(db, "A-2")["identical"] is True
-    with pytest.raises(InputError, match="certificate A-1 is amended; only an issued one can be replaced"):
-        issue(
-            db, "limited", 20, LABORATORY, out=tmp_path, number="A-3", issued_on=DAY, replaces="A-1", reason="x"
-        )  # fmt: skip
-    assert not (tmp_path / "certificate-A-3.pdf").exists()

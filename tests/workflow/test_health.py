@@ -401,6 +401,19 @@ def test_a_report_made_late_says_what_one_made_on_monday_said(
     assert stored(fleet, "B-stepped").basis == then.basis
 
 
+def test_a_first_report_has_the_whole_history_though_nothing_of_it_was_identified(tmp_path: Path) -> None:
+    with Database(tmp_path / "first.duckdb", threads=1) as db:
+        for example in ("cold-cold", "five-days"):
+            import_campaign(db, read_campaign(EXAMPLES / example))
+        report(db, "2026-W10", out=tmp_path, made_at=MADE)
+        before = db.rows("SELECT count(*) FROM v_runs WHERE campaign = 'cold-cold'")[0][0]
+        times = stored(db, "HU40-T").parameters[0].history.times
+        assert len(times) == before + 16
+        assert times[0].date() == date(2026, 2, 17)
+        # Three weeks of history and no change since 5 March: a trend a year would be scatter.
+        assert all(one.drift is None for one in stored(db, "HU40-T").parameters)
+
+
 def test_machines_outside_the_chosen_campaigns_are_left_out(
     fleet: Database, week10: dict, tmp_path: Path
 ) -> None:

@@ -12,8 +12,9 @@ from monitor.methods.virtual import virtual_campaign
 from monitor.store import Database
 from monitor.workflow import models
 from monitor.workflow.campaigns import import_folders
+from monitor.workflow.known_errors import _of_shared
 from monitor.workflow.simulation import simulate
-from monitor.workflow.volumetric import _of_shared, volumetric_map
+from monitor.workflow.volumetric import volumetric_map
 
 
 @pytest.fixture(scope="module")

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from datetime import date
 from pathlib import Path
+from typing import Any
 
 from monitor.cli import output
 from monitor.cli.database import opened
+from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, told
 from monitor.exceptions import InputError
-from monitor.readers import read_linear_axes
 from monitor.workflow import certificate_checks, certificates
-from monitor.workflow.conformity import RULES
 
 EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/laboratory.toml"
 
@@ -22,31 +21,8 @@ def options(parser: ArgumentParser) -> None:
     issued = verbs.add_parser("issue", **told("a certificate for one run", EXAMPLE))
     issued.add_argument("campaign", metavar="CAMPAIGN")
     issued.add_argument("--run", type=int, required=True, metavar="N", dest="number_of_run")
-    issued.add_argument(
-        "--laboratory", type=Path, required=True, metavar="FILE", help="what the laboratory states"
-    )
-    issued.add_argument("--out", type=Path, metavar="PATH", help="a folder, or a file ending in .pdf")
-    issued.add_argument("--number", metavar="NUMBER", help="default: the next of the year")
-    issued.add_argument(
-        "--date", type=date.fromisoformat, metavar="YYYY-MM-DD", help="of issue; default: today"
-    )
-    issued.add_argument("--model", metavar="NAME")
-    issued.add_argument(
-        "--linear-axes", type=Path, metavar="FILE",
-        help="errors of the linear axes (TOML), for methods that take these axes as known",
-    )  # fmt: skip
+    add_issuing(issued)
     issued.add_argument("--draft", action="store_true", help="a draft, to be looked at")
-    issued.add_argument(
-        "--conformity",
-        choices=RULES,
-        help="state conformity with the machine's tolerances by this rule",
-    )
-    issued.add_argument(
-        "--sign", type=Path, metavar="P12", help="sign it with the key of a PKCS#12 file (extra [sign])"
-    )
-    issued.add_argument(
-        "--passphrase-file", type=Path, metavar="FILE", help="its first line opens the PKCS#12 file"
-    )
     issued.add_argument(
         "--replaces", metavar="NUMBER", help="the certificate that this one amends; it is marked so"
     )
@@ -63,6 +39,11 @@ def options(parser: ArgumentParser) -> None:
         "--dcc", type=Path, metavar="PATH",
         help="write the digital certificate, PTB DCC 3.2.1 (a folder, or a file ending in .xml)",
     )  # fmt: skip
+    shown.add_argument(
+        "--pdf", type=Path, metavar="PATH",
+        help="write the document as it was issued (a folder, or a file ending in .pdf)",
+    )  # fmt: skip
+    add_fonts(shown)
     shown.set_defaults(run=_show)
     verified = verbs.add_parser(
         "verify",
@@ -79,23 +60,25 @@ def options(parser: ArgumentParser) -> None:
     amended = verbs.add_parser(
         "amend",
         **told(
-            "mark as replaced by another certificate",
-            "monitor certificate amend 2026-0001 --by 2026-0002 --reason 'wrong customer'",
+            "a new certificate that replaces another and says so; the old one is marked",
+            "monitor certificate amend 2026-0001 --laboratory laboratory.toml --reason 'wrong customer'",
         ),
     )
-    amended.add_argument("number", metavar="NUMBER")
+    amended.add_argument("replaces", metavar="NUMBER")
+    amended.add_argument("--reason", required=True, help="why it is replaced, as printed")
+    amended.add_argument("--campaign", metavar="CAMPAIGN", help="default: that of the old certificate")
     amended.add_argument(
-        "--by", required=True, metavar="NEW", help="the number of the certificate that replaces it"
+        "--run", type=int, metavar="N", dest="number_of_run", help="default: that of the old certificate"
     )
-    amended.add_argument("--reason", required=True)
-    amended.set_defaults(run=_mark)
+    add_issuing(amended)
+    amended.set_defaults(run=_amend)
     withdrawn = verbs.add_parser(
         "withdraw",
         **told("mark as withdrawn", "monitor certificate withdraw 2026-0001 --reason 'the bar was damaged'"),
     )
     withdrawn.add_argument("number", metavar="NUMBER")
     withdrawn.add_argument("--reason", required=True)
-    withdrawn.set_defaults(run=_mark, by=None)
+    withdrawn.set_defaults(run=_withdraw)
     for one in (issued, shown, verified, amended, withdrawn):
         common(one)
 
@@ -103,41 +86,46 @@ def options(parser: ArgumentParser) -> None:
 def _issue(options: Namespace) -> int:
     with opened(options, threads=1) as db, output.working("issuing"):
         found = certificates.issue(
-            db, options.campaign, options.number_of_run, options.laboratory, out=options.out, number=options.number,
-            issued_on=options.date, model=options.model, draft=options.draft,
-            linear_axes=None if options.linear_axes is None else read_linear_axes(options.linear_axes),
-            conformity=options.conformity, key=options.sign, passphrase=_passphrase(options.passphrase_file),
-            replaces=options.replaces, reason=options.reason,
+            db, options.campaign, options.number_of_run, options.laboratory, draft=options.draft,
+            replaces=options.replaces, reason=options.reason, **issuing(options),
         )  # fmt: skip
-    if options.json:
+    return _issued(found, options.json)
+
+
+def _amend(options: Namespace) -> int:
+    with opened(options, threads=1) as db, output.working("issuing"):
+        found = certificates.amend(
+            db, options.replaces, options.laboratory, options.reason, campaign=options.campaign,
+            run=options.number_of_run, **issuing(options),
+        )  # fmt: skip
+    return _issued(found, options.json)
+
+
+def _issued(found: dict[str, Any], as_json: bool) -> int:
+    if as_json:
         output.document(found)
     else:
         output.say(f"certificate {found['number']} ({found['state']}): {found['file']}")
     return 0
 
 
-def _passphrase(file: Path | None) -> str | None:
-    if file is None:
-        return None
-    try:
-        return (file.read_text(encoding="utf-8").splitlines() or [""])[0]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"the passphrase file {file} cannot be read: {error}") from error
-
-
 def _show(options: Namespace) -> int:
-    for wish, path in (("--remake", options.remake), ("--dcc", options.dcc)):
+    for wish, path in (("--remake", options.remake), ("--dcc", options.dcc), ("--pdf", options.pdf)):
         if path is not None and options.number is None:
             raise InputError(
                 f"{wish} needs the number of a certificate; `monitor certificate show` lists them"
             )
     if options.remake is not None:
         return _remake(options)
-    if options.dcc is not None:
-        with opened(options) as db:
-            made = certificate_checks.digital(db, options.number, options.dcc)
-        output.document(made) if options.json else output.say(made["file"])
-        return 0
+    for path, write in (
+        (options.dcc, certificate_checks.digital),
+        (options.pdf, certificate_checks.stored_file),
+    ):
+        if path is not None:
+            with opened(options) as db:
+                made = write(db, options.number, path)
+            output.document(made) if options.json else output.say(made["file"])
+            return 0
     with opened(options) as db:
         found = certificate_checks.show(db, options.number)
     if options.json:
@@ -151,7 +139,7 @@ def _show(options: Namespace) -> int:
 
 def _remake(options: Namespace) -> int:
     with opened(options) as db, output.working("making it again"):
-        found = certificate_checks.remake(db, options.number, options.remake)
+        found = certificate_checks.remake(db, options.number, options.remake, options.font)
     if options.json:
         output.document(found)
     else:
@@ -181,9 +169,9 @@ def _verify(options: Namespace) -> int:
     return 0 if found["ok"] else 1
 
 
-def _mark(options: Namespace) -> int:
+def _withdraw(options: Namespace) -> int:
     with opened(options) as db:
-        found = certificates.withdraw(db, options.number, options.reason, options.by)
+        found = certificates.withdraw(db, options.number, options.reason)
     if options.json:
         output.document(found)
     else:

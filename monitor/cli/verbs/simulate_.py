@@ -22,13 +22,19 @@ def options(parser: ArgumentParser) -> None:
         "--peak", type=float, default=5.0, metavar="UM", help="its largest displacement (default 5 µm)"
     )
     parser.add_argument(
-        "--noise", type=float, default=1.0, metavar="UM", help="of a reading, standard deviation (1 µm)"
+        "--noise",
+        type=float,
+        metavar="UM",
+        help="of a reading, standard deviation (1 µm; 20 µm of a tracker)",
+    )
+    parser.add_argument(
+        "--robot", action="store_true", help="a robot seen by a tracker instead of a machine tool"
     )
     parser.add_argument("--seed", type=int, default=1, metavar="S")
 
 
 def run(options: Namespace) -> int:
-    found = simulate(options.out, options.effect, options.peak, options.noise, options.seed)
+    found = simulate(options.out, options.effect, options.peak, options.noise, options.seed, options.robot)
     if options.json:
         output.document(found)
     else:

@@ -36,8 +36,9 @@ SAME_UNIT = {"day": "d"}
 CLOCKS = ("ms", "s", "min", "h", "d", "week", "month", "year")
 DATE_UNIT = "d"
 NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
-#: A column of whole numbers without a unit that names things rather than counts them: so many rows a label at least.
-ROWS_A_LABEL = 3
+#: A column of whole numbers without a unit that names things (operator 1 and 2) rather than counts them: at most so
+#: many different ones, with so many rows each on average. Others are listed under ``groups``.
+MOST_LABELS, ROWS_A_LABEL = 6, 3
 RESERVED = ("sequence", "formula", "pi")
 
 
@@ -209,13 +210,17 @@ def _columns(table: CsvTable, told: _Told, faults: Faults) -> Columns:
     labels: dict[str, np.ndarray[tuple[int], np.dtype[np.str_]]] = {}
     units: dict[str, str] = {}
     dated: list[str] = []
+    # What the base model names is an input, whatever its values look like.
+    numeric = {told.response, told.time, *told.inputs, *NAME.findall(told.base or "")}
     for name, cells in table.columns.items():
         days = None if name in (*told.groups, told.response) else _days(cells)
         if days is not None:
             columns[name], units[name] = days, DATE_UNIT
             dated.append(name)
-        elif name in told.groups or (
-            name not in (*told.inputs, told.response, told.time) and _are_labels(cells)
+        elif (
+            name in told.groups
+            or (_are_words(cells) and name not in (told.response, *told.inputs))
+            or (name not in numeric and not _unit(name) and _are_labels(cells))
         ):
             _refuse_empty(table, name, cells, faults)
             labels[name] = np.array(cells, dtype=np.str_)
@@ -223,7 +228,6 @@ def _columns(table: CsvTable, told: _Told, faults: Faults) -> Columns:
             columns[name] = numbers(table, name, faults).values
             units[name] = _unit(name)
     units |= told.units
-    # In the model a column of whole numbers is an input, whatever its values look like.
     clocks = [name for name in columns if name != told.response and units[name] in CLOCKS]
     time = told.time or (dated[0] if dated else clocks[0] if len(clocks) == 1 else None)
     if told.time is not None and told.time not in columns:
@@ -246,16 +250,15 @@ def _refuse_empty(table: CsvTable, name: str, cells: Sequence[str], faults: Faul
 
 
 def _are_labels(cells: Sequence[str]) -> bool:
-    """Whether a column names things: words, or few whole numbers that come again and again."""
-    try:
-        values = [float(cell) for cell in cells if cell]
-    except ValueError:
-        # One mistyped number does not make a column of words.
-        return sum(_is_number(cell) for cell in cells) < len(cells) / 2
-    if not values or len(values) < len(cells):
-        return False
-    whole = all(re.fullmatch(r"[0-9]+\.?", cell) for cell in cells)
-    return False if not whole else 2 <= len(set(values)) <= len(cells) / ROWS_A_LABEL
+    """Whether a column of whole numbers names things: few that come again and again."""
+    values = set(cells)
+    whole = all(re.fullmatch(r"[0-9]+\.?", cell) for cell in values)
+    return whole and 2 <= len(values) <= min(MOST_LABELS, len(cells) / ROWS_A_LABEL)
+
+
+def _are_words(cells: Sequence[str]) -> bool:
+    """Whether most cells are no numbers: one mistyped number does not make a column of words."""
+    return sum(_is_number(cell) for cell in cells) < len(cells) / 2
 
 
 def _is_number(cell: str) -> bool:

@@ -1,0 +1,125 @@
+"""What `certificate issue` and `amend` ask for alike: the laboratory, what is stated, the key that signs."""
+
+from __future__ import annotations
+
+import os
+from argparse import ArgumentParser, Namespace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from monitor.exceptions import InputError
+from monitor.readers import read_linear_axes
+from monitor.reporting.signing import FileKey, Key, TokenKey
+from monitor.workflow.certificate_results import METHODS
+from monitor.workflow.conformity import RULES
+
+#: The environment variable with a token's PIN, unless --pin-from names another; an argument could be seen by others.
+PIN = "MONITOR_TOKEN_PIN"
+
+
+def add_issuing(parser: ArgumentParser) -> None:
+    """The options of a certificate that is to be issued."""
+    parser.add_argument(
+        "--laboratory", type=Path, required=True, metavar="FILE", help="what the laboratory states"
+    )
+    parser.add_argument("--out", type=Path, metavar="PATH", help="a folder, or a file ending in .pdf")
+    parser.add_argument("--number", metavar="NUMBER", help="default: the next of the year")
+    parser.add_argument(
+        "--date", type=date.fromisoformat, metavar="YYYY-MM-DD", help="of issue; default: today"
+    )
+    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--linear-axes", type=Path, metavar="FILE",
+        help="errors of the linear axes (TOML), for methods that take these axes as known",
+    )  # fmt: skip
+    parser.add_argument(
+        "--method", choices=METHODS, default="guf",
+        help="state the GUM framework's result, or the stored Monte Carlo result (default guf)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--conformity",
+        choices=RULES,
+        help="state conformity with the machine's tolerances by this rule",
+    )
+    parser.add_argument("--map", action="store_true", help="state the volumetric error too, with its figure")
+    add_fonts(parser)
+    signing = parser.add_argument_group("signature (extra [sign]; for a token, extra [token])")
+    signing.add_argument("--sign", type=Path, metavar="P12", help="sign with the key of a PKCS#12 file")
+    signing.add_argument(
+        "--passphrase-file", type=Path, metavar="FILE", help="its first line opens the PKCS#12 file"
+    )
+    signing.add_argument(
+        "--token",
+        type=Path,
+        metavar="LIBRARY",
+        help="sign with a key on a PKCS#11 token: its maker's library",
+    )
+    signing.add_argument("--token-label", metavar="LABEL", help="the label of the token")
+    signing.add_argument("--token-slot", type=int, metavar="N", help="or its slot, counted from 0")
+    signing.add_argument("--token-key", metavar="LABEL", help="the label of the key")
+    signing.add_argument(
+        "--token-certificate", metavar="LABEL", help="that of its certificate, if it has another label"
+    )
+    signing.add_argument(
+        "--pin-from", metavar="VARIABLE", default=PIN,
+        help=f"the environment variable with the PIN (default {PIN}; empty: the token has a PIN pad)",
+    )  # fmt: skip
+
+
+def add_fonts(parser: ArgumentParser) -> None:
+    """The option for letters that our own fonts lack."""
+    parser.add_argument(
+        "--font", type=Path, action="append", default=[], metavar="FILE",
+        help="a TrueType or OpenType font for letters that DejaVu Sans lacks, such as Chinese; may be repeated",
+    )  # fmt: skip
+
+
+def issuing(options: Namespace) -> dict[str, Any]:
+    """The options as ``certificates.issue`` and ``certificates.amend`` take them. Raises InputError."""
+    return {
+        "out": options.out,
+        "number": options.number,
+        "issued_on": options.date,
+        "model": options.model,
+        "linear_axes": None if options.linear_axes is None else read_linear_axes(options.linear_axes),
+        "method": options.method,
+        "conformity": options.conformity,
+        "with_map": options.map,
+        "fonts": tuple(options.font),
+        "key": _key(options),
+    }
+
+
+def _key(options: Namespace) -> Key | None:
+    if options.sign is not None and options.token is not None:
+        raise InputError("a certificate is signed once: choose --sign or --token")
+    if options.sign is not None:
+        return FileKey(options.sign, _passphrase(options.passphrase_file))
+    if options.token is None:
+        return None
+    if options.token_key is None:
+        raise InputError("--token-key LABEL says which key of the token signs")
+    pin = os.environ.get(options.pin_from) if options.pin_from else None
+    if options.pin_from and pin is None:
+        raise InputError(
+            f"the environment variable {options.pin_from} holds no PIN; set it, or give --pin-from '' where the token "
+            "has a PIN pad"
+        )
+    return TokenKey(
+        library=options.token,
+        key=options.token_key,
+        token=options.token_label,
+        slot=options.token_slot,
+        certificate=options.token_certificate,
+        pin=pin,
+    )
+
+
+def _passphrase(file: Path | None) -> str | None:
+    if file is None:
+        return None
+    try:
+        return (file.read_text(encoding="utf-8").splitlines() or [""])[0]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"the passphrase file {file} cannot be read: {error}") from error

@@ -1,0 +1,54 @@
+"""The volumetric error that a certificate prints: its largest, mean and RMS over the region, and every point of a grid.
+
+It is stored with the certificate's record, so that figure and numbers can be made again from there alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from monitor.records import Array
+
+Place = tuple[tuple[str, float, str], ...]
+
+
+@dataclass(frozen=True)
+class Length:
+    """A length of the error, µm, its standard and expanded uncertainty; ``at`` is where: (axis, reading, unit)."""
+
+    value_um: float
+    u_um: float
+    expanded_um: float
+    at: Place = ()
+
+
+@dataclass(frozen=True, eq=False)
+class VolumetricResult:
+    """The volumetric error of one state of the machine over a region, as one evaluation gave it.
+
+    ``k`` is the coverage factor of one length for the probability ``p``. The region: ``ranges`` (axis, from, to) in mm
+    of the linear axes, ``from_strokes`` where these are the machine's strokes, ``each`` points along each axis at
+    ``poses`` rotary poses, ``points`` in all. ``datum`` is where the workpiece's zero was set, empty where nowhere.
+    ``left_out`` are parameters that the map does not contain, and why.
+
+    The grid with the rotary axes at zero: ``readings_mm`` (n, 3) of ``axes``, ``vectors_um`` (n, 3) along X, Y and Z
+    of the machine, ``expanded_um`` (n,) of their lengths.
+    """
+
+    state: str
+    p: float
+    k: float
+    ranges: tuple[tuple[str, float, float], ...]
+    from_strokes: bool
+    each: int
+    poses: int
+    points: int
+    datum: Place
+    largest: Length
+    mean: Length
+    rms: Length
+    left_out: tuple[tuple[str, str], ...]
+    axes: tuple[str, ...]
+    readings_mm: Array
+    vectors_um: Array
+    expanded_um: Array

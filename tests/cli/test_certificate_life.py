@@ -1,0 +1,151 @@
+"""The life of certificates as a user types it: drafts, numbers, files, amended, withdrawn."""
+
+from __future__ import annotations
+
+import shutil
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import pypdf
+import pytest
+
+
+def text_of(file: Path) -> str:
+    return "\n".join(page.extract_text() for page in pypdf.PdfReader(file).pages)
+
+
+def test_withdrawn_is_no_longer_valid_and_says_why(typed: Any, issued: Any) -> None:
+    answer = typed(
+        "certificate", "withdraw", "2026-0001", "--reason", 'the bar\'s "damage"', "--json", db=issued.db
+    )
+    assert (answer.document["state"], answer.document["reason"]) == ("withdrawn", 'the bar\'s "damage"')
+    found = typed("certificate", "verify", issued.file("2026-0001"), "--json", db=issued.db)
+    assert found.status == 1
+    assert found.document["checks"]["hash"] is True
+    assert found.document["checks"]["database"] is False
+    assert found.document["faults"] == [
+        'certificate 2026-0001 is withdrawn, no longer valid: the bar\'s "damage"'
+    ]
+    assert typed("certificate", "verify", issued.file("2026-0002"), db=issued.db).status == 0
+    again = typed("certificate", "withdraw", "2026-0001", "--reason", "once more", db=issued.db)
+    assert again.status == 2
+    assert "certificate 2026-0001 is withdrawn; it can become nothing else" in again.err
+
+
+def test_17025_7_8_8_amending_issues_a_new_certificate_that_names_the_old(
+    typed: Any, issued: Any, laboratory: Path
+) -> None:
+    amend = ["certificate", "amend", "2026-0001", "--laboratory", laboratory, "--out", "new.pdf"]
+    refused = typed(*amend, "--reason", " ", db=issued.db)
+    assert refused.status == 2
+    assert "say why certificate 2026-0001 is replaced: --reason TEXT" in refused.err
+    made = typed(
+        *amend, "--reason", "wrong customer", "--date", "2026-03-11", "--json", db=issued.db
+    ).document
+    assert (made["number"], made["campaign"], made["runs"]) == ("2026-0004", "five-days", [20])
+    assert "replaces certificate 2026-0001 of 2026-03-10. Reason: wrong customer" in text_of(Path("new.pdf"))
+    found = typed("certificate", "verify", issued.file("2026-0001"), "--json", db=issued.db)
+    assert (found.status, found.document["state"]) == (1, "amended")
+    assert (
+        "certificate 2026-0001 is amended, no longer valid, replaced by 2026-0004: wrong customer"
+        in found.document["faults"]
+    )
+    assert typed("certificate", "verify", "new.pdf", db=issued.db).status == 0
+    again = typed(*amend, "--reason", "x", db=issued.db)
+    assert again.status == 2
+    assert "certificate 2026-0001 is amended; only an issued one can be replaced" in again.err
+
+
+def test_a_draft_says_so_on_paper_and_when_verified(typed: Any, db: Path, laboratory: Path) -> None:
+    issue = [
+        "certificate",
+        "issue",
+        "cold-cold",
+        "--run",
+        3,
+        "--laboratory",
+        laboratory,
+        "--draft",
+        "--number",
+        "D-1",
+    ]
+    made = typed(*issue, "--out", "draft.pdf", "--json", db=db).document
+    assert (made["state"], made["file"]) == ("draft", "draft.pdf")
+    assert "DRAFT, not valid" in text_of(Path("draft.pdf"))
+    found = typed("certificate", "verify", "draft.pdf", "--json", db=db)
+    assert (found.status, found.document["state"]) == (1, "draft")
+    assert "it is a draft" in found.document["faults"]
+    # A draft is written anew as often as one likes, then issued under its number.
+    assert typed(*issue, "--out", "draft.pdf", db=db).status == 0
+    issue.remove("--draft")
+    assert typed(*issue, "--out", "draft.pdf", "--json", db=db).document["state"] == "issued"
+    assert "DRAFT" not in text_of(Path("draft.pdf"))
+
+
+def test_numbers_follow_one_another_within_the_year(typed: Any, issued: Any, laboratory: Path) -> None:
+    issue = ["certificate", "issue", "cold-cold", "--run", 3, "--laboratory", laboratory, "--json"]
+    assert typed(*issue, "--date", "2026-12-31", db=issued.db).document["number"] == "2026-0004"
+    assert typed(*issue, "--date", "2027-01-01", db=issued.db).document["number"] == "2027-0001"
+    assert typed(*issue, db=issued.db).document["number"].startswith(f"{date.today().year}-")
+
+
+def test_no_certificate_before_its_measurement(typed: Any, db: Path, laboratory: Path) -> None:
+    answer = typed(
+        "certificate",
+        "issue",
+        "five-days",
+        "--run",
+        20,
+        "--laboratory",
+        laboratory,
+        "--date",
+        "2026-03-08",
+        db=db,
+    )
+    assert (answer.status, list(Path().iterdir())) == (2, [])
+    assert "run 20 was measured on 2026-03-09; no certificate was issued of it on 2026-03-08" in answer.err
+
+
+def test_the_file_of_an_issued_certificate_is_not_written_over(
+    typed: Any, issued: Any, laboratory: Path
+) -> None:
+    shutil.copyfile(issued.file("2026-0001"), "mine.pdf")
+    answer = typed(
+        "certificate",
+        "issue",
+        "cold-cold",
+        "--run",
+        3,
+        "--laboratory",
+        laboratory,
+        "--out",
+        "mine.pdf",
+        db=issued.db,
+    )
+    assert answer.status == 2
+    assert "mine.pdf is certificate 2026-0001; name another file" in answer.err
+    assert Path("mine.pdf").read_bytes() == issued.file("2026-0001").read_bytes()
+
+
+@pytest.mark.parametrize("out", ["text", "text/x.pdf"])
+def test_a_file_that_cannot_be_written_leaves_no_certificate(
+    typed: Any, db: Path, laboratory: Path, out: str
+) -> None:
+    Path("text").write_text("hello")
+    answer = typed(
+        "certificate", "issue", "cold-cold", "--run", 3, "--laboratory", laboratory, "--out", out, db=db
+    )
+    assert (answer.status, answer.out) == (2, "")
+    assert "the certificate cannot be written to" in answer.err
+    assert typed("certificate", "show", db=db).out == "no certificate was made yet\n"
+    assert [path.name for path in Path().iterdir()] == ["text"]
+
+
+def test_a_number_with_slashes_stays_in_its_folder(typed: Any, db: Path, laboratory: Path) -> None:
+    issue = ["certificate", "issue", "cold-cold", "--run", 3, "--laboratory", laboratory, "--out", "out"]
+    answer = typed(*issue, "--number", "../../x/1", "--json", db=db)
+    assert answer.document["number"] == "../../x/1"
+    (file,) = Path("out").iterdir()
+    assert str(file) == answer.document["file"]
+    assert not list(Path("..").glob("*.pdf"))

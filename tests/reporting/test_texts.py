@@ -1,0 +1,137 @@
+"""The texts of the certificate: the same keys in every language, none left in a template, none of them missing."""
+
+from __future__ import annotations
+
+import re
+import string
+from datetime import date
+from decimal import Decimal
+
+import pytest
+
+from monitor.exceptions import InputError
+from monitor.reporting.resources import report_text
+from monitor.reporting.symbols import describe
+from monitor.reporting.texts import languages, texts_of
+
+ENGLISH = texts_of()
+
+
+def places(text: str) -> set[str]:
+    return {place for _, place, _, _ in string.Formatter().parse(text) if place}
+
+
+def test_there_are_english_and_german() -> None:
+    assert languages() == ("de", "en")
+    with pytest.raises(InputError, match="there are no texts in 'tlh'; there are de, en"):
+        texts_of("tlh")
+
+
+@pytest.mark.parametrize("language", languages())
+def test_every_language_has_the_same_keys_with_the_same_places(language: str) -> None:
+    words = texts_of(language).words
+    assert set(words) == set(ENGLISH.words)
+    assert {key: places(text) for key, text in words.items()} == {
+        key: places(text) for key, text in ENGLISH.words.items()
+    }
+    assert not [key for key, text in words.items() if not text.strip()]
+
+
+def test_german_is_german() -> None:
+    same = {key for key, text in texts_of("de").words.items() if text == ENGLISH.words[key]}
+    # Words and signs that both languages have.
+    assert same == {"page.software", "page.symbol", "page.parameter", "page.map_expanded"}
+
+
+@pytest.mark.parametrize("template", ["certificate.html", "certificate.css", "base.css"])
+def test_no_template_holds_text(template: str) -> None:
+    plain = re.sub(r"{#.*?#}|{{.*?}}|{%.*?%}", "", report_text(template), flags=re.DOTALL)
+    if template.endswith(".css"):
+        said = [text for text in re.findall(r'"([^"]*)"', plain) if re.search("[A-Za-z]", text)]
+    else:
+        plain = re.sub(r"<style>.*?</style>|<[^>]*>", "|", plain, flags=re.DOTALL)
+        # u and U are symbols (GUM 2.3), µm is a unit.
+        said = [text.strip() for text in plain.split("|") if re.search(r"[^\W\d_]", text)]
+        said = [text for text in said if text not in {"u", "U =  u", "µm"}]
+    assert said == []
+
+
+def test_keys_that_a_template_names_are_there() -> None:
+    named = re.findall(r'texts(?:\.markup)?\("([a-z_.]+)"', report_text("certificate.html"))
+    assert len(named) > 30
+    assert set(named) <= set(ENGLISH.words)
+
+
+def test_days_and_numbers_follow_the_language() -> None:
+    german = texts_of("de")
+    assert german.day(date(2026, 3, 9)) == "09.03.2026"
+    assert ENGLISH.day(date(2026, 3, 9)) == "2026-03-09"
+    assert german.number(Decimal("-1.50")) == "−1,50"
+    assert ENGLISH.number(Decimal("-1.50")) == "−1.50"
+
+
+@pytest.mark.parametrize(
+    ("symbol", "words"),
+    [
+        ("EA0B", "Ausrichtung um X von Achse B"),
+        ("EX0C1", "Lage in X von Spindel C1"),
+        ("EYX:poly2", "Geradheitsabweichung in Y von Achse X (poly2)"),
+    ],
+)
+def test_iso_230_1_symbol_in_german_words(symbol: str, words: str) -> None:
+    assert describe(symbol, texts_of("de")) == words
+
+
+def test_what_a_page_marks_stays_and_what_a_user_writes_is_escaped() -> None:
+    made = ENGLISH.markup("page.number_issued", number="<b>&", day="today")
+    assert str(made) == "No. <strong>&lt;b&gt;&amp;</strong>, issued on today"
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        (
+            "repeated runs, pooled by day, 15 degrees of freedom",
+            "Wiederholungsläufe, tageweise zusammengefasst, 15 Freiheitsgrade",
+        ),
+        (
+            "selection warm: all 12 runs, 11 degrees of freedom",
+            "Auswahl warm: alle 12 Läufe, 11 Freiheitsgrade",
+        ),
+        (
+            "the repeatability of 1.8 µm, which exceeds the probe's statement; too few runs for more",
+            "Wiederholbarkeit von 1,8 µm, die die Angabe für den Messtaster überschreitet; zu wenige Läufe für mehr",
+        ),
+        (
+            "with this plan EX0C1 cannot be told apart from tip x: C1 stands at one angle throughout; probe also with "
+            "C1 at 90, 180 and 270 degrees",
+            "mit diesem Messplan nicht zu trennen: EX0C1 von Tasterspitze x: C1 steht durchweg bei einem Winkel; auch "
+            "mit C1 bei 90, 180 und 270 Grad antasten",
+        ),
+        (
+            "with this plan EXX and EYY cannot be told apart; probe more indexations",
+            "mit diesem Messplan nicht voneinander zu trennen: EXX und EYY; mehr Stellungen der Drehachsen antasten",
+        ),
+        (
+            "with this plan EXX at 9 places cannot be told apart from lattice; lay the piece in the XY and the YZ "
+            "plane too",
+            "mit diesem Messplan nicht zu trennen: EXX an 9 Stellen von lattice; das Stück auch in die Ebene XY und YZ "
+            "legen",
+        ),
+        (
+            "with this plan EX0J1 cannot be told apart from tip z: J1, J2 stood still throughout; move them too",
+            "mit diesem Messplan nicht zu trennen: EX0J1 von Tasterspitze z: J1, J2 standen durchweg still; auch diese "
+            "Achsen bewegen",
+        ),
+        (
+            "all 9 runs, 8 degrees of freedom; errors of the linear axes and the stylus tip are no part of u: the "
+            "method takes them as known",
+            "alle 9 Läufe, 8 Freiheitsgrade; nicht in u enthalten sind Abweichungen von Linearachsen und Tasterspitze: "
+            "das Verfahren nimmt sie als bekannt an",
+        ),
+        ("a sentence that nobody translated", "a sentence that nobody translated"),
+    ],
+)  # fmt: skip
+def test_sentences_of_the_computation_are_said_in_german(english: str, german: str) -> None:
+    assert texts_of("de").computed(english) == german
+    assert ENGLISH.computed(english) == english

@@ -1,0 +1,227 @@
+"""The life of certificates: signed, altered, killed in the middle, replaced by another, withdrawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import UTC, date, datetime, timedelta
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pypdf
+import pytest
+
+from monitor.exceptions import InputError
+from monitor.readers import read_campaign
+from monitor.records import Campaign
+from monitor.reporting.certificate import CertificateRecord, Replaced
+from monitor.reporting.dcc import dcc_xml
+from monitor.reporting.dcc_results import DCC
+from monitor.reporting.documents import from_document
+from monitor.reporting.render import certificate_pdf
+from monitor.reporting.signing import FileKey, sign
+from monitor.store import Database, import_campaign, list_certificates, load_certificate
+from monitor.workflow import certificates
+from monitor.workflow.certificate_checks import remake, stored_file, verify
+from monitor.workflow.certificates import issue, withdraw
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+LABORATORY = EXAMPLES / "laboratory.toml"
+DAY = date(2026, 3, 12)
+
+
+def other_machine() -> Campaign:
+    campaign = read_campaign(EXAMPLES / "five-days")
+    return replace(campaign, name="other", machine=replace(campaign.machine, id="M"))
+
+
+@pytest.fixture(scope="module")
+def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    with Database(tmp_path_factory.mktemp("life") / "c.duckdb", threads=1) as opened:
+        import_campaign(opened, read_campaign(EXAMPLES / "five-days"))
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def key(tmp_path_factory: pytest.TempPathFactory) -> FileKey:
+    """The key of a made-up laboratory."""
+    pytest.importorskip("pyhanko", reason="the extra [sign] is not installed")
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.asymmetric import rsa
+    from cryptography.hazmat.primitives.serialization import NoEncryption, pkcs12
+
+    secret = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "Made-up Laboratory")])
+    now = datetime.now(UTC)
+    certificate = (
+        x509.CertificateBuilder().subject_name(name).issuer_name(name).public_key(secret.public_key()).serial_number(1)
+        .not_valid_before(now - timedelta(days=1)).not_valid_after(now + timedelta(days=9))
+        .add_extension(x509.KeyUsage(True, True, *[False] * 7), critical=True)
+        .sign(secret, hashes.SHA256())
+    )  # fmt: skip
+    file = tmp_path_factory.mktemp("key") / "lab.p12"
+    file.write_bytes(pkcs12.serialize_key_and_certificates(b"lab", secret, certificate, None, NoEncryption()))
+    return FileKey(file)
+
+
+def test_one_byte_changed_at_200_random_places_is_found_by_the_hash_and_by_the_signature(
+    db: Database, key: FileKey, tmp_path: Path
+) -> None:
+    made = issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="B-1", issued_on=DAY, key=key)
+    genuine = Path(made["file"]).read_bytes()
+    rng = np.random.default_rng(200)
+    file = tmp_path / "altered.pdf"
+    for place in rng.choice(len(genuine), 200, replace=False):
+        altered = bytearray(genuine)
+        altered[place] ^= 1 << int(rng.integers(0, 8))
+        file.write_bytes(altered)
+        found = verify(db, file)
+        where = f"byte {place}: {found['faults']}"
+        # What fails is the file, by both of its seals; the database and its chain of entries are as they were.
+        assert found["checks"] == {"hash": False, "chain": True, "signature": False, "database": False}, where
+        assert found["ok"] is False
+        assert any("no certificate of this database has the content" in fault for fault in found["faults"]), (
+            where
+        )
+        assert any("altered" in fault or "does not" in fault for fault in found["faults"][1:]), where
+
+
+def test_a_signed_certificate_is_verified_check_by_check(db: Database, key: FileKey, tmp_path: Path) -> None:
+    made = issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="S-1", issued_on=DAY, key=key)
+    file = Path(made["file"])
+    good = verify(db, file)
+    assert good["ok"] is True
+    assert good["checks"] == {"hash": True, "chain": True, "signature": True, "database": True}
+    assert good["signer"] == "Common Name: Made-up Laboratory"
+    assert remake(db, "S-1")["identical"] is True
+    whole = file.read_bytes()
+    altered = bytearray(whole)
+    altered[whole.index(b"stream", whole.index(b"/EmbeddedFile")) + 40] ^= 1
+    file.write_bytes(bytes(altered))
+    bad = verify(db, file)
+    assert bad["ok"] is False
+    assert bad["checks"] == {"hash": False, "chain": True, "signature": False, "database": False}
+    assert any("altered after it was signed" in fault for fault in bad["faults"])
+    assert any("it bears the number S-1, but differs" in fault for fault in bad["faults"])
+    # A forged copy with another good signature: the signature holds, the database does not know it.
+    forged = tmp_path / "forged.pdf"
+    record = from_document(CertificateRecord, load_certificate(db, "S-1").record)
+    forged.write_bytes(sign(certificate_pdf(record), key))
+    assert verify(db, forged)["checks"] == {
+        "hash": False, "chain": True, "signature": True, "database": False
+    }  # fmt: skip
+    # What no hash says: a genuine file that was withdrawn.
+    file.write_bytes(whole)
+    withdraw(db, "S-1", "the bar was damaged")
+    late = verify(db, file)
+    assert late["checks"] == {"hash": True, "chain": True, "signature": True, "database": False}
+    assert late["ok"] is False
+
+
+def test_17025_7_8_8_a_withdrawn_draft_and_a_withdrawn_certificate_stay_what_they_are(
+    db: Database, tmp_path: Path
+) -> None:
+    issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="W-1", issued_on=DAY, draft=True)
+    withdraw(db, "W-1", "was only a try")
+    for number in ("W-1",):
+        with pytest.raises(
+            InputError, match=f"certificate {number} is withdrawn; it can become nothing else"
+        ):
+            withdraw(db, number, "again")
+        with pytest.raises(InputError, match="is withdrawn; only an issued one can be replaced"):
+            issue(db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY, replaces=number, reason="x")
+
+
+def test_17025_7_8_8_3_an_amended_certificate_has_a_new_number_the_reason_and_names_the_old(
+    db: Database, tmp_path: Path
+) -> None:
+    issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="A-1", issued_on=DAY)
+    with pytest.raises(InputError, match="say why certificate A-1 is replaced"):
+        issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="A-2", issued_on=DAY, replaces="A-1")
+    with pytest.raises(InputError, match="a draft replaces nothing"):
+        issue(
+            db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY, draft=True, replaces="A-1", reason="x"
+        )  # fmt: skip
+    made = issue(
+        db, "five-days", 20, LABORATORY, out=tmp_path, number="A-2", issued_on=DAY, replaces="A-1",
+        reason="the customer's address was wrong",
+    )  # fmt: skip
+    record = from_document(CertificateRecord, load_certificate(db, "A-2").record)
+    assert record.replaces == Replaced(
+        "A-1", DAY, "the customer's address was wrong", load_certificate(db, "A-1").pdf_sha256
+    )
+    core = ET.fromstring(dcc_xml(record)).find(".//dcc:coreData", {"dcc": DCC})
+    assert core is not None
+    assert core.findtext("dcc:reportAmendedSubstituted/dcc:typeOfChange", None, {"dcc": DCC}) == "substituted"
+    assert (
+        core.findtext("dcc:reportAmendedSubstituted/dcc:replacedUniqueIdentifier", None, {"dcc": DCC})
+        == "A-1"
+    )
+    assert (
+        core.findtext("dcc:previousReport/dcc:value", None, {"dcc": DCC})
+        == load_certificate(db, "A-1").pdf_sha256
+    )
+    page = " ".join(pypdf.PdfReader(made["file"]).pages[0].extract_text().split())
+    assert "replaces certificate A-1 of 2026-03-12. Reason: the customer's address was wrong" in page
+    old = load_certificate(db, "A-1")
+    assert (old.state, old.replaced_by, old.reason) == ("amended", "A-2", "the customer's address was wrong")
+    assert verify(db, tmp_path / "certificate-A-1.pdf")["ok"] is False
+    assert verify(db, tmp_path / "certificate-A-2.pdf")["ok"] is True
+    assert remake(db, "A-2")["identical"] is True
+    with pytest.raises(InputError, match="certificate A-1 is amended; only an issued one can be replaced"):
+        issue(
+            db, "five-days", 20, LABORATORY, out=tmp_path, number="A-3", issued_on=DAY, replaces="A-1", reason="x"
+        )  # fmt: skip
+    assert not (tmp_path / "certificate-A-3.pdf").exists()
+    import_campaign(db, other_machine())
+    with pytest.raises(
+        InputError, match="campaign other is of machine M, certificate A-2 of HU40-T: it cannot"
+    ):
+        issue(db, "other", 20, LABORATORY, out=tmp_path, issued_on=DAY, replaces="A-2", reason="x")
+
+
+class Killed(BaseException):
+    """What a process feels when it is stopped: nothing catches it on purpose."""
+
+
+def killed(*_: object, **__: object) -> None:
+    raise Killed
+
+
+def test_stopped_before_the_entry_no_file_bears_the_name_of_a_certificate(
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = set(list_certificates(db)["number"])
+    monkeypatch.setattr(certificates, "save_certificate", killed)
+    with pytest.raises(Killed):
+        issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="K-1", issued_on=DAY)
+    assert set(list_certificates(db)["number"]) == before
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_stopped_behind_the_entry_the_database_gives_the_document_back(
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certificates, "publish", killed)
+    with pytest.raises(Killed):
+        issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="K-2", issued_on=DAY)
+    assert list(tmp_path.glob("*.pdf")) == []
+    made = stored_file(db, "K-2", tmp_path)
+    assert verify(db, Path(made["file"]))["ok"] is True
+    assert Path(made["file"]).read_bytes() == load_certificate(db, "K-2").pdf
+
+
+def test_a_file_that_cannot_get_its_name_says_where_the_certificate_is(
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: Path, target: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(
+        InputError, match=r"certificate K-3 is in the database, .*`monitor certificate show K-3 --pdf"
+    ):
+        issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="K-3", issued_on=DAY)
+    assert load_certificate(db, "K-3").state == "issued"
