@@ -68,7 +68,7 @@ def _by_day(y: Array, t: Array, u: Array | None, index: npt.NDArray[np.intp]) ->
     mean = np.bincount(rank, weight * y) / total
     square = np.ones_like(y) if u is None else u**2
     return _Days(
-        weight=total,
+        weight=np.asarray(total, dtype=np.float64),
         mean=mean,
         time=np.bincount(rank, weight * t) / total,
         runs=np.cumsum(np.bincount(rank)).astype(np.float64),
