@@ -3,6 +3,7 @@
 One method, one file. Units are those of the arrays passed in; nothing here knows a database.
 """
 
+from monitor.statistics.backtest import Backtest, backtest
 from monitor.statistics.changes import Change, History, find_changes
 from monitor.statistics.common_change import joint_change
 from monitor.statistics.components import VarianceComponents, variance_components
@@ -18,7 +19,7 @@ from monitor.statistics.control import (
     reference_period,
 )
 from monitor.statistics.fdr import FalseDiscoveries, control_false_discoveries
-from monitor.statistics.forecast import Backtest, Crossing, Forecast, backtest, forecast, predict
+from monitor.statistics.forecast import Crossing, Forecast, forecast, predict
 from monitor.statistics.groups import Selection, group_by, select_runs
 from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
 from monitor.statistics.joint_forecast import LengthForecast, forecast_longest, residual_correlation

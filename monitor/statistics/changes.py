@@ -17,7 +17,8 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
-from monitor.statistics.scan import EDGE, Base, Kind, Scan, Scanner
+from monitor.statistics.scan import Scan, Scanner
+from monitor.statistics.scan_candidates import EDGE, Base, Kind
 from monitor.statistics.sums import label_groups
 
 

@@ -9,7 +9,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.changes import Change, when
 from monitor.statistics.checks import as_matrix, as_vector
-from monitor.statistics.scan import EDGE
+from monitor.statistics.scan_candidates import EDGE
 
 
 def joint_change(

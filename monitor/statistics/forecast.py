@@ -15,9 +15,8 @@ from scipy import optimize, stats
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_positive, as_probability, as_vector
-from monitor.statistics.sums import label_groups
-from monitor.statistics.trend import Trend, trend
+from monitor.statistics.checks import as_probability, as_vector
+from monitor.statistics.trend import Trend
 
 METHOD = (
     "prediction interval of the drift: the longest time after which a run is still in tolerance "
@@ -56,26 +55,6 @@ class Forecast:
     reliability: float
     horizon: float
     method: str
-
-
-@dataclass(frozen=True)
-class Backtest:
-    """Forecasts of held-out days: ``covered`` of ``made`` runs lay in their prediction interval (``level``).
-
-    ``bias`` and ``rms`` of observed less predicted; ``z`` (made,) the same in units of the stated uncertainty.
-    """
-
-    made: int
-    covered: int
-    level: float
-    bias: float
-    rms: float
-    z: Array
-
-    @property
-    def coverage(self) -> float:
-        """Share of held-out runs inside."""
-        return self.covered / self.made
 
 
 def predict(line: Trend, times: npt.ArrayLike) -> tuple[Array, Array, Array]:
@@ -162,47 +141,3 @@ def forecast(
         horizon=end,
         method=METHOD,
     )
-
-
-def backtest(
-    values: npt.ArrayLike,
-    times: npt.ArrayLike,
-    *,
-    u: npt.ArrayLike | None = None,
-    days: npt.ArrayLike | None = None,
-    ahead: int = 1,
-    first: int = 5,
-    level: float = 0.95,
-) -> Backtest:
-    """Forecasts each day from the ``first`` on by what was known ``ahead`` days before it.
-
-    Arguments as in ``trend``. Only the first run of a forecast day counts, so that the counted errors are
-    not copies of one day's. Raises ``DataError`` where the history has fewer than first + ahead days.
-    """
-    y = as_vector(values, "values", least=3)
-    t = as_vector(times, "times", length=len(y))
-    own = None if u is None else as_positive(u, "u", length=len(y))
-    as_probability(level, "level")
-    index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
-    starts = np.array([t[index == j].min() for j in range(int(index.max()) + 1)])
-    order = np.argsort(starts, kind="stable")
-    if first < 3 or ahead < 1:
-        raise DataError(
-            f"first is {first}, ahead is {ahead}; at least 3 days of history and 1 ahead are needed."
-        )
-    if len(order) < first + ahead:
-        raise DataError(f"the history has {len(order)} days; first + ahead = {first + ahead} are needed.")
-    rank = np.argsort(order)[index]
-    z, errors, inside = [], [], 0
-    for day in range(first + ahead - 1, len(order)):
-        past = rank <= day - ahead
-        target = int(np.flatnonzero(rank == day)[0])
-        known = None if own is None else own[past]
-        line = trend(y[past], t[past], u=known, days=index[past], level=level, ranks=False)
-        value, _, spread = predict(line, t[target])
-        error = float(y[target] - value)
-        errors.append(error)
-        z.append(error / max(float(spread), 1e-300))
-        inside += abs(z[-1]) <= stats.t.isf((1.0 - level) / 2.0, line.dof)
-    e = np.array(errors)
-    return Backtest(len(e), int(inside), level, float(e.mean()), float(np.sqrt((e**2).mean())), np.array(z))

@@ -11,10 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, stats
+from scipy import linalg, stats
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+
+#: Largest day component looked for, as t² times the weight of a day: thirty million times the scatter of its mean.
+LARGEST = 1e15
+#: Newton's steps at most; two to eight are usual.
+STEPS = 100
 
 
 @dataclass(frozen=True)
@@ -51,10 +56,14 @@ class MixedFit:
 
 
 def _day_means(columns: Array, weight: Array, total: Array, day: npt.NDArray[np.intp]) -> Array:
-    """Weighted means of the columns by day, spread back over the runs (n, q)."""
-    summed = np.zeros((len(total), columns.shape[1]))
-    np.add.at(summed, day, columns * weight[:, np.newaxis])
-    return np.asarray((summed / total[:, np.newaxis])[day])
+    """Weighted means of the columns by day (d, q)."""
+    weighted = columns * weight[:, np.newaxis]
+    return np.column_stack([np.bincount(day, column) for column in weighted.T]) / total[:, np.newaxis]
+
+
+def _triangle(rows: Array) -> Array:
+    """The triangle R of rows = Q R: all that least squares needs of them."""
+    return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
 def _rank(matrix: Array) -> int:
@@ -80,54 +89,55 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
     total = np.asarray(np.bincount(day, weight), dtype=np.float64)
     both = np.column_stack([design, y])
     mean = _day_means(both, weight, total, day)
-    root = np.sqrt(weight)[:, np.newaxis]
-    inner, outer = root * (both - mean), mean
+    inner = np.sqrt(weight)[:, np.newaxis] * (both - mean[day])
     rank_within = _rank(np.where(np.abs(inner[:, :q]) > 1e-9, inner[:, :q], 0.0))
+    # Within and between the days are orthogonal: the one is reduced to a triangle, the other to a row a day.
+    inner, outer = _triangle(inner), np.sqrt(total)[:, np.newaxis] * mean
     dof_within = n - days - rank_within
-    dof_between = days - _rank(root * outer[:, :q])
+    dof_between = days - _rank(outer[:, :q])
     if n - q < 1:
         raise DataError(f"{n} runs do not suffice for {q} terms; at least {q + 1} are needed.")
-    within = 1.0
+    inside, unit = 0.0, 1.0
     repeated = dof_within >= 1
     if repeated:
         solution = np.linalg.lstsq(inner[:, :q], inner[:, q], rcond=1e-9)[0]
-        within = float(np.sqrt(((inner[:, q] - inner[:, :q] @ solution) ** 2).sum() / dof_within))
+        inside = float(((inner[:, q] - inner[:, :q] @ solution) ** 2).sum())
+        unit = inside / dof_within
 
-    def whiten(variance: float) -> Array:
-        """Rows with covariance s² times one, for t² = ``variance`` in units of s²."""
-        shrunk = 1.0 / np.sqrt(1.0 + variance * total[day])[:, np.newaxis]
-        return np.asarray(inner + root * outer * shrunk)
+    def solve(variance: float) -> tuple[Array, Array, float, float]:
+        """Triangle (q, q), coefficients, chi-square and its slope for t² = ``variance`` in units of s²."""
+        rows = outer / np.sqrt(1.0 + variance * total)[:, np.newaxis]
+        triangle = _triangle(np.vstack([inner, rows]))
+        found = linalg.solve_triangular(triangle[:q, :q], triangle[:q, q], check_finite=False)
+        left = (rows[:, q] - rows[:, :q] @ found) ** 2
+        within_days = ((inner[:, q] - inner[:, :q] @ found) ** 2).sum()
+        slope = (left * total / (1.0 + variance * total)).sum()
+        return triangle[:q, :q], found, float(within_days + left.sum()), -float(slope)
 
-    def solve(variance: float) -> tuple[Array, float]:
-        rows = whiten(variance)
-        found = np.asarray(np.linalg.lstsq(rows[:, :q], rows[:, q], rcond=None)[0], dtype=np.float64)
-        return found, float(((rows[:, q] - rows[:, :q] @ found) ** 2).sum())
-
-    unit = within**2 if repeated else 1.0
     goal = (n - q) * unit
     variance, truncated = 0.0, True
-    if solve(0.0)[1] > goal > 0.0 and dof_between > 0:
+    triangle, coefficients, chi_square, slope = solve(0.0)
+    if chi_square > goal > 0.0 and dof_between > 0:
         truncated = False
-        top = 1.0 / float(total.mean())
-        while solve(top)[1] > goal and top * float(total.max()) < 1e12:
-            top *= 8.0
-        variance = (
-            optimize.brentq(lambda v: solve(v)[1] - goal, 0.0, top, rtol=1e-10)
-            if solve(top)[1] < goal
-            else top
-        )
-    coefficients, chi_square = solve(variance)
-    rows = whiten(variance)[:, :q]
-    unscaled = np.linalg.inv(rows.T @ rows)
+        # The reciprocal of what the days add to chi-square is concave in t²: Newton's steps rise to the root and do
+        # not pass it (with days that weigh alike it is a straight line, and the first step is the last).
+        most = LARGEST / float(total.max())
+        for _ in range(STEPS):
+            step = (chi_square - inside) * (chi_square - goal) / ((goal - inside) * -slope)
+            variance = min(variance + step, most)
+            triangle, coefficients, chi_square, slope = solve(variance)
+            if chi_square - goal <= 1e-13 * goal or step <= 1e-14 * variance or variance == most:
+                break
+    inverse = linalg.solve_triangular(triangle, np.eye(q), check_finite=False)
+    unscaled = inverse @ inverse.T
     factor = chi_square / (n - q)
-    share = np.einsum("ij,nj->in", unscaled, inner[:, :q])
-    within_part = (share**2).sum(axis=1) / np.diag(unscaled)
+    within_part = ((inner[:, :q] @ unscaled) ** 2).sum(axis=0) / np.diag(unscaled)
     dof = _effective(within_part, max(dof_within, 0), max(dof_between, 0), n - q)
     return MixedFit(
         coefficients=coefficients / scale,
         covariance=factor * unscaled / np.outer(scale, scale),
         dof=dof,
-        within=within if repeated else float(np.sqrt(factor)),
+        within=float(np.sqrt(unit if repeated else factor)),
         between=float(np.sqrt(variance * unit)),
         truncated=truncated,
         residual=y - design @ coefficients,

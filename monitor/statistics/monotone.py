@@ -9,10 +9,11 @@ Theil-Sen trend and corrected for bias; since few values tell little of it, one 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special, stats
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -54,6 +55,43 @@ def lag_one(residual: Array, *, fitted: int) -> float:
     return float(np.clip(r + (fitted + (fitted + 3) * r) / n, -0.95, 0.95))
 
 
+def _pairs(values: Array, times: Array) -> tuple[Array, Array]:
+    """Rise (m,) and slope (m,) of every pair of different times, the later less the earlier; times must not fall."""
+    earlier, later = _places(len(values))
+    rise, apart = values[later] - values[earlier], times[later] - times[earlier]
+    if not (apart > 0.0).all():
+        rise, apart = rise[apart > 0.0], apart[apart > 0.0]
+    return rise, rise / apart
+
+
+# The parameters of a machine have the same number of days.
+@lru_cache(maxsize=8)
+def _places(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    earlier, later = np.triu_indices(n, 1)
+    return earlier, later
+
+
+def theil_sen(values: Array, times: Array, level: float) -> tuple[float, tuple[float, float]]:
+    """Median slope of all pairs of ``values`` (n,) over ``times`` (n,), which must not fall, and its interval.
+
+    Source: P. K. Sen, J. Am. Stat. Assoc. 63 (1968) 1379, Eq. (2.6) with its variance for ties; the numbers are those
+    of ``scipy.stats.theilslopes``, of which only the ranks that are asked for are sorted out.
+    """
+    n = len(values)
+    slopes = _pairs(values, times)[1]
+    many = len(slopes)
+    variance = n * (n - 1.0) * (2 * n + 5) / 18.0
+    for column in (values, times):
+        k = np.unique(column, return_counts=True)[1].astype(np.float64)
+        variance -= float((k * (k - 1) * (2 * k + 5)).sum()) / 18.0
+    half = float(special.ndtri(0.5 * (1.0 + level)) * np.sqrt(max(variance, 0.0)))
+    low, high = max(round((many - half) / 2.0) - 1, 0), min(round((many + half) / 2.0), many - 1)
+    middle = ((many - 1) // 2, many // 2)
+    slopes = np.partition(slopes, sorted({low, high, *middle}))
+    median = 0.5 * (float(slopes[middle[0]]) + float(slopes[middle[1]]))
+    return median, (float(slopes[low]), float(slopes[high]))
+
+
 def mann_kendall(values: npt.ArrayLike, times: npt.ArrayLike) -> MonotoneTrend:
     """Mann-Kendall of ``values`` (n,) in the order of ``times`` (n,), which must rise; at least 6 values.
 
@@ -71,13 +109,13 @@ def mann_kendall(values: npt.ArrayLike, times: npt.ArrayLike) -> MonotoneTrend:
         raise DataError(
             f"times falls or repeats at index {int(np.argmax(np.diff(t) <= 0)) + 1}; it must rise."
         )
-    sign = np.sign(y[np.newaxis, :] - y[:, np.newaxis])
-    s = int(np.triu(sign, 1).sum())
+    rise, pairs = _pairs(y, t)
+    s = int(np.count_nonzero(rise > 0.0) - np.count_nonzero(rise < 0.0))
     ties = np.unique(y, return_counts=True)[1].astype(np.float64)
     variance = (n * (n - 1.0) * (2 * n + 5) - (ties * (ties - 1) * (2 * ties + 5)).sum()) / 18.0
     if variance == 0.0:
         return MonotoneTrend(0, 0.0, 0.0, 1.0, 1.0, 1.0)
-    slope = stats.theilslopes(y, t)[0]
+    slope = float(np.median(pairs))
     ranks = stats.rankdata(y - slope * t)
     seen = lag_one(np.asarray(ranks), fitted=2)
     r = float(np.clip(seen + SCATTER / np.sqrt(n), 0.0, 0.95))
@@ -90,4 +128,4 @@ def mann_kendall(values: npt.ArrayLike, times: npt.ArrayLike) -> MonotoneTrend:
 
 def _p_value(s: int, variance: float) -> float:
     """Two-sided normal p-value with the continuity correction."""
-    return float(2.0 * stats.norm.sf(max(abs(s) - 1, 0) / np.sqrt(variance)))
+    return float(2.0 * special.ndtr(-max(abs(s) - 1, 0) / np.sqrt(variance)))

@@ -15,6 +15,7 @@ from scipy import optimize, special, stats
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.statistics.chart_limits import tabulated_limit
 
 #: States of the chain: with 101 the run length of the tables of Lucas and Saccucci (1990) comes to 4 digits.
 STATES = 101
@@ -88,7 +89,16 @@ def run_length(chart: RunLength, limit: float, n: float, dof: float) -> float:
 
 
 def limit_for(chart: partial[Array], arl: float, n: float, dof: float, top: float) -> float:
-    """The limit with the wanted run length; ``DataError`` where even ``top`` does not reach it."""
+    """The limit with the wanted run length, from the table where it holds it; ``DataError`` where even ``top`` does not
+    reach it."""
+    name = "ewma" if chart.func is ewma_run_length else "cusum"
+    (constant,) = chart.keywords.values()
+    known = tabulated_limit(name, constant, arl, n, dof)
+    return solved_limit(chart, arl, n, dof, top) if known is None else known
+
+
+def solved_limit(chart: partial[Array], arl: float, n: float, dof: float, top: float) -> float:
+    """As ``limit_for``, computed."""
     return _limit(chart.func, tuple(sorted(chart.keywords.items())), arl, n, dof, top)
 
 

@@ -11,16 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
+from monitor.statistics.scan_candidates import EDGE, Base, Kind, candidates
 from monitor.statistics.serial import DayComponent, FirstOrder, Shape
-
-Base = Literal["constant", "line"]
-Kind = Literal["step", "slope", "trend", "transient"]
 
 #: Correlations of neighbours of which the likelihood is computed.
 GRID = np.arange(0.0, 0.91, 0.1)
@@ -35,10 +33,6 @@ REFUTED = 2.0
 #: Simulations until a p-value is clearly no finding: so many exceedances end them (Besag and Clifford,
 #: Biometrika 78 (1991) 301), looked at after each block; most searches end with the first.
 EXCEEDANCES, FIRST_BLOCK, BLOCK = 20, 100, 500
-#: Time constants of a warm-up or running-in tried, as fractions of the history; a finer fit is `warm_up`'s.
-DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
-#: Fewest runs on each side of a change: one run alone is an outlier, not a change.
-EDGE = 2
 
 
 @dataclass(frozen=True)
@@ -61,40 +55,32 @@ class Scan:
     deviance: Array
 
 
-def candidates(times: Array, base: Base) -> tuple[Array, tuple[Kind, ...], npt.NDArray[np.int64]]:
-    """Columns (n, c) of all candidates: on a constant the line, decays from the start
-    and steps; on a line steps and bends."""
-    n = len(times)
-    at = np.arange(EDGE, n - EDGE + 1)
-    after = np.arange(n)[:, np.newaxis] >= at
-    steps = after.astype(np.float64)
-    scaled = (times - times[0]) / max(float(np.ptp(times)), 1e-300)
-    steps_of: list[Kind] = ["step"] * len(at)
-    if base == "constant":
-        decays = np.exp(-scaled[:, np.newaxis] / np.array(DECAYS))
-        columns = np.column_stack([scaled, decays, steps])
-        kinds: list[Kind] = ["trend", *_transients()]
-        return columns, (*kinds, *steps_of), np.concatenate([np.zeros(1 + len(DECAYS), dtype=np.int64), at])
-    bends = after * (scaled[:, np.newaxis] - scaled[at - 1])
-    inner = slice(1, len(at) - 1) if len(at) > 4 else slice(0, 0)
-    columns = np.column_stack([steps, bends[:, inner]])
-    bends_of: list[Kind] = ["slope"] * len(at[inner])
-    return columns, (*steps_of, *bends_of), np.concatenate([at, at[inner]])
-
-
-def _transients() -> list[Kind]:
-    return ["transient" for _ in DECAYS]
-
-
 @dataclass(frozen=True)
 class _Prepared:
-    """One shape with what the base and the candidates are under it."""
+    """One shape with what the base and the candidates are under it.
+
+    ``turned`` (n, k) is W' base, ``along`` (c, k) its products with the candidates.
+    """
 
     shape: Shape
     base: Array
+    turned: Array
+    along: Array
     inverse: Array
     weight: Array
     constant: float
+
+
+class _Sums(NamedTuple):
+    """Columns (n, m) without the base, summed once for all first-order shapes.
+
+    Of these W'W is 1 at the ends, 1 + r² between them and -r beside them; ``products`` (c, m) and ``squares`` (m,) are
+    those with the columns, with all but their ends, and with their neighbours.
+    """
+
+    rows: Array
+    products: tuple[Array, Array, Array]
+    squares: tuple[Array, Array, Array]
 
 
 class Scanner:
@@ -112,6 +98,7 @@ class Scanner:
         self.root = root / np.sqrt(np.mean(root**2))
         line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)
         basis = np.column_stack([np.ones(n), line] if base == "line" else [np.ones(n)])
+        self.plain = np.linalg.qr(self.root[:, np.newaxis] * basis)[0]
         self.free = n - basis.shape[1]
         self.at = np.arange(EDGE, n - EDGE + 1)
         self.scaled = (times - times[0]) / max(float(np.ptp(times)), 1e-300)
@@ -141,36 +128,68 @@ class Scanner:
         # The residual likelihood counts the determinant of the candidate as that of every fitted coefficient; its
         # coefficient is taken in units of the scatter, so that the gain does not depend on the unit of the values.
         weight = np.where(good, square ** (1.0 / self.free), np.inf)
-        return _Prepared(shape, q, np.where(good, 1.0 / square, 0.0), weight, constant)
+        turned = shape.back(q)
+        along = self._products(turned)
+        return _Prepared(shape, q, turned, along, np.where(good, 1.0 / square, 0.0), weight, constant)
 
-    def _residual(self, prepared: _Prepared, weighted: Array) -> tuple[Array, Array]:
-        """What the base leaves of columns (n, m), as a sum of squares (m,), and what each candidate (c, m) takes."""
-        rows = prepared.shape.whiten(weighted)
-        rows -= prepared.base @ (prepared.base.T @ rows)
-        total = np.einsum("ij,ij->j", rows, rows)
-        along = self.root[:, np.newaxis] * prepared.shape.back(rows)
+    def _products(self, rows: Array) -> Array:
+        """Products (c, m) of the candidates, weighted, with rows (n, m)."""
+        along = self.root[:, np.newaxis] * rows
         # Steps and bends are sums from their place to the end.
         steps = np.cumsum(along[::-1], axis=0)[::-1][self.at]
         if self.smooth is not None:
-            found = np.concatenate([self.smooth.T @ along, steps])
-        elif len(self.at) > 4:
+            return np.concatenate([self.smooth.T @ along, steps])
+        if len(self.at) > 4:
             ramps = np.cumsum((along * self.scaled[:, np.newaxis])[::-1], axis=0)[::-1][self.at]
             bends = ramps - self.scaled[self.at - 1, np.newaxis] * steps
-            found = np.concatenate([steps, bends[1:-1]])
+            return np.concatenate([steps, bends[1:-1]])
+        return steps
+
+    def _sums(self, weighted: Array) -> _Sums:
+        rows = weighted - self.plain @ (self.plain.T @ weighted)
+        inner, beside = rows.copy(), np.zeros_like(rows)
+        inner[[0, -1]] = 0.0
+        beside[1:] += rows[:-1]
+        beside[:-1] += rows[1:]
+        parts = (rows, inner, beside)
+        whole, within, next_to = (self._products(part) for part in parts)
+        squares = (np.einsum("ij,ij->j", rows, part) for part in parts)
+        return _Sums(rows, (whole, within, next_to), (next(squares), next(squares), next(squares)))
+
+    def _residual(self, prepared: _Prepared, sums: _Sums) -> tuple[Array, Array]:
+        """What the base leaves of the columns, as a sum of squares (m,), and what each candidate (c, m) takes."""
+        if isinstance(prepared.shape, FirstOrder):
+            r = prepared.shape.strength
+            total = sums.squares[0] + r * r * sums.squares[1] - r * sums.squares[2]
+            found = r * r * sums.products[1]
+            found += sums.products[0]
+            found -= r * sums.products[2]
+            by_base = prepared.turned.T @ sums.rows
+            total = np.maximum(total - (by_base**2).sum(axis=0), 0.0)
+            found -= prepared.along @ by_base
         else:
-            found = steps
-        return total, found**2 * prepared.inverse[:, np.newaxis]
+            rows = prepared.shape.whiten(sums.rows)
+            rows -= prepared.base @ (prepared.base.T @ rows)
+            total = np.einsum("ij,ij->j", rows, rows)
+            found = self._products(prepared.shape.back(rows))
+        found *= found
+        found *= prepared.inverse[:, np.newaxis]
+        return total, found
 
     def _deviances(self, weighted: Array, places: Sequence[int]) -> tuple[Array, Array]:
         """Minus twice the residual log-likelihood by shape (s, m): of no change, and of the best candidate."""
         plain = np.empty((len(places), weighted.shape[1]))
         best = np.empty_like(plain)
-        for i, one in enumerate(self.prepared[place] for place in places):
-            total, taken = self._residual(one, weighted)
-            floor = 1e-15 * total + 1e-300
-            left = (np.maximum(total - taken, floor) * one.weight[:, np.newaxis]).min(axis=0)
-            plain[i] = one.constant + self.free * np.log(total + 1e-300)
-            best[i] = one.constant + self.free * np.log(left)
+        for start in range(0, weighted.shape[1], FIRST_BLOCK):
+            part = slice(start, start + FIRST_BLOCK)
+            sums = self._sums(weighted[:, part])
+            for i, one in enumerate(self.prepared[place] for place in places):
+                total, left = self._residual(one, sums)
+                np.subtract(total, left, out=left)
+                np.maximum(left, 1e-15 * total + 1e-300, out=left)
+                left *= one.weight[:, np.newaxis]
+                plain[i, part] = one.constant + self.free * np.log(total + 1e-300)
+                best[i, part] = one.constant + self.free * np.log(left.min(axis=0))
         return plain, best
 
     def _gain(self, weighted: Array, family: int) -> Array:
@@ -226,7 +245,7 @@ class Scanner:
             if p > level:
                 break
         likeliest = self.prepared[int(best[:, 0].argmin())]
-        total, taken = self._residual(likeliest, weighted)
+        total, taken = self._residual(likeliest, self._sums(weighted))
         left = np.maximum(total - taken, 1e-15 * total + 1e-300)[:, 0]
         chosen = int((left * likeliest.weight).argmin())
         return Scan(

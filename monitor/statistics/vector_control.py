@@ -15,6 +15,7 @@ from scipy import stats
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.statistics.chart_limits import tabulated_vector_limit
 from monitor.statistics.checks import as_matrix
 from monitor.statistics.control import THREE_SIGMA
 
@@ -91,6 +92,8 @@ def mewma_chart(
 
     The limit is simulated with reference periods of the same size: a chance of 1 - 1/e of a false alarm
     within ``arl`` runs, as for an exponential run length; with 2000 trials the run length is good to 4 %.
+    Where ``chart_limits`` holds the limit, from 20 000 trials, that one is taken and ``rng`` and ``trials`` are not
+    used.
     Source: C. A. Lowry et al., Technometrics 34 (1992) 46.
     """
     z, inverse, m = _reference(values, reference)
@@ -99,7 +102,8 @@ def mewma_chart(
         raise DataError(f"lam is {lam}; the weight lies above 0 and up to 1.")
     if trials < 100:
         raise DataError(f"trials is {trials}; at least 100 are needed.")
-    limit = mewma_limit(z.shape[1], m, lam, arl, rng, trials)
+    known = tabulated_vector_limit(z.shape[1], m, lam, arl)
+    limit = mewma_limit(z.shape[1], m, lam, arl, rng, trials) if known is None else known
     path = np.empty_like(z)
     last = np.zeros(z.shape[1])
     for i, row in enumerate(z):

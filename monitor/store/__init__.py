@@ -29,7 +29,7 @@ from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.events import list_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
-from monitor.store.history import MachineHistory, latest_tolerances, machine_history, unidentified_campaigns
+from monitor.store.history import MachineHistory, latest_tolerances, machine_history
 from monitor.store.identifications import (
     identification_by_number,
     list_identifications,
@@ -102,6 +102,5 @@ __all__ = [
     "snapshot",
     "stored_analyses",
     "take_backup",
-    "unidentified_campaigns",
     "verify_audit",
 ]

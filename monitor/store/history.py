@@ -1,13 +1,15 @@
 """The history of one machine: every run of every campaign with its parameters and conditions, in order of time.
 
-Arrays for the statistics, read in two queries; people read the same numbers in the view ``v_parameters``.
+Arrays for the statistics; people read the same numbers in the view ``v_parameters``.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,53 +18,47 @@ from monitor.records import Array
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database
 
+# The numbers of a machine's campaigns are read once and are constants of what follows: they prune the blocks of rows
+# that hold none of them, which a joined table of numbers does not.
+_CAMPAIGNS = "SELECT campaign_id, campaign, method FROM campaign WHERE machine = ? ORDER BY campaign_id"
+
+# Of each campaign the identification with the most runs, the later of two: what load_identification takes.
+_CHOSEN = """
+SELECT campaign_id, max((CAST(run_count AS BIGINT) << 32) | identification_id) AS best
+FROM identification
+WHERE campaign_id IN ({marks}) AND (model = ? OR CAST(? AS VARCHAR) IS NULL AND model = method)
+  AND (CAST(? AS INTEGER) IS NULL OR model_version = ?)
+GROUP BY campaign_id
+"""
+
 _RUNS = """
-WITH chosen AS (
-    -- Of each campaign the identification with the most runs, the later of two: what load_identification takes.
-    SELECT i.campaign_id,
-           max((CAST(i.run_count AS BIGINT) << 32) | i.identification_id) & 4294967295 AS identification_id
-    FROM identification AS i JOIN campaign AS c USING (campaign_id)
-    WHERE c.machine = $machine AND (i.model = $model OR $model IS NULL AND i.model = i.method)
-      AND ($version IS NULL OR i.model_version = $version)
-    GROUP BY i.campaign_id
-)
-SELECT h.identification_id, c.campaign, r.run, r.started_at, r.utc_offset_s, r.day, r.warm_up, r.conditions, c.method
-FROM chosen AS h JOIN campaign AS c USING (campaign_id) JOIN run AS r USING (campaign_id)
-WHERE r.started_at >= $since OR $since IS NULL
-ORDER BY r.started_at, h.identification_id, r.run
+SELECT campaign_id, run, started_at, utc_offset_s, day, warm_up, conditions FROM run WHERE campaign_id IN ({marks})
 """
 
 _VALUES = """
-SELECT v.identification_id, v.run, v.parameter, v.value / v.display_factor AS value, v.u / v.display_factor AS u, v.unit
-FROM parameter_value AS v
-WHERE v.identification_id IN ({marks}) AND v.value IS NOT NULL
+SELECT identification_id, run, parameter, value / display_factor AS value, u / display_factor AS u, unit
+FROM parameter_value WHERE identification_id IN ({marks}) AND value IS NOT NULL
+"""
+
+_LATEST = """
+SELECT c.machine, arg_max(c.campaign_id, (r.latest, c.campaign_id)) AS campaign_id
+FROM campaign AS c
+LEFT JOIN (SELECT campaign_id, max(started_at) AS latest FROM run GROUP BY campaign_id) AS r USING (campaign_id)
+GROUP BY c.machine
 """
 
 _TOLERANCES = """
-WITH latest AS (
-    SELECT c.machine, arg_max(c.campaign_id, (r.latest, c.campaign_id)) AS campaign_id
-    FROM campaign AS c
-    LEFT JOIN (
-        SELECT campaign_id, max(started_at) AS latest FROM run
-        WHERE $machine IS NULL OR campaign_id IN (SELECT campaign_id FROM campaign WHERE machine = $machine)
-        GROUP BY campaign_id
-    ) AS r USING (campaign_id)
-    WHERE $machine IS NULL OR c.machine = $machine
-    GROUP BY c.machine
-)
 SELECT machine, parameter, CAST(machine_description -> 'tolerances' ->> parameter AS DOUBLE) AS tolerance
 FROM (
-    SELECT l.machine, c.machine_description, unnest(json_keys(c.machine_description, '$.tolerances')) AS parameter
-    FROM latest AS l JOIN campaign AS c USING (campaign_id)
+    SELECT machine, machine_description, unnest(json_keys(machine_description, '$.tolerances')) AS parameter
+    FROM campaign WHERE campaign_id IN ({latest})
 )
 ORDER BY ALL
 """
 
 _CHANNELS = """
-SELECT c.campaign, p.run, e.key AS channel, avg(e.value) AS value
-FROM (SELECT campaign_id, run, unnest(map_entries(channels)) AS e FROM probing
-      WHERE campaign_id IN (SELECT campaign_id FROM campaign WHERE machine = $machine)) AS p
-JOIN campaign AS c USING (campaign_id)
+SELECT campaign_id, run, e.key AS channel, avg(e.value) AS value
+FROM (SELECT campaign_id, run, unnest(map_entries(channels)) AS e FROM probing WHERE campaign_id IN ({marks}))
 WHERE e.value IS NOT NULL
 GROUP BY ALL ORDER BY ALL
 """
@@ -75,7 +71,8 @@ class MachineHistory:
     ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
     are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
     the recorded channels, in the unit that the name ends in, NaN where not recorded. ``tolerances`` are those of the
-    machine's latest campaign.
+    machine's latest campaign. ``unidentified`` names the campaigns, in order of import, of which no identification
+    under the model holds every run.
     """
 
     machine: str
@@ -91,6 +88,7 @@ class MachineHistory:
     u: Array
     conditions: Mapping[str, Array]
     tolerances: Mapping[str, float]
+    unidentified: tuple[str, ...]
 
     @property
     def seconds(self) -> Array:
@@ -113,15 +111,19 @@ def machine_history(
     """
     check_machine(db, machine)
     start = None if since is None else since.astimezone(UTC).replace(tzinfo=None)
-    rows = db.rows(_RUNS, {"machine": machine, "model": model, "version": version, "since": start})
+    campaigns = {number: (name, method) for number, name, method in db.rows(_CAMPAIGNS, [machine])}
+    chosen = _chosen(db, list(campaigns), model, version)
+    every = _of(db, _RUNS, list(campaigns))
+    counts = Counter(row[0] for row in every)
+    rows = _ordered(every, chosen, start)
     place = {(row[0], row[2]): i for i, row in enumerate(rows)}
     names, units, values, u = _values(db, place, parameter)
-    campaign = np.array([row[1] for row in rows], dtype=np.str_)
     run = np.array([row[2] for row in rows], dtype=np.int64)
+    latest = max(every, key=lambda row: (row[2], row[0]))[0] if every else max(campaigns, default=0)
     return MachineHistory(
         machine=machine,
-        campaign=campaign,
-        method=np.array([row[8] for row in rows], dtype=np.str_),
+        campaign=np.array([campaigns[row[1]][0] for row in rows], dtype=np.str_),
+        method=np.array([campaigns[row[1]][1] for row in rows], dtype=np.str_),
         run=run,
         started_at=tuple(
             row[3].replace(tzinfo=UTC).astimezone(timezone(timedelta(seconds=row[4]))) for row in rows
@@ -132,35 +134,40 @@ def machine_history(
         units=units,
         values=values,
         u=u,
-        conditions=_conditions(db, machine, [row[7] for row in rows], campaign, run),
-        tolerances={name: limit for (_, name), limit in latest_tolerances(db, machine).items()},
+        conditions=_conditions(
+            db, [row[7] for row in rows], {(row[1], row[2]): i for i, row in enumerate(rows)}
+        ),
+        tolerances={name: limit for (_, name), limit in _tolerances(db, "?", [latest]).items()},
+        unidentified=tuple(
+            name for number, (name, _) in campaigns.items() if chosen.get(number, (0, 0))[1] < counts[number]
+        ),
     )
 
 
-def unidentified_campaigns(
-    db: Database, machine: str, model: str | None = None, version: int | None = None
-) -> tuple[str, ...]:
-    """Campaigns of a machine of which no identification under the model holds every run, in order of import."""
-    return tuple(
-        name
-        for (name,) in db.rows(
-            """
-            SELECT c.campaign FROM campaign AS c
-            LEFT JOIN identification AS i ON i.campaign_id = c.campaign_id
-                AND (i.model = $model OR $model IS NULL AND i.model = i.method)
-                AND ($version IS NULL OR i.model_version = $version)
-            LEFT JOIN (
-                SELECT campaign_id, count(*) AS runs FROM run
-                WHERE campaign_id IN (SELECT campaign_id FROM campaign WHERE machine = $machine) GROUP BY campaign_id
-            ) AS r ON r.campaign_id = c.campaign_id
-            WHERE c.machine = $machine
-            GROUP BY c.campaign_id, c.campaign, r.runs
-            HAVING coalesce(max(i.run_count), 0) < r.runs
-            ORDER BY c.campaign_id
-            """,
-            {"machine": machine, "model": model, "version": version},
-        )
-    )
+def _of(db: Database, sql: str, numbers: list[int]) -> list[tuple[Any, ...]]:
+    """The rows of a query with ``numbers`` among its marks."""
+    return db.rows(sql.format(marks=", ".join("?" * len(numbers))), numbers) if numbers else []
+
+
+def _chosen(
+    db: Database, campaigns: list[int], model: str | None, version: int | None
+) -> dict[int, tuple[int, int]]:
+    """Number and count of runs of the identification that each campaign's results are taken from."""
+    if not campaigns:
+        return {}
+    sql = _CHOSEN.format(marks=", ".join("?" * len(campaigns)))
+    found = db.rows(sql, [*campaigns, model, model, version, version])
+    return {campaign: (best & 0xFFFFFFFF, best >> 32) for campaign, best in found}
+
+
+def _ordered(
+    every: list[tuple[Any, ...]], chosen: dict[int, tuple[int, int]], since: datetime | None
+) -> list[tuple[Any, ...]]:
+    """The runs with an identification, its number before them, in the order of time."""
+    rows = [
+        (chosen[row[0]][0], *row) for row in every if row[0] in chosen and (since is None or row[2] >= since)
+    ]
+    return sorted(rows, key=lambda row: (row[3], row[0], row[2]))
 
 
 def _values(
@@ -169,15 +176,13 @@ def _values(
     numbers = sorted({number for number, _ in place})
     if not numbers:
         return (), (), np.zeros((0, 0)), np.zeros((0, 0))
-    # Constants prune the blocks of rows that hold none of them; a joined table of numbers does not.
     found = db.arrays(_VALUES.format(marks=", ".join("?" * len(numbers))), numbers)
     data = {name: np.ma.getdata(column) for name, column in found.items()}
+    data["parameter"] = data["parameter"].astype(np.str_)
     if parameter is not None:
-        wanted = data["parameter"].astype(np.str_) == parameter
+        wanted = data["parameter"] == parameter
         data = {name: column[wanted] for name, column in data.items()}
-    names, first, column = np.unique(
-        data["parameter"].astype(np.str_), return_index=True, return_inverse=True
-    )
+    names, first, column = np.unique(data["parameter"], return_index=True, return_inverse=True)
     values = np.full((len(place), len(names)), np.nan)
     u = np.full_like(values, np.nan)
     keys = zip(data["identification_id"].tolist(), data["run"].tolist(), strict=True)
@@ -191,27 +196,28 @@ def _values(
 
 
 def _conditions(
-    db: Database,
-    machine: str,
-    recorded: list[dict[str, float]],
-    campaign: npt.NDArray[np.str_],
-    run: npt.NDArray[np.int64],
+    db: Database, recorded: list[dict[str, float]], place: dict[tuple[int, int], int]
 ) -> dict[str, Array]:
+    """Conditions of the runs and means of their channels; ``place`` is where the run of a campaign is."""
     found: dict[str, Array] = {}
     for i, conditions in enumerate(recorded):
         for name, value in conditions.items():
-            found.setdefault(name, np.full(len(run), np.nan))[i] = value
-    place = {(str(c), int(r)): i for i, (c, r) in enumerate(zip(campaign, run, strict=True))}
-    for name_of, number, channel, value in db.rows(_CHANNELS, {"machine": machine}):
-        row = place.get((name_of, number))
+            found.setdefault(name, np.full(len(place), np.nan))[i] = value
+    numbers = sorted({number for number, _ in place})
+    for campaign, run, channel, value in _of(db, _CHANNELS, numbers):
+        row = place.get((campaign, run))
         if row is not None:
-            found.setdefault(channel, np.full(len(run), np.nan))[row] = value
+            found.setdefault(channel, np.full(len(place), np.nan))[row] = value
     return found
 
 
-def latest_tolerances(db: Database, machine: str | None = None) -> dict[tuple[str, str], float]:
+def latest_tolerances(db: Database) -> dict[tuple[str, str], float]:
     """Limits of the absolute value by machine and parameter, in display units, as each latest campaign states them."""
+    return _tolerances(db, f"SELECT campaign_id FROM ({_LATEST})", [])
+
+
+def _tolerances(db: Database, latest: str, numbers: list[int]) -> dict[tuple[str, str], float]:
     return {
         (name, parameter): float(limit)
-        for name, parameter, limit in db.rows(_TOLERANCES, {"machine": machine})
+        for name, parameter, limit in db.rows(_TOLERANCES.format(latest=latest), numbers)
     }

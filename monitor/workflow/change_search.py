@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -41,7 +41,7 @@ class Recorded(Protocol):
     def t(self) -> Array: ...
 
     @property
-    def days(self) -> npt.NDArray[np.str_]: ...
+    def days(self) -> npt.NDArray[Any]: ...
 
 
 def weights_of(series: Recorded) -> Array | None:
@@ -70,7 +70,7 @@ class _Plan(NamedTuple):
     t: Array
     begins: Array
     u: Array | None
-    days: npt.NDArray[np.str_] | None
+    days: npt.NDArray[Any] | None
     values: dict[str, Array]
 
 

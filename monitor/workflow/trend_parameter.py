@@ -42,14 +42,14 @@ COLLINEAR = 0.95
 @dataclass(frozen=True)
 class Series:
     """One parameter of one machine in the order of time: ``values`` and ``u`` (n,) in ``unit``, ``t`` (n,) in days
-    since 1970 (UTC), ``days`` labels of the machine's days (n,), ``hour`` of the shop's clock (n,)."""
+    since 1970 (UTC), ``days`` numbers of the machine's days (n,), ``hour`` of the shop's clock (n,)."""
 
     name: str
     unit: str
     values: Array
     u: Array
     t: Array
-    days: npt.NDArray[np.str_]
+    days: npt.NDArray[np.int64]
     hour: Array
     offset: timedelta
 

@@ -16,12 +16,17 @@ from monitor.workflow.trend_parameter import Series
 SECONDS_PER_DAY = 86400.0
 
 
+def _days(history: MachineHistory) -> npt.NDArray[np.int64]:
+    """Number (n,) of each run's day of its campaign, from 0 in the order of time."""
+    numbers: dict[tuple[str, int], int] = {}
+    pairs = zip(history.campaign.tolist(), history.day.tolist(), strict=True)
+    return np.array([numbers.setdefault(pair, len(numbers)) for pair in pairs], dtype=np.int64)
+
+
 def all_series(history: MachineHistory) -> list[tuple[Series, npt.NDArray[np.bool_]]]:
     """Each parameter with the runs that have it."""
     t = history.seconds / SECONDS_PER_DAY
-    days = np.array(
-        [f"{campaign} day {day}" for campaign, day in zip(history.campaign, history.day, strict=True)], dtype=np.str_
-    )  # fmt: skip
+    days = _days(history)
     hour = np.array([at.hour + at.minute / 60.0 for at in history.started_at])
     offset = (history.started_at[-1].utcoffset() if history.started_at else None) or timedelta()
     found = []
@@ -49,7 +54,7 @@ def points_of(history: MachineHistory, series: list[tuple[Series, npt.NDArray[np
     t = history.seconds / SECONDS_PER_DAY
     offset = series[0][0].offset
     keep = ~history.warm_up if (~history.warm_up).sum() >= 6 else np.ones(len(t), dtype=np.bool_)
-    labels = np.array([f"{c} day {d}" for c, d in zip(history.campaign, history.day, strict=True)])[keep]
+    labels = _days(history)[keep]
     distinct, first, index = np.unique(labels, return_index=True, return_inverse=True)
     if len(distinct) < DAYS_FOR_MEANS:
         return Points(history.values[keep], t[keep], "runs", offset)

@@ -18,7 +18,6 @@ from monitor.store import (
     list_events,
     machine_history,
     save_analysis,
-    unidentified_campaigns,
 )
 from monitor.workflow.agreement import Moment, agreement, evaluated
 from monitor.workflow.change_search import search_changes
@@ -83,16 +82,21 @@ def _history(db: Database, machine: str, choice: Choice) -> MachineHistory:
     if choice.model is not None:
         stored = resolve(db, choice.model)
         model, version = stored.name, stored.version
-    if not db.read_only:
-        for campaign in unidentified_campaigns(db, machine, model, version):
+
+    def read() -> MachineHistory:
+        return machine_history(
+            db, machine, model=model, version=version, parameter=choice.parameter, since=choice.since
+        )
+
+    found = read()
+    if not db.read_only and found.unidentified:
+        for campaign in found.unidentified:
             try:
                 identify(db, campaign, choice.model)
             except DataError:
                 # A campaign that cannot be identified does not keep the others from being followed.
                 continue
-    found = machine_history(
-        db, machine, model=model, version=version, parameter=choice.parameter, since=choice.since
-    )
+        found = read()
     found = chosen_only(found, choice.campaigns)
     if choice.parameter is not None and len(found.run) and choice.parameter not in found.parameters:
         there = machine_history(db, machine, model=model, version=version).parameters

@@ -14,6 +14,7 @@ moved, steps, other plans and other noise.
 from __future__ import annotations
 
 import argparse
+import gzip
 import importlib.util
 import json
 import sys
@@ -492,6 +493,10 @@ def table(records: list[Record]) -> str:
     return "\n".join(lines)
 
 
+def _opened(path: Path) -> str:
+    return gzip.decompress(path.read_bytes()).decode() if path.suffix == ".gz" else path.read_text()
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seeds", type=int, default=10)
@@ -501,15 +506,20 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=1e9, help="stop beginning new cases after so long")
     parser.add_argument("--only", default="", help="scenes whose name contains this")
     parser.add_argument("--write", action="store_true", help="keep the tables in docs/trials-discovery.md")
-    parser.add_argument("--log", type=Path, help="one JSON document a case")
+    parser.add_argument(
+        "--log", type=Path, help="one JSON document a case; those that it has already are not run again"
+    )
     parser.add_argument("--tables", type=Path, nargs="+", help="only make the tables, of these logs")
     options = parser.parse_args()
     begin = time.perf_counter()
     records: list[Record] = []
     todo = [] if options.tables else list(cases(options.seeds, options.empties, options.scenes, options.only))
     for path in options.tables or ():
-        lines = path.read_text().splitlines()
-        records += [Record(**json.loads(line)) for line in lines]
+        records += [Record(**json.loads(line)) for line in _opened(path).splitlines()]
+    if options.log and options.log.exists():
+        records += [Record(**json.loads(line)) for line in _opened(options.log).splitlines()]
+        done = {(one.scene, one.seed) for one in records}
+        todo = [case for case in todo if (case.scene, case.seed) not in done]
     with ProcessPoolExecutor(options.processes) as pool:
         size = 12 * options.processes
         for start in range(0, len(todo), size):

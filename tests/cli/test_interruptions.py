@@ -144,8 +144,11 @@ def test_ctrl_c_ends_with_one_line_and_nothing_stored(started: Any, db: Path) ->
             break
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, "")
+    # A block of trials, or the compilation of the kernel on a busy machine, is finished first.
+    out, err = process.communicate(timeout=200)
+    # Python ends itself by the signal where it was importing; a shell calls either 130.
+    assert process.returncode in (130, -signal.SIGINT)
+    assert out == ""
     assert err == "monitor: stopped; what was not finished was not stored\n"
     with Database(db) as opened:
         assert opened.rows("SELECT count(*) FROM analysis") == before

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from monitor.exceptions import DataError
 from monitor.statistics import backtest, forecast, predict, trend
@@ -86,6 +87,32 @@ def test_backtest_covers_and_sees_a_change_that_no_drift_foretold():
     assert backtest(y, t, days=day).coverage < 0.95
 
 
+@pytest.mark.parametrize("repeats", ["one run a day", "days of their own size"])
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("between", [0.0, 0.5, 300.0])
+def test_backtest_of_all_days_at_once_is_that_of_each_day_by_itself(repeats, weighted, between):
+    rng = np.random.default_rng([3, weighted, int(between)])
+    sizes = np.ones(20, dtype=int) if repeats == "one run a day" else rng.integers(1, 5, 20)
+    day = np.repeat(rng.permutation(20), sizes)
+    t = 2e4 + 7.0 * day + 0.1 * rng.random(len(day))
+    u = rng.uniform(0.3, 2.0, len(day)) if weighted else None
+    y = 50.0 + between * rng.normal(size=20)[day] + rng.normal(size=len(day)) * (1.0 if u is None else u)
+    z, errors, inside = [], [], 0
+    for target in range(6, 20):
+        past = day <= target - 2
+        line = trend(y[past], t[past], u=None if u is None else u[past], days=day[past])
+        run = int(np.flatnonzero(day == target)[0])
+        value, _, spread = predict(line, t[run])
+        errors.append(y[run] - value)
+        z.append(errors[-1] / spread)
+        inside += abs(z[-1]) <= stats.t.isf(0.025, line.dof)
+    found = backtest(y, t, u=u, days=day, first=5, ahead=2)
+    assert (found.made, found.covered) == (14, inside)
+    np.testing.assert_allclose(found.z, z, rtol=1e-8, atol=1e-9)
+    assert found.bias == pytest.approx(np.mean(errors), rel=1e-8)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=1e-8)
+
+
 def test_refusals_say_what_is_needed():
     line = trend(np.sin(np.arange(10.0)), np.arange(10.0))
     with pytest.raises(DataError, match=r"limits is \(5\.0, -5\.0\); the lower must be below"):
@@ -96,3 +123,7 @@ def test_refusals_say_what_is_needed():
         forecast(line, (-5.0, 5.0), 1.0, [])
     with pytest.raises(DataError, match=r"the history has 4 days; first \+ ahead = 6 are needed"):
         backtest(np.arange(4.0), np.arange(4.0))
+    with pytest.raises(
+        DataError, match="the first days have the same mean time; a trend needs days that differ"
+    ):
+        backtest(np.arange(8.0), np.repeat([1.0, 2.0], [6, 2]))

@@ -18,7 +18,7 @@ from monitor.exceptions import NotFoundError
 from monitor.records import Campaign
 from monitor.statistics import anova, bartlett, pool, trend
 from monitor.statistics.sufficient import GroupSums, cells_from_sums, drift_from_sums
-from monitor.store import Database, FleetSums, fleet_sums, machine_history, unidentified_campaigns
+from monitor.store import Database, FleetSums, fleet_sums, machine_history
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd"
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -193,8 +193,8 @@ def test_history_of_one_machine_is_in_the_order_of_time(
     assert found.campaign.tolist() == ["a", "a", "b"]
     assert found.values[:, 0].tolist() == pytest.approx([5000.0, 6000.0, 7000.0])
     assert (np.diff(found.seconds) > 0.0).all()
-    assert unidentified_campaigns(db, "A") == ()
-    assert unidentified_campaigns(db, "A", "other") == ("a", "b")
+    assert found.unidentified == ()
+    assert machine_history(db, "A", model="other").unidentified == ("a", "b")
     later = machine_history(db, "A", since=found.started_at[2], parameter="EXX")
     assert later.values.tolist() == [[7000.0]]
     with pytest.raises(NotFoundError, match="there is no machine 'C'; there are A, B"):

@@ -1,0 +1,185 @@
+"""How good were forecasts of the drift? Every day foretold by what was known before it, all days at once.
+
+The line of ``trend``, fitted anew to the history before every forecast day. Such a line depends on the days alone
+(their weights, means and times), so the fits of all origins are sums over the same days and are solved together: the
+work of one fit for each of 255 days becomes some products of matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy import special
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.statistics.checks import as_positive, as_probability, as_vector
+from monitor.statistics.mixed import LARGEST, STEPS
+from monitor.statistics.sums import label_groups
+
+#: Origins solved at a time: the weights of all days for each are held at once.
+BLOCK = 128
+
+
+@dataclass(frozen=True)
+class Backtest:
+    """Forecasts of held-out days: ``covered`` of ``made`` runs lay in their prediction interval (``level``).
+
+    ``bias`` and ``rms`` of observed less predicted; ``z`` (made,) the same in units of the stated uncertainty.
+    """
+
+    made: int
+    covered: int
+    level: float
+    bias: float
+    rms: float
+    z: Array
+
+    @property
+    def coverage(self) -> float:
+        """Share of held-out runs inside."""
+        return self.covered / self.made
+
+
+class _Days(NamedTuple):
+    """d days in the order of time: weight, mean, time (d,); sums over the days up to each (d,) of runs, of squares
+    within the days and of the squared uncertainties of the runs; ``first`` (d,), the first run of each."""
+
+    weight: Array
+    mean: Array
+    time: Array
+    runs: Array
+    within: Array
+    u_squared: Array
+    first: npt.NDArray[np.intp]
+
+
+def _by_day(y: Array, t: Array, u: Array | None, index: npt.NDArray[np.intp]) -> _Days:
+    count = int(index.max()) + 1
+    starts = np.full(count, np.inf)
+    np.minimum.at(starts, index, t)
+    order = np.argsort(starts, kind="stable")
+    rank = np.argsort(order)[index]
+    weight = np.ones_like(y) if u is None else 1.0 / u**2
+    total = np.bincount(rank, weight)
+    mean = np.bincount(rank, weight * y) / total
+    square = np.ones_like(y) if u is None else u**2
+    return _Days(
+        weight=np.asarray(total, dtype=np.float64),
+        mean=mean,
+        time=np.bincount(rank, weight * t) / total,
+        runs=np.cumsum(np.bincount(rank)).astype(np.float64),
+        within=np.cumsum(np.bincount(rank, weight * (y - mean[rank]) ** 2)),
+        u_squared=np.cumsum(np.bincount(rank, square)),
+        first=np.unique(rank, return_index=True)[1],
+    )
+
+
+class _Lines(NamedTuple):
+    """Lines of k origins: place and value of their weighted means, slopes, chi-square of the day means about them, its
+    derivative by the day component, total weight and weighted square of the times, each (k,)."""
+
+    at: Array
+    level: Array
+    slope: Array
+    chi_square: Array
+    derivative: Array
+    total: Array
+    spread: Array
+
+
+def _lines(days: _Days, known: npt.NDArray[np.bool_], variance: Array) -> _Lines:
+    """Lines through the ``known`` (k, d) days with a component of ``variance`` (k,), in units of the scatter."""
+    d = known.shape[1]
+    t, m = days.time[:d], days.mean[:d]
+    weight = known * (days.weight[:d] / (1.0 + variance[:, np.newaxis] * days.weight[:d]))
+    # About the mean of each origin: a few early days may lie close together, and their scatter far below their level.
+    total = weight.sum(axis=1)
+    at, level = weight @ t / total, weight @ m / total
+    time, left = t - at[:, np.newaxis], m - level[:, np.newaxis]
+    spread = np.einsum("kd,kd,kd->k", weight, time, time)
+    slope = np.einsum("kd,kd,kd->k", weight, time, left) / spread
+    left -= slope[:, np.newaxis] * time
+    weighted = weight * left
+    chi_square, derivative = np.einsum("kd,kd->k", weighted, left), -np.einsum("kd,kd->k", weighted, weighted)
+    return _Lines(at, level, slope, chi_square, derivative, total, spread)
+
+
+def _forecasts(days: _Days, past: npt.NDArray[np.intp], t: Array) -> tuple[Array, Array, Array]:
+    """Prediction at ``t`` (k,), standard uncertainty of one run there, and degrees of freedom, from ``past`` (k,) days.
+
+    As ``fit_with_days`` does with a line whose times are those of the days: all of it lies between the days.
+    """
+    last = past - 1
+    runs, within = days.runs[last], days.within[last]
+    repeated = runs > past
+    unit = np.where(repeated, within / np.where(repeated, runs - past, 1.0), 1.0)
+    inside = np.where(repeated, within, 0.0)
+    goal = (runs - 2.0) * unit
+    known = np.arange(int(past.max())) < past[:, np.newaxis]
+    variance = np.zeros(len(past))
+    lines = _lines(days, known, variance)
+    open_ = (lines.chi_square + inside > goal) & (goal > 0.0) & (past > 2)
+    most = LARGEST / np.maximum.accumulate(days.weight)[last]
+    for _ in range(STEPS):
+        if not open_.any():
+            break
+        # Newton's steps on the reciprocal, see ``fit_with_days``.
+        excess = lines.chi_square + inside - goal
+        step = lines.chi_square * excess / ((goal - inside) * -np.where(open_, lines.derivative, -1.0))
+        variance = np.where(open_, np.minimum(variance + step, most), variance)
+        lines = _lines(days, known, variance)
+        left = lines.chi_square + inside - goal
+        open_ &= (left > 1e-13 * goal) & (step > 1e-14 * variance) & (variance < most)
+    factor = (lines.chi_square + inside) / (runs - 2.0)
+    own = np.where(repeated, unit, factor) * days.u_squared[last] / runs
+    away = t - lines.at
+    of_line = factor * (1.0 / lines.total + away**2 / lines.spread)
+    dof = np.clip(past - 2.0, 1.0, runs - 2.0)
+    return lines.level + lines.slope * away, np.sqrt(of_line + own + variance * unit), dof
+
+
+def backtest(
+    values: npt.ArrayLike,
+    times: npt.ArrayLike,
+    *,
+    u: npt.ArrayLike | None = None,
+    days: npt.ArrayLike | None = None,
+    ahead: int = 1,
+    first: int = 5,
+    level: float = 0.95,
+) -> Backtest:
+    """Forecasts each day from the ``first`` on by what was known ``ahead`` days before it.
+
+    Arguments as in ``trend``. Only the first run of a forecast day counts, so that the counted errors are
+    not copies of one day's. Raises ``DataError`` where the history has fewer than first + ahead days, or the first
+    days all have the same time. The numbers are those of ``trend`` and ``predict`` for every day by itself
+    (tests/statistics/test_forecast.py).
+    """
+    y = as_vector(values, "values", least=3)
+    t = as_vector(times, "times", length=len(y))
+    own = None if u is None else as_positive(u, "u", length=len(y))
+    as_probability(level, "level")
+    index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
+    count = int(index.max()) + 1
+    if first < 3 or ahead < 1:
+        raise DataError(
+            f"first is {first}, ahead is {ahead}; at least 3 days of history and 1 ahead are needed."
+        )
+    if count < first + ahead:
+        raise DataError(f"the history has {count} days; first + ahead = {first + ahead} are needed.")
+    known = _by_day(y, t, own, index)
+    if np.ptp(known.time[:first]) == 0.0:
+        raise DataError("the first days have the same mean time; a trend needs days that differ.")
+    targets = np.arange(first + ahead - 1, count)
+    seen = known.first[targets]
+    blocks = [slice(start, start + BLOCK) for start in range(0, len(targets), BLOCK)]
+    found = [_forecasts(known, targets[block] - ahead + 1, t[seen[block]]) for block in blocks]
+    predicted, spread, dof = (np.concatenate(part) for part in zip(*found, strict=True))
+    errors = y[seen] - predicted
+    z = errors / np.maximum(spread, 1e-300)
+    inside = int((np.abs(z) <= -special.stdtrit(dof, (1.0 - level) / 2.0)).sum())
+    return Backtest(len(z), inside, level, float(errors.mean()), float(np.sqrt((errors**2).mean())), z)

@@ -1,0 +1,43 @@
+"""What the search for one change tries: steps, bends, decays and the straight line. A part of ``scan``."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Array
+
+Base = Literal["constant", "line"]
+Kind = Literal["step", "slope", "trend", "transient"]
+
+#: Time constants of a warm-up or running-in tried, as fractions of the history; a finer fit is `warm_up`'s.
+DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
+#: Fewest runs on each side of a change: one run alone is an outlier, not a change.
+EDGE = 2
+
+
+def candidates(times: Array, base: Base) -> tuple[Array, tuple[Kind, ...], npt.NDArray[np.int64]]:
+    """Columns (n, c) of all candidates: on a constant the line, decays from the start
+    and steps; on a line steps and bends."""
+    n = len(times)
+    at = np.arange(EDGE, n - EDGE + 1)
+    after = np.arange(n)[:, np.newaxis] >= at
+    steps = after.astype(np.float64)
+    scaled = (times - times[0]) / max(float(np.ptp(times)), 1e-300)
+    steps_of: list[Kind] = ["step"] * len(at)
+    if base == "constant":
+        decays = np.exp(-scaled[:, np.newaxis] / np.array(DECAYS))
+        columns = np.column_stack([scaled, decays, steps])
+        kinds: list[Kind] = ["trend", *_transients()]
+        return columns, (*kinds, *steps_of), np.concatenate([np.zeros(1 + len(DECAYS), dtype=np.int64), at])
+    bends = after * (scaled[:, np.newaxis] - scaled[at - 1])
+    inner = slice(1, len(at) - 1) if len(at) > 4 else slice(0, 0)
+    columns = np.column_stack([steps, bends[:, inner]])
+    bends_of: list[Kind] = ["slope"] * len(at[inner])
+    return columns, (*steps_of, *bends_of), np.concatenate([at, at[inner]])
+
+
+def _transients() -> list[Kind]:
+    return ["transient" for _ in DECAYS]
