@@ -1,8 +1,9 @@
 """A curve's model against its rows: how large the residual is, how large it should be, and where it is too large.
 
 Rows with equal inputs are repeats: their scatter is pure error, and lack of fit is tested against it (Draper and
-Smith, Applied regression analysis, section 2.1; NIST/SEMATECH e-Handbook 4.6.1.5). Without repeats the first
-step of the search for a missing effect is the test.
+Smith, Applied regression analysis, section 2.1; NIST/SEMATECH e-Handbook 4.6.1.5). Rows at different times whose
+scatter resembles that of their neighbours are none: the test rests on independent repeats. Where nothing speaks
+against the model, the search for a missing effect has the last word, so that `compare` and `explain` agree.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from monitor.discovery.compare import (
     Part,
     split,
 )
-from monitor.discovery.curve_explain import explain_curve
+from monitor.discovery.curve_explain import explain_curve, noise_of
 from monitor.effects.curve import SEQUENCE
 from monitor.methods.curve import CurveFit
 from monitor.statistics.noise import Assessed, assess
@@ -67,8 +68,11 @@ def places_of(fit: CurveFit) -> npt.NDArray[np.int64]:
 
 
 def lack_of_fit(fit: CurveFit) -> tuple[LackOfFit | None, float | None]:
-    """F of lack of fit over pure error, and the repeatability; None where no row was repeated."""
+    """F of lack of fit over pure error, and the repeatability; None where no row was repeated, or the model has no
+    input that could be equal, or the repeats lie at different times and drift between them."""
     kept = ~fit.problem.left_out
+    if not fit.effects or fit.exact or _repeats_drift(fit):
+        return None, None
     scatter, lack, repeated = split(fit.residual[kept, None], places_of(fit)[kept])
     own = fit.degrees_of_freedom - repeated
     if repeated < 1:
@@ -80,6 +84,19 @@ def lack_of_fit(fit: CurveFit) -> tuple[LackOfFit | None, float | None]:
     return LackOfFit(
         float(f), float(stats.f.sf(f, own, repeated)), float(own), float(repeated)
     ), repeatability
+
+
+def _repeats_drift(fit: CurveFit) -> bool:
+    """Whether the deviations of repeats from their mean resemble those of the rows before them in time."""
+    clock, rows = fit.problem.curve.time, fit.problem.order
+    if clock is None or any(effect.column == clock for effect in fit.effects):
+        return False
+    _, place, count = np.unique(places_of(fit)[rows], return_inverse=True, return_counts=True)
+    residual = fit.residual[rows]
+    deviation = residual - (np.bincount(place, weights=residual) / count)[place]
+    deviation = deviation[count[place] > 1]
+    found = assess(deviation, np.ones((len(deviation), 1)))
+    return found.noticed and found.noise.lag_one > 0.0
 
 
 def _part(residual: npt.NDArray[np.float64]) -> Part:
@@ -107,8 +124,8 @@ def _breakdown(fit: CurveFit) -> dict[str, dict[str, Part]]:
     return found
 
 
-def compare_curve(fit: CurveFit, *, rate: float = 0.01) -> CurveComparison:
-    """Compare a fitted model with its curve."""
+def compare_curve(fit: CurveFit, *, rate: float = 0.01, lacks: bool | None = None) -> CurveComparison:
+    """Compare a fitted model with its curve; ``lacks`` says whether a search has found a missing effect already."""
     problem, rows = fit.problem, fit.problem.order
     test, repeatability = lack_of_fit(fit)
     stated = problem.curve.standard_uncertainty
@@ -116,18 +133,18 @@ def compare_curve(fit: CurveFit, *, rate: float = 0.01) -> CurveComparison:
     if stated is not None:
         expected = stated * float(np.sqrt(fit.degrees_of_freedom / len(rows)))
         excess = float(stats.chi2.sf(fit.sum_of_squares / stated**2, fit.degrees_of_freedom))
-    missing = test is not None and test.p_value < LACK_OF_FIT_LEVEL
+    missing = bool(lacks) or (test is not None and test.p_value < LACK_OF_FIT_LEVEL)
     if stated is not None and excess is not None:
         missing |= fit.deviation > STATEMENT_TOLERANCE * stated and excess < LACK_OF_FIT_LEVEL
-    if test is None and not missing:
-        missing = bool(explain_curve(problem, rate=rate, most=1).missing)
+    if lacks is None and not missing:
+        missing = bool(explain_curve(problem, rate=rate).missing)
     return CurveComparison(
         fit=fit,
         lack_of_fit=test,
         repeatability=repeatability,
         expected_rms=expected,
         excess_p_value=excess,
-        noise=assess(problem.curve.measured[rows], fit.design[rows]),
+        noise=noise_of(fit),
         verdict=SOMETHING_IS_MISSING if missing else EXPLAINED,
         by=_breakdown(fit),
     )

@@ -52,6 +52,9 @@ MOST_TOGETHER = 5
 #: Fewer cycles than these over the range of an input can be a bend.
 MOST_BENDS = 2.0
 AGAINST_NOISE = 0.05
+#: A line and a cycle together: slow noise (correlation 0.97 and independent readings) is taken for them at 0.05 in
+#: every fifth series of 100 rows.
+LINE_AGAINST_NOISE = 1e-6
 COINCIDES = 0.999
 
 
@@ -183,25 +186,32 @@ class _Acceptance:
         """Whether correlated noise is no better explanation.
 
         Alone: the effect stands out from the noise that its model leaves, and its model is likelier than noise
-        alone. In company: cycles of one input look like correlated noise as long as one of them is not in the model,
-        so they are asked together, and the rows have to be independent once all are in.
+        alone. In company: a line and cycles of one input look like correlated noise as long as one of them is not in
+        the model, so they are asked together, and the rows have to be independent once all are in.
         """
         asked = found.family
         found = at_best(self.scene, self.visible, [*others, found], len(others))
         p = self.p_values[asked] = self.p_values[found.family] = self.p_value(others, found)
         if p * self.families <= self.rate and self.likelier(others, [found], AGAINST_NOISE):
             return True
-        if effect_of(found).shape != "sin" or self.alone(others, found) * self.families > self.rate:
+        line = effect_of(found).order == 1
+        if not (line or effect_of(found).shape == "sin"):
+            return False
+        if self.alone(others, found) * self.families > self.rate:
             return False
         kind = (effect_of(found).column, "sin")
-        same = [one for one in others if (effect_of(one).column, effect_of(one).shape) == kind]
+        same = (
+            [] if line else [one for one in others if (effect_of(one).column, effect_of(one).shape) == kind]
+        )
         rest = [one for one in others if one not in same]
         together = [found, *same]
-        while len(together) <= max(MOST_TOGETHER, len(same) + 1):
-            enough = len(together) > 1 and self.likelier(rest, together, AGAINST_NOISE)
+        # Slow noise is a line and some cycles too: one cycle has to make a line plain.
+        most, level = (2, LINE_AGAINST_NOISE) if line else (max(MOST_TOGETHER, len(same) + 1), AGAINST_NOISE)
+        while len(together) <= most:
+            enough = len(together) > 1 and self.likelier(rest, together, level)
             if enough and not self.noise_after([*rest, *together]).noticed:
                 return True
-            more = self.next_one([*rest, *together])
+            more = self.next_one([*rest, *together], kind)
             if more is None:
                 return False
             together.append(more)
@@ -233,9 +243,8 @@ class _Acceptance:
         """The noise that is left with the chosen ones in the model."""
         return assess(*self.design(chosen))
 
-    def next_one(self, chosen: Sequence[Candidate]) -> Candidate | None:
-        """The most convincing candidate of the kind of the last one, beside the chosen ones, at its best value."""
-        kind = (effect_of(chosen[-1]).column, effect_of(chosen[-1]).shape)
+    def next_one(self, chosen: Sequence[Candidate], kind: tuple[str, str]) -> Candidate | None:
+        """The most convincing candidate of a kind (column, shape) beside the chosen ones, at its best value."""
         stack = np.concatenate([self.visible.added, *(one.columns for one in chosen)], axis=1)
         taken = {one.family for one in chosen}
         apart = separable(self.scene.fit.problem)
@@ -277,6 +286,7 @@ class _Round:
     result: ScanResult
     acceptance: _Acceptance
     under: CurveFit
+    scanned: int
 
     def alone(self) -> _Round:
         """The round with those findings only that stand out from correlated noise by themselves."""
@@ -326,10 +336,11 @@ class _Views:
             # A rival takes the place of an effect where it still says something beside it, noise allowed for.
             better=lambda chosen, rival: acceptance.p_value(chosen, rival) * acceptance.families <= self.rate,
         )
+        scanned = len(result.findings)
         result = replace(result, findings=_standing(acceptance, result.findings))
         found = [effect_of(one.candidate) for one in result.findings]
         under = fit(scene.fit.settled.with_effects(found)) if found else scene.fit
-        return _Round(scene, visible, result, acceptance, under)
+        return _Round(scene, visible, result, acceptance, under, scanned)
 
 
 def _standing(acceptance: _Acceptance, findings: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -355,19 +366,21 @@ def explain_curve(problem: CurveProblem, *, rate: float = 0.01, most: int = MOST
     Raises DataError where the model cannot be fitted.
     """
     first = fit(problem)
+    if first.exact:
+        return CurveExplanation(first, first, (), (), noise_of(first), (), ())
     suspect: tuple[Outlier, ...] = ()
     now, suspect = _exhausted(_Views(problem, rate, WHITE), suspect, most)
-    noise = _noise_of(now.under)
+    noise = noise_of(now.under)
     if noise.noticed:
         # Some cycles were taken for the sake of company that did not come: each has to stand alone now.
         now = now.alone()
-        noise = _noise_of(now.under)
+        noise = noise_of(now.under)
     rounds = [now]
     if noise.noticed:
         # What independent rows would show was found; now what stands out once the resemblance is filtered out.
         more = replace(now.under.settled, left_out=problem.left_out)
         now, suspect = _exhausted(_Views(more, rate, noise.noise), suspect, most - len(now.result.findings))
-        noise = _noise_of(now.under)
+        noise = noise_of(now.under)
         rounds.append(now)
     out = now.under.problem.left_out
     missing = _tell(rounds, noise)
@@ -389,23 +402,35 @@ def explain_curve(problem: CurveProblem, *, rate: float = 0.01, most: int = MOST
     )
 
 
-def _noise_of(fitted: CurveFit) -> Assessed:
+def noise_of(fitted: CurveFit) -> Assessed:
+    """The noise that a model leaves; none where it fits exactly."""
+    if fitted.exact:
+        return Assessed(WHITE, 1.0)
     rows = fitted.problem.order
     return assess(fitted.problem.curve.measured[rows], fitted.design[rows])
 
 
 def _exhausted(views: _Views, suspect: tuple[Outlier, ...], most: int) -> tuple[_Round, tuple[Outlier, ...]]:
     """One effect after the other, until nothing stands: readings that look like outliers are judged under the most
-    convincing effects before weaker ones are looked for."""
+    convincing effects before weaker ones are looked for.
+
+    A drift over several days hides a daily cycle and looks like correlated noise until the cycle is in the model: what
+    the scan finds but does not stand alone gets its company in the next round, before it is given up.
+    """
     now = views.look(suspect, 0)
+    short: tuple[_Round, tuple[Outlier, ...]] | None = None
     for count in range(1, most + 1):
         for _ in range(MOST_ROUNDS):
             now = views.look(suspect, count)
-            before, suspect = suspect, outliers(now.under)
+            before, suspect = suspect, () if now.under.exact else outliers(now.under)
             if {one.row for one in before} == {one.row for one in suspect}:
                 break
-        if len(now.result.findings) < count:
+        found = len(now.result.findings)
+        if short is not None and found <= len(short[0].result.findings):
+            return short
+        if now.scanned < count or now.under.exact:
             break
+        short = (now, suspect) if found < count else None
     return now, suspect
 
 

@@ -40,6 +40,8 @@ CONSTANT = "constant"
 RANK_TOLERANCE = 1e-12
 #: Share of a null vector from which on a coefficient counts as part of it.
 MEMBER_SHARE = 1e-5
+#: A residual below this share of the response's range is what sixteen digits and a period's search leave.
+EXACT = 1e-9
 MOST_ITERATIONS = 60
 CONVERGED = 1e-13
 #: A period is searched from twice the mean spacing to the whole range, three steps a resolvable period; a constant
@@ -178,6 +180,11 @@ class CurveFit:
     def deviation(self) -> float:
         """Residual standard deviation: per degree of freedom."""
         return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
+
+    @property
+    def exact(self) -> bool:
+        """Whether what is left is the rounding of numbers and no noise that says anything."""
+        return self.rms < EXACT * float(np.ptp(self.problem.curve.measured[~self.problem.left_out]))
 
     @property
     def settled(self) -> CurveProblem:

@@ -21,18 +21,21 @@ from monitor.discovery.curve_explain import (
     explain_curve,
     held_out,
     inflation,
+    noise_of,
 )
 from monitor.effects.curve import SEARCHED
 from monitor.exceptions import DataError, InputError
 from monitor.methods.curve import NAME, CurveFit, fit, problem_of
 from monitor.records import CurveCampaign
-from monitor.statistics.noise import Assessed, assess, effective_number
+from monitor.statistics.noise import Assessed, effective_number
 from monitor.store import Database, StoredModel, load_curve, model_history, save_analysis
 from monitor.units import MICROMETRE
 from monitor.workflow.models import as_model, label, resolve
 
 Document = dict[str, Any]
 #: Lengths in millimetres, for the keys that end in _um.
+#: So many rows on average at each value of a column make it look set rather than read.
+ROWS_A_SETTING = 4
 LENGTHS = {"pm": 1e-9, "nm": 1e-6, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "km": 1e6, "in": 25.4}
 
 
@@ -64,6 +67,12 @@ def _noise(found: Assessed, rows: int) -> Document:
         "rows": rows,
         "effective_rows": effective_number(found.noise, rows) if seen else float(rows),
     }
+
+
+def correlation(noise: Document) -> str:
+    """The noise in words: both of its numbers, for what a mean is worth depends on how slowly it fades."""
+    told = f"correlation {noise['lag_one']:.2f}"
+    return f"{told}, times {noise['slow']:.2f} with each further row" if noise["lag_one"] > 0.0 else told
 
 
 def _kept(found: CurveFit) -> int:
@@ -173,13 +182,14 @@ def _missing(curve: CurveCampaign, rank: int, found: CurveMissing) -> Document:
 def explanation_document(found: CurveExplanation, model: str) -> Document:
     """An explanation as people see it: everything a comparison has, and what is missing."""
     curve = found.first.problem.curve
-    document = comparison_document(compare_curve(found.first), model)
+    compared = compare_curve(found.first, lacks=bool(found.missing))
+    document = comparison_document(compared, model)
     document["missing"] = [_missing(curve, rank, one) for rank, one in enumerate(found.missing, start=1)]
     if found.missing:
         document["verdict"] = SOMETHING_IS_MISSING
     elif found.suspect:
         # A bad reading is told as that: what counts is the verdict without it.
-        document["verdict"] = compare_curve(found.final).verdict
+        document["verdict"] = compare_curve(found.final, lacks=False).verdict
     document["suspect_data"] = [
         {
             "run": 1,
@@ -197,11 +207,26 @@ def explanation_document(found: CurveExplanation, model: str) -> Document:
     document["blind_spots"] = list(found.blind)
     document["not_recorded"] = dict(found.refused)
     document["autocorrelation_after"] = _noise(found.noise, _kept(found.final))
-    document["answer"] = _answer(document)
+    document["answer"] = _answer(document, found)
     return document
 
 
-def _answer(document: Document) -> str:
+def _exchanged(curve: CurveCampaign) -> str | None:
+    """A hint where the response looks like what was set and an input of the base like what was read."""
+    values = len(np.unique(curve.measured))
+    if values * ROWS_A_SETTING > len(curve):
+        return None
+    for effect in problem_of(curve).base:
+        taken = len(np.unique(curve.columns[effect.column])) if effect.column in curve.columns else 0
+        if effect.column != curve.time and 2 * taken > len(curve):
+            return (
+                f"{curve.response} takes only {values} different values and {effect.column} {taken}: if "
+                f"{curve.response} was set and {effect.column} was read, exchange them in response and base."
+            )
+    return None
+
+
+def _answer(document: Document, found: CurveExplanation) -> str:
     """The finding in a few sentences."""
     parts = []
     missing = document["missing"]
@@ -217,13 +242,20 @@ def _answer(document: Document) -> str:
         parts.append(
             "The model does not explain the measurements, but no effect that the columns allow explains more."
         )
+    elif found.first.exact:
+        parts.append("The model fits exactly, to the rounding of the numbers; nothing is left to explain.")
     else:
         parts.append("Nothing is missing that these rows can show.")
+    hint = _exchanged(found.first.problem.curve)
+    if hint is not None:
+        parts.append(hint)
+    if missing and found.final.exact:
+        parts.append("With all of it the model fits exactly, to the rounding of the numbers.")
     noise = document["autocorrelation_after"]
     if noise["noticed"]:
         resembles = "resemble" if noise["lag_one"] > 0 else "alternate against"
         parts.append(
-            f"Neighbouring rows {resembles} each other (correlation {noise['lag_one']:.2f}): "
+            f"Neighbouring rows {resembles} each other ({correlation(noise)}): "
             + (
                 f"for a mean they are worth {noise['effective_rows']:.0f} of {noise['rows']} rows, and "
                 if noise["lag_one"] > 0
@@ -261,8 +293,7 @@ def identify(db: Database, campaign: str, model: str | None = None, run: int | N
     if run not in (None, 1):
         raise DataError(f"campaign {campaign} is a curve with one run, number 1, not {run}")
     curve, stored, found = fitted(db, campaign, model)
-    rows = found.problem.order
-    noise = assess(curve.measured[rows], found.design[rows])
+    noise = noise_of(found)
     u = np.sqrt(np.diag(allowed_for(found, noise)))
     independent = np.sqrt(np.diag(found.covariance))
     parameters = {

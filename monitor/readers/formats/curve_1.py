@@ -6,7 +6,6 @@ import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from monitor.exceptions import CampaignError
 from monitor.readers.csv_table import CsvTable, parse_csv
 from monitor.readers.csv_values import numbers
+from monitor.readers.curve_cells import are_dates, days_of, refuse_copies, refuse_dates, refuse_enormous
 from monitor.readers.faults import Faults, near, one_of, quoted
 from monitor.readers.files import LARGEST_CSV, LARGEST_TOML, decode, read_bytes
 from monitor.readers.registry import Reader
@@ -99,7 +99,7 @@ def read(folder: Path) -> CurveCampaign:
     time = None
     if table is not None and told is not None and top is not None:
         _check_names(table, faults)
-        if _check_told(top, told, table):
+        if len(table) and _check_told(top, told, table):
             columns, labels, units, time = _columns(table, told, faults)
     if len(faults):
         raise CampaignError(str(folder), faults.sorted())
@@ -213,10 +213,12 @@ def _columns(table: CsvTable, told: _Told, faults: Faults) -> Columns:
     # What the base model names is an input, whatever its values look like.
     numeric = {told.response, told.time, *told.inputs, *NAME.findall(told.base or "")}
     for name, cells in table.columns.items():
-        days = None if name in (*told.groups, told.response) else _days(cells)
+        days = None if name in (*told.groups, told.response) else days_of(cells)
         if days is not None:
             columns[name], units[name] = days, DATE_UNIT
             dated.append(name)
+        elif name not in (*told.groups, told.response) and are_dates(cells):
+            refuse_dates(table, name, faults)
         elif (
             name in told.groups
             or (_are_words(cells) and name not in (told.response, *told.inputs))
@@ -227,13 +229,16 @@ def _columns(table: CsvTable, told: _Told, faults: Faults) -> Columns:
         else:
             columns[name] = numbers(table, name, faults).values
             units[name] = _unit(name)
+            refuse_enormous(table, name, columns[name], faults)
     units |= told.units
     clocks = [name for name in columns if name != told.response and units[name] in CLOCKS]
     time = told.time or (dated[0] if dated else clocks[0] if len(clocks) == 1 else None)
-    if told.time is not None and told.time not in columns:
+    if told.time is not None and told.time not in columns and not are_dates(table.columns[told.time]):
         faults.add(
             DATA, 1, told.time, "the column of the time holds neither numbers nor dates such as 1980-02-05"
         )
+    if not len(faults):
+        refuse_copies(table, time, faults)
     if not len(faults) and told.response is not None:
         for name, values in columns.items():
             if name == told.response and np.ptp(values) == 0.0:
@@ -267,24 +272,6 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _days(cells: Sequence[str]) -> Array | None:
-    """Days since the first row, of dates in ISO 8601 with or without a time; None where they are none."""
-    moments = []
-    for cell in cells:
-        if not re.match(r"\d{4}-\d\d-\d\d", cell):
-            return None
-        try:
-            moment = datetime.fromisoformat(cell)
-        except ValueError:
-            return None
-        moments.append(moment)
-    aware = [moment.tzinfo is not None for moment in moments]
-    if any(aware) and not all(aware):
-        return None
-    first = min(moments)
-    return np.array([(moment - first).total_seconds() / 86400.0 for moment in moments])
 
 
 def _unit(name: str) -> str:
