@@ -16,6 +16,11 @@ from monitor.workflow.models import as_model, resolve
 
 Document = dict[str, Any]
 
+# Residuals so many times as large as stated: the statement of a probe is seldom wrong by a factor of three.
+TOO_LARGE = 3.0
+# And so small a part: no probe is twenty times better than its owner says.
+TOO_SMALL = 0.05
+
 
 def parameter_document(estimate: float, u: float, unit: Unit) -> Document:
     """A parameter as people see it."""
@@ -42,7 +47,26 @@ def _run_document(found: Identification, run: RunIdentification) -> Document:
         "chi_square": run.chi_square,
         "degrees_of_freedom": run.degrees_of_freedom,
         "iterations": found.iterations,
+        "note": _note(run),
     }
+
+
+def _note(run: RunIdentification) -> str:
+    """What has to be known before the standard uncertainties of a run are used; empty where nothing has."""
+    if run.degrees_of_freedom < 1:
+        return ""
+    times = float(np.sqrt(run.chi_square / run.degrees_of_freedom))
+    if times > TOO_LARGE:
+        return (
+            f"run {run.run}: the residuals are {times:.2g} times what the stated uncertainties leave, so u does not "
+            "hold; compare and explain say where the model fails and what is missing"
+        )
+    if times < TOO_SMALL:
+        return (
+            f"run {run.run}: the residuals are far smaller than the stated uncertainties leave ({times:.1g} of it): "
+            "check the units of the columns and the statement"
+        )
+    return ""
 
 
 def _stored(campaign: Campaign, found: Identification, model: str, version: int) -> StoredIdentification:
