@@ -26,7 +26,7 @@ from monitor.machine import Chain, Evaluation, evaluate
 from monitor.methods.identification import Identification
 from monitor.methods.least_squares import Linearisation
 from monitor.methods.model import Model, chain_of
-from monitor.methods.problem import ChainProblem, solve_problem
+from monitor.methods.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.results import identification
 from monitor.records import Array, Campaign, LShape
 from monitor.units import MICROMETRE
@@ -326,7 +326,9 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     return f"; scan {len(ORDERS) + 1} or more modules along every arm, as a cubic needs"
 
 
-def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification:
+def identify(
+    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
+) -> Identification:
     """The geometric errors of every run at once. Raises DataError where the data do not suffice."""
     problem = problem_of(campaign, model)
-    return identification(campaign, model, problem, solve_problem(problem), advice)
+    return identification(campaign, model, problem, solve(problem), advice)

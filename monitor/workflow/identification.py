@@ -8,8 +8,16 @@ import numpy as np
 
 from monitor.methods import method_named
 from monitor.methods.identification import Identification, RunIdentification
+from monitor.methods.problem import Solver, solve_problem
 from monitor.records import Array, Campaign
-from monitor.store import Database, StoredIdentification, StoredRun, load_campaign, save_identification
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    StoredModel,
+    StoredRun,
+    load_campaign,
+    save_identification,
+)
 from monitor.units import MICROMETRE, Unit
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.models import as_model, resolve
@@ -96,6 +104,17 @@ def _stored(campaign: Campaign, found: Identification, model: str, version: int)
     )
 
 
+def identified(
+    campaign: Campaign, model: StoredModel, solve: Solver = solve_problem
+) -> tuple[Identification, StoredIdentification]:
+    """Identify a campaign under a model, and the same as it is stored.
+
+    ``solve`` gives the solution of the method's problem. Raises as ``identify``.
+    """
+    found: Identification = method_named(campaign.method).identify(campaign, as_model(model), solve)
+    return found, _stored(campaign, found, model.name, model.version)
+
+
 def identify(db: Database, campaign: str, model: str | None = None, run: int | None = None) -> Document:
     """Identify a campaign, or one of its runs, under a model, and store the result.
 
@@ -106,8 +125,8 @@ def identify(db: Database, campaign: str, model: str | None = None, run: int | N
     if run is not None:
         loaded = only_run(loaded, run)
     stored_model = resolve(db, model, loaded.method)
-    found = method_named(loaded.method).identify(loaded, as_model(stored_model))
-    save_identification(db, _stored(loaded, found, stored_model.name, stored_model.version))
+    found, kept = identified(loaded, stored_model)
+    save_identification(db, kept)
     return {
         "campaign": campaign,
         "model": found.model,
