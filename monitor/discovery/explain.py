@@ -82,7 +82,7 @@ def explain(
 
     Raises DataError where the model cannot be fitted.
     """
-    given, problem = problem, problem.foreseen()
+    given, problem = problem, problem.for_search()
     # What is known of the problem as given serves only where nothing else is foreseen.
     first = fit(problem) if first is None or problem is not given else first
     surroundings = _surroundings(campaign, problem)

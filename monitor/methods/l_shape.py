@@ -14,7 +14,7 @@ tangent for angle, 1e-7 of a tilt of 0.5 mrad; products of errors, as in Eqs. (4
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -276,6 +276,17 @@ class LShapeProblem(ChainProblem):
             tilted = np.einsum("nki,ni...->nk...", self.frames[:, :2], rows[:, 3:])
         twice = -2.0 * self.piece.focal_length
         return np.concatenate([twice * tilted, twice * (moved / self.piece.paraboloid + tilted)], axis=1)
+
+    def for_search(self) -> LShapeProblem:
+        """The modules deviate from their calibration alike in all R runs. Each run has a deviation of its own here,
+        so its uncertainty is widened by the root of R: all runs together then say as little of it as one does."""
+        wider = float(np.sqrt(len(self.runs)))
+        piece = replace(
+            self.piece,
+            place_uncertainty=self.piece.place_uncertainty * wider,
+            tilt_uncertainty=self.piece.tilt_uncertainty * wider,
+        )
+        return replace(self.foreseen(), piece=piece)
 
     def extras(self, own: Array) -> tuple[Array, Array]:
         """The modules' deviations from their calibration, in standard uncertainties of it."""

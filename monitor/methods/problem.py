@@ -102,6 +102,10 @@ class ChainProblem(ABC):
         bare = replace(self, added=())
         return replace(self, context=self.context.expecting(_stops(bare, solve_problem(bare))))
 
+    def for_search(self) -> Self:
+        """The problem in which missing effects are looked for."""
+        return self.foreseen()
+
     @property
     def extra_names(self) -> tuple[str, ...]:
         """Names of the e calibrated quantities that every run has besides its rows."""
