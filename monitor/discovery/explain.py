@@ -75,13 +75,16 @@ def explain(
     *,
     rate: float = 0.01,
     rng: np.random.Generator,
+    first: Fit | None = None,
 ) -> Explanation:
-    """What a model lacks. ``rate`` is the false discovery rate of each scan; ``rng`` serves the step search.
+    """What a model lacks. ``rate`` is the false discovery rate of each scan; ``rng`` serves the step search;
+    ``first`` is the fit of ``problem`` where it is known.
 
     Raises DataError where the model cannot be fitted.
     """
-    problem = problem.foreseen()
-    first = fit(problem)
+    given, problem = problem, problem.for_search()
+    # What is known of the problem as given serves only where nothing else is foreseen.
+    first = fit(problem) if first is None or problem is not given else first
     surroundings = _surroundings(campaign, problem)
     drivers, runs = surroundings.drivers, surroundings.runs
     pitches = {
@@ -99,7 +102,7 @@ def explain(
         refined = refine_all(now, visible, result)
         chosen = [one.candidate.variant.effect for one in refined]
         under = fit(with_effects(problem, [*own, *chosen]), out, now) if chosen else now
-        more = find_suspects(under, problem, chosen, suspects, variants)
+        more = find_suspects(under, problem, chosen, suspects, variants, visible if under is now else None)
         if more.same_as(suspects):
             break
         suspects = more

@@ -16,7 +16,7 @@ from monitor.discovery.anomalies import BadPoint, BallMove, bad_points, ball_mov
 from monitor.discovery.fit import Fit, fit
 from monitor.discovery.variants import each_run
 from monitor.discovery.varying import most_varying
-from monitor.discovery.visible import Variant
+from monitor.discovery.visible import Variant, Visible
 from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
 from monitor.methods.problem import ChainProblem
 
@@ -78,17 +78,19 @@ def find_suspects(
     chosen: Sequence[ChainEffect | ArtefactEffect],
     known: Suspects,
     variants: Sequence[Variant],
+    visible: Visible | None = None,
 ) -> Suspects:
     """The suspects under a model with the ``chosen`` effects, the most certain first; ``known`` ones are kept.
 
-    ``under`` is the fit with the chosen and the known ones, ``variants`` the effects that may vary.
+    ``under`` is the fit with the chosen and the known ones, ``variants`` the effects that may vary,
+    ``visible`` what ``under`` shows of them all where that is known.
     """
     bad, moves, varying = dict(known.bad), dict(known.moves), known.varying
     now = under
     while len(bad) < MOST_BAD_POINTS:
         new: list[BadPoint | BallMove] = [*bad_points(now), *ball_moves(now)]
         new.sort(key=lambda one: -one.chi_square)
-        wild = most_varying(now, variants) if len(varying) < MOST_VARYING else None
+        wild = most_varying(now, variants, visible) if len(varying) < MOST_VARYING else None
         if wild is not None and (not new or wild.gain > new[0].chi_square):
             varying = (*varying, wild.effect)
         elif not new:
@@ -109,4 +111,5 @@ def find_suspects(
                     bad[one.row] = one
         found = Suspects(bad, moves, varying)
         now = fit(with_effects(problem, [*found.effects(problem), *chosen]), found.left_out(problem), now)
+        visible = None
     return Suspects(bad, moves, varying)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import lru_cache
 
 from monitor.discovery.visible import Variant
 from monitor.effects import ArtefactEffect, ChainEffect, parse_effect, with_time_constant
@@ -39,7 +40,8 @@ def variants_of(effect: ChainEffect | ArtefactEffect) -> list[Variant]:
     return [Variant(effect.text, effect, odds=odds)]
 
 
-def cycles_of_unknown_pitch(chain: Chain) -> list[Variant]:
+@lru_cache(maxsize=16)
+def cycles_of_unknown_pitch(chain: Chain) -> tuple[Variant, ...]:
     """Positioning errors of every linear axis with every pitch of the grid."""
     low, high = 1.0 / LONGEST_PITCH_MM, 1.0 / SHORTEST_PITCH_MM
     count = int((high - low) / FREQUENCY_STEP) + 1
@@ -50,7 +52,7 @@ def cycles_of_unknown_pitch(chain: Chain) -> list[Variant]:
         for pitch in pitches:
             text = f"{term}:cyclic{pitch:.6g}mm"
             found.append(Variant(f"{term}:cyclic", parse_effect(text, chain), count))
-    return found
+    return tuple(found)
 
 
 def with_drivers(effect: ChainEffect | ArtefactEffect, drivers: Iterable[str]) -> list[Variant]:

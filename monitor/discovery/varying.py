@@ -34,14 +34,23 @@ class Varying:
     gain: float
 
 
-def _weigh(fit: Fit, variants: Sequence[Variant]) -> tuple[list[Evidence], Visible]:
-    seen = see(fit, variants)
-    found = weigh_in_each_run([one for one in seen.candidates if one.detectable], seen)
+def _weigh(
+    fit: Fit, variants: Sequence[Variant], visible: Visible | None = None
+) -> tuple[list[Evidence], Visible]:
+    seen = see(fit, variants) if visible is None else visible
+    # By identity: equal variants are the same objects here, and comparing effects is slow.
+    own = {id(one) for one in variants}
+    found = weigh_in_each_run(
+        [one for one in seen.candidates if id(one.variant) in own and one.detectable], seen
+    )
     return sorted(found, key=lambda one: -one.score), seen
 
 
-def most_varying(fit: Fit, variants: Sequence[Variant]) -> Varying | None:
-    """The effect that, with another size in every run, explains most of what the model leaves; None if none does."""
+def most_varying(fit: Fit, variants: Sequence[Variant], visible: Visible | None = None) -> Varying | None:
+    """The effect that, with another size in every run, explains most of what the model leaves; None if none does.
+
+    ``visible`` is what the fit shows of all ``variants``, where that is known.
+    """
     if len(fit.problem.runs) < FEWEST_RUNS:
         return None
     known = {effect.text for effect in fit.problem.added}
@@ -50,7 +59,7 @@ def most_varying(fit: Fit, variants: Sequence[Variant]) -> Varying | None:
         for one in variants
         if one.tries == 1 and (own := each_run(one.effect)) is not None and own.effect.text not in known
     ]
-    found, seen = _weigh(fit, bare)
+    found, seen = _weigh(fit, bare, visible)
     if not found or found[0].p_value * len(found) > FALSE_ALARM:
         return None
     best = found[0]

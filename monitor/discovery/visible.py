@@ -130,14 +130,19 @@ def _projected(fit: Fit, raw: Sequence[Array], basis_of_runs: Array) -> tuple[Ar
     weights = 1.0 / problem.sigma
     places = problem.padded(np.arange(float(weights.size)).reshape(weights.shape) + 1.0).astype(np.int64) - 1
     left = np.zeros((count, runs, rows))
-    if count:
-        white = (np.concatenate(raw) * weights).reshape(count, -1)
-        filled = places >= 0
-        # Probings of one run after another, all runs of the same length: the usual file needs no reordering.
-        if np.array_equal(places.reshape(-1), np.arange(white.shape[1])):
-            left[:, :, : places.shape[1]] = white.reshape(count, *places.shape)
+    filled = places >= 0
+    # Probings of one run after another, all runs of the same length: the usual file needs no reordering.
+    straight = np.array_equal(places.reshape(-1), np.arange(weights.size))
+    place = 0
+    # Effect by effect: all columns once more beside ``left`` would be fetched from the system page by page.
+    for one in raw:
+        white = (one * weights).reshape(len(one), -1)
+        into = left[place : place + len(one), :, : places.shape[1]]
+        place += len(one)
+        if straight:
+            into[...] = white.reshape(len(one), *places.shape)
         else:
-            left[:, :, : places.shape[1]] = np.where(filled, white[:, np.where(filled, places, 0)], 0.0)
+            into[...] = np.where(filled, white[:, np.where(filled, places, 0)], 0.0)
     before = np.sqrt(np.einsum("krn,krn->k", left, left))
     for run, basis in enumerate(basis_of_runs):
         part = left[:, run]

@@ -1,7 +1,8 @@
 """Calibration methods, one file each, and the least-squares solver that they share.
 
-A method is a module with ``NAME``, ``problem_of(campaign, model)``, ``identify(campaign, model)`` and ``advice``, what
-to do about parameters that a plan cannot separate; another one is another file, listed here.
+A method is a module with ``NAME``, ``problem_of(campaign, model)``, ``identify(campaign, model, solve)``, where
+``solve`` gives the problem's solution, and ``advice``, what to do about parameters that a plan cannot separate; another
+one is another file, listed here.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from monitor.methods.free_form_problem import FreeFormProblem
 from monitor.methods.free_form_rank import nullity, reason_of
 from monitor.methods.identification import Identification
 from monitor.methods.model import Model, chain_of
-from monitor.methods.problem import ChainProblem, solve_problem
+from monitor.methods.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.results import identification
 from monitor.records import Campaign
 from monitor.units import DEGREE
@@ -122,7 +122,9 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     return reason_of(problem, parameters, run)
 
 
-def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification:
+def identify(
+    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
+) -> Identification:
     """Shape and errors of every run of a campaign, with the covariance of the probe's and the length's uncertainty.
 
     Raises DataError where a run stood at fewer than three table angles, has fewer readings than unknowns or
@@ -131,8 +133,7 @@ def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification
     problem = problem_of(campaign, model)
     refuse_too_little(problem)
     _refuse_far_off(problem)
-    solution = solve_problem(problem)
-    return identification(campaign, model, problem, solution, advice)
+    return identification(campaign, model, problem, solve(problem), advice)
 
 
 def refuse_too_little(problem: FreeFormProblem) -> None:

@@ -14,7 +14,7 @@ tangent for angle, 1e-7 of a tilt of 0.5 mrad; products of errors, as in Eqs. (4
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,7 +26,7 @@ from monitor.machine import Chain, Evaluation, evaluate
 from monitor.methods.identification import Identification
 from monitor.methods.least_squares import Linearisation
 from monitor.methods.model import Model, chain_of
-from monitor.methods.problem import ChainProblem, solve_problem
+from monitor.methods.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.results import identification
 from monitor.records import Array, Campaign, LShape
 from monitor.units import MICROMETRE
@@ -277,6 +277,17 @@ class LShapeProblem(ChainProblem):
         twice = -2.0 * self.piece.focal_length
         return np.concatenate([twice * tilted, twice * (moved / self.piece.paraboloid + tilted)], axis=1)
 
+    def for_search(self) -> LShapeProblem:
+        """The modules deviate from their calibration alike in all R runs. Each run has a deviation of its own here,
+        so its uncertainty is widened by the root of R: all runs together then say as little of it as one does."""
+        wider = float(np.sqrt(len(self.runs)))
+        piece = replace(
+            self.piece,
+            place_uncertainty=self.piece.place_uncertainty * wider,
+            tilt_uncertainty=self.piece.tilt_uncertainty * wider,
+        )
+        return replace(self.foreseen(), piece=piece)
+
     def extras(self, own: Array) -> tuple[Array, Array]:
         """The modules' deviations from their calibration, in standard uncertainties of it."""
         first = len(SETUP) * len(self._used)
@@ -326,7 +337,9 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     return f"; scan {len(ORDERS) + 1} or more modules along every arm, as a cubic needs"
 
 
-def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification:
+def identify(
+    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
+) -> Identification:
     """The geometric errors of every run at once. Raises DataError where the data do not suffice."""
     problem = problem_of(campaign, model)
-    return identification(campaign, model, problem, solve_problem(problem), advice)
+    return identification(campaign, model, problem, solve(problem), advice)

@@ -10,7 +10,7 @@ them a reading tells (``observe``), and which calibrated quantities it has besid
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -101,6 +101,10 @@ class ChainProblem(ABC):
             return self
         bare = replace(self, added=())
         return replace(self, context=self.context.expecting(_stops(bare, solve_problem(bare))))
+
+    def for_search(self) -> Self:
+        """The problem in which missing effects are looked for."""
+        return self.foreseen()
 
     @property
     def extra_names(self) -> tuple[str, ...]:
@@ -294,6 +298,10 @@ def _stops(problem: ChainProblem, solution: Solution) -> Array:
     stops = problem.context.positions.copy()
     stops[:, measured] -= np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(seen.residual))
     return stops
+
+
+#: What gives the solution of a problem: ``solve_problem``, or who has it already.
+Solver = Callable[[ChainProblem], Solution]
 
 
 def solve_problem(problem: ChainProblem, local: Array | None = None, common: Array | None = None) -> Solution:

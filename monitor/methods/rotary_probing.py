@@ -25,7 +25,7 @@ from monitor.exceptions import DataError
 from monitor.machine import Evaluation, evaluate
 from monitor.methods.identification import Identification
 from monitor.methods.model import Model, chain_of
-from monitor.methods.problem import ChainProblem, solve_problem
+from monitor.methods.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.results import identification
 from monitor.methods.rotary_base import rotary_base
 from monitor.records import Array, Campaign
@@ -224,11 +224,13 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     return "; touch more faces or other angles: the same points at opposite angles, and faces that look elsewhere"
 
 
-def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification:
+def identify(
+    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
+) -> Identification:
     """The location errors of every run of a campaign, with the covariance of the probe's stated uncertainty.
 
     Raises DataError where the readings contradict the machine file, EffectError where the model names an effect
     that the machine or the data do not have.
     """
     problem = problem_of(campaign, model)
-    return identification(campaign, model, problem, solve_problem(problem), advice)
+    return identification(campaign, model, problem, solve(problem), advice)

@@ -15,7 +15,7 @@ from monitor.exceptions import DataError
 from monitor.machine import refuse_untouchable
 from monitor.methods.identification import Identification
 from monitor.methods.model import Model, chain_of
-from monitor.methods.problem import ChainProblem, solve_problem
+from monitor.methods.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.results import identification
 from monitor.methods.touch import Distance, TouchProblem
 from monitor.records import Array, Campaign
@@ -97,7 +97,9 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     return f": {', '.join(joint.name for joint in still)} stands at one angle throughout; index it too"
 
 
-def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification:
+def identify(
+    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
+) -> Identification:
     """The geometric errors of every run of a campaign, with the covariance of the probe and bar uncertainties.
 
     Raises DataError where a run has fewer readings than its unknowns need or the readings contradict the
@@ -114,5 +116,4 @@ def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification
                 f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "probe more balls or indexations"
             )
-    solution = solve_problem(problem)
-    return identification(campaign, model, problem, solution, advice)
+    return identification(campaign, model, problem, solve(problem), advice)

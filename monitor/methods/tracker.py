@@ -18,7 +18,7 @@ from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.identification import Identification
 from monitor.methods.model import Model, chain_of
-from monitor.methods.problem import ChainProblem, solve_problem
+from monitor.methods.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.results import identification
 from monitor.methods.tracking import TrackingProblem, first_guess
 from monitor.records import Campaign
@@ -77,7 +77,9 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     return "; add poses over the whole range of the joints"
 
 
-def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification:
+def identify(
+    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
+) -> Identification:
     """The geometric errors of every run of a campaign, with the covariance of the stated uncertainty.
 
     Raises DataError where a run has fewer readings than its unknowns need or the readings contradict the
@@ -92,5 +94,4 @@ def identify(campaign: Campaign, model: Model = DEFAULT_MODEL) -> Identification
                 f"run {run} of campaign {campaign.name} has {3 * len(targets)} readings for {unknowns} unknowns; "
                 "measure more poses"
             )
-    solution = solve_problem(problem)
-    return identification(campaign, model, problem, solution, advice)
+    return identification(campaign, model, problem, solve(problem), advice)

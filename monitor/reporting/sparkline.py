@@ -56,17 +56,23 @@ def sparkline(parameter: ParameterHealth, factor: float) -> str:
             marks.append(
                 f'<line x1="{at:.1f}" x2="{at:.1f}" y1="2" y2="{height - 2:.0f}" stroke="{ORANGE}" stroke-width="3.2"/>'
             )
-    for place, own in enumerate(history.this_week[-MOST:]):
-        colour = BLUE if own else MID
-        at, here = float(x[place]), float(y[place])
-        marks.append(
-            f'<line x1="{at:.1f}" x2="{at:.1f}" y1="{here - bar[place]:.1f}" y2="{here + bar[place]:.1f}" '
-            f'stroke="{colour}" stroke-width="2"/>'
+    own = np.array(history.this_week[-MOST:], dtype=bool)
+    for week, colour in ((False, MID), (True, BLUE)):
+        # One path for all bars and one for all dots (round ends of lines of no length): the PDF is twice as quick.
+        dots = "".join(
+            f"M{at:.1f} {here:.1f}h0" for at, here in zip(x[own == week], y[own == week], strict=True)
         )
-        marks.append(
-            f'<circle cx="{at:.1f}" cy="{here:.1f}" r="4.2" fill="{colour if own else "white"}" stroke="{colour}" '
-            'stroke-width="1.8"/>'
+        if not dots:
+            continue
+        bars = "".join(
+            f"M{at:.1f} {here - long:.1f}V{here + long:.1f}"
+            for at, here, long in zip(x[own == week], y[own == week], bar[own == week], strict=True)
         )
+        marks.append(f'<path d="{bars}" fill="none" stroke="{colour}" stroke-width="2"/>')
+        for wide, ink in ((10.2, colour),) if week else ((10.2, colour), (6.6, "white")):
+            marks.append(
+                f'<path d="{dots}" fill="none" stroke="{ink}" stroke-width="{wide}" stroke-linecap="round"/>'
+            )
     picture = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH_MM}mm" height="{HEIGHT_MM}mm" '
         f'viewBox="0 0 {width:.0f} {height:.0f}">{"".join(marks)}</svg>'

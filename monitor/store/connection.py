@@ -72,28 +72,28 @@ class Database:
 
     def execute(self, sql: str, parameters: Parameters = ()) -> None:
         """Run a statement. Values are always bound, never written into the text."""
-        with self._lock:
+        with self._lock, _stopped_by_ctrl_c():
             self._connection.execute(sql, parameters)
 
     def rows(self, sql: str, parameters: Parameters = ()) -> list[tuple[Any, ...]]:
         """The rows of a query as tuples."""
-        with self._lock:
+        with self._lock, _stopped_by_ctrl_c():
             return self._connection.execute(sql, parameters).fetchall()
 
     def frame(self, sql: str, parameters: Parameters = ()) -> pd.DataFrame:
         """The rows of a query as a table, for views that people read."""
-        with self._lock:
+        with self._lock, _stopped_by_ctrl_c():
             return self._connection.execute(sql, parameters).df()
 
     def arrays(self, sql: str, parameters: Parameters = ()) -> dict[str, Any]:
         """The columns of a query as numpy arrays, masked where NULL."""
-        with self._lock:
+        with self._lock, _stopped_by_ctrl_c():
             columns: dict[str, Any] = self._connection.execute(sql, parameters).fetchnumpy()
             return columns
 
     def insert(self, sql: str, incoming: pd.DataFrame, parameters: Parameters = ()) -> None:
         """Run an INSERT that selects from ``incoming``: 50 times as quick as row by row."""
-        with self._lock:
+        with self._lock, _stopped_by_ctrl_c():
             self._connection.register("incoming", incoming)
             try:
                 self._connection.execute(sql, parameters)
@@ -167,6 +167,17 @@ class Database:
                 f"{self.path}: the database is older than this software and was opened for reading only; "
                 "open it once for writing, which brings it to the present schema"
             )
+
+
+@contextmanager
+def _stopped_by_ctrl_c() -> Iterator[None]:
+    """DuckDB tells Ctrl-C during a query as a fault of the query; here it is what it is everywhere else."""
+    try:
+        yield
+    except RuntimeError as fault:
+        if str(fault) == "Query interrupted":
+            raise KeyboardInterrupt from fault
+        raise
 
 
 def _connect(path: str, read_only: bool, threads: int | None) -> duckdb.DuckDBPyConnection:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from monitor.exceptions import RefusedResultError
@@ -43,6 +44,23 @@ class Engine(Protocol):
     def cancel(self, handles: Iterable[Any]) -> None:
         """Forget tasks whose results nobody wants."""
         ...
+
+
+class Here:
+    """This process: a task is done when its result is asked for."""
+
+    size = 1
+
+    def submit(self, task: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+        """Remember a task."""
+        return partial(task, *arguments)
+
+    def result(self, handle: Callable[[], Any]) -> Any:
+        """Do it."""
+        return handle()
+
+    def cancel(self, handles: Iterable[Any]) -> None:
+        """Nothing was begun."""
 
 
 def in_order(

@@ -164,6 +164,8 @@ def grid(
     zero. Raises DataError for an axis without a range or fewer than two points.
     """
     linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
+    if not linear:
+        raise DataError("a map runs over the strokes of linear axes, and this machine has none")
     if points < 2:
         raise DataError(f"a map needs at least 2 points along every axis, not {points}")
     lacking = [chain.joints[place].name for place in linear if chain.joints[place].name not in ranges]

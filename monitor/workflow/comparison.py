@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
@@ -26,6 +27,8 @@ Document = dict[str, Any]
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.
 SEED = 20260302
+# The false discovery rate of a search for missing effects.
+RATE = 0.01
 ONE_RUN = (
     "with one run nobody can say what varies from run to run, what stepped between runs, or how well a reading "
     "repeats; measure the same plan again"
@@ -230,7 +233,7 @@ def explain_campaign(
     db: Database,
     campaign: str,
     model: str | None = None,
-    rate: float = 0.01,
+    rate: float = RATE,
     *,
     before: datetime | None = None,
 ) -> tuple[Document, Explanation]:
@@ -243,14 +246,33 @@ def explain_campaign(
         raise InputError(f"the false discovery rate must lie between 0 and 1, not {rate}")
     loaded = runs_before(load_campaign(db, campaign), before)
     stored = resolve(db, model, loaded.method)
-    problem = method_named(loaded.method).problem_of(loaded, as_model(stored))
-    found = explain(loaded, problem, label(stored), rate=rate, rng=np.random.default_rng(SEED))
+    found = explanation_of(loaded, stored, rate)
     document = explanation_document(found)
-    save_analysis(
-        db, kind_of("explanation", before), document, method=method_of(loaded.method, before), campaign=campaign,
-        model=stored.name, model_version=stored.version, seed=SEED,
-    )  # fmt: skip
+    save_explanation(db, document, loaded.method, stored, before)
     return document, found
+
+
+def explanation_of(
+    campaign: Campaign, model: StoredModel, rate: float = RATE, first: Fit | None = None
+) -> Explanation:
+    """Which physical effect a model lacks; ``first`` is its fit where that is known."""
+    problem = (
+        method_named(campaign.method).problem_of(campaign, as_model(model))
+        if first is None
+        else first.problem
+    )
+    rng = np.random.default_rng(SEED)
+    return explain(campaign, problem, label(model), rate=rate, rng=rng, first=first)
+
+
+def save_explanation(
+    db: Database, document: Document, method: str, model: StoredModel, before: datetime | None
+) -> None:
+    """Keep an explanation, ``partial`` where runs from ``before`` on took no part."""
+    save_analysis(
+        db, kind_of("explanation", before), document, method=method_of(method, before),
+        campaign=document["campaign"], model=model.name, model_version=model.version, seed=SEED,
+    )  # fmt: skip
 
 
 def latest_campaign(db: Database, model: StoredModel) -> str:
@@ -285,15 +307,20 @@ def history(
     if is_curve(db, name):
         return curves.history(db, stored, name)
     loaded = runs_before(load_campaign(db, name), before)
+    return error_steps(loaded, model_history(db, stored.name, stored.version))
+
+
+def error_steps(loaded: Campaign, versions: Sequence[StoredModel]) -> list[Document]:
+    """The error of every version of a model on a campaign."""
     steps = []
-    for version in model_history(db, stored.name, stored.version):
+    for version in versions:
         found = fit(method_named(loaded.method).problem_of(loaded, as_model(version)))
         error = version_error(found)
         unseen = shared_parameters(found.problem, found.solution).refused
         steps.append(
             {
                 "model": label(version),
-                "campaign": name,
+                "campaign": loaded.name,
                 "added": " + ".join(version.added) or None,
                 "removed": " + ".join(version.removed) or None,
                 "rms_um": _um(error.rms),

@@ -1,13 +1,18 @@
 """The weekly health report: the state of every machine is found and stored, then HTML and PDF are written from that.
 
-A machine is held at a time: its record is stored as it is found, and read again when its page is written.
+A few machines are held at a time: a record is stored as it is found, and read again when its page is written. What is
+to be computed, and the PDF, may be spread over processes (``health_work``); this one alone has the database.
 """
 
 from __future__ import annotations
 
 import json
+import os
+from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from datetime import UTC, date, datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +23,21 @@ from monitor.reporting.health import ALARMS, Fleet, FleetRow, MachineHealth, by_
 from monitor.reporting.health_render import MACHINES_A_PART, health_html, health_pdf
 from monitor.store import Database, list_machines, save_analysis
 from monitor.store.catalogue import check_machine
+from monitor.uncertainty.engine import Engine, Here, in_order
+from monitor.uncertainty.processes import processes
 from monitor.workflow.campaigns import records
 from monitor.workflow.health_history import check_campaigns, makers
-from monitor.workflow.health_machine import Settings, machine_health
+from monitor.workflow.health_machine import Begun, Settings, begun, machine_health
 from monitor.workflow.health_refusals import refused_elsewhere
+from monitor.workflow.health_work import Work, computed
 from monitor.workflow.weeks import Week, week_before, week_named
 
 Document = dict[str, Any]
 KIND = "health"
+#: Processes by default: at most so many (each needs up to 0.7 GB while it writes a part of the PDF), and one for so
+#: many machines, since a process starts in the time in which a machine or two are computed.
+MOST_WORKERS = 4
+MACHINES_A_WORKER = 4
 
 
 def report(
@@ -37,11 +49,13 @@ def report(
     settings: Settings | None = None,
     made_at: datetime | None = None,
     progress: Callable[[str], None] = lambda name: None,
+    workers: int | None = None,
 ) -> Document:
     """Find, store and write the state of one machine or of all at the end of a week.
 
     ``week`` like ``2026-W10``, by default the last that has ended. Files go to ``out`` (made where there is
-    none, by default the working directory). Raises InputError for a week that is none, NotFoundError for a
+    none, by default the working directory). ``workers`` processes compute, by default as many as there are cores and
+    the fleet occupies; the results do not depend on it. Raises InputError for a week that is none, NotFoundError for a
     machine or campaign that is not there.
     """
     chosen = week_named(week) if week else week_before(date.today())
@@ -57,35 +71,89 @@ def report(
             f"machine {machine} has none of the campaigns chosen ({', '.join(own.campaigns)}); "
             f"they are of {', '.join(sorted(measured_by))}"
         )
-    rows: list[tuple[FleetRow, int]] = []
-    for known in records(list_machines(db)):
-        name = str(known["machine"])
-        if machine not in (None, name) or (measured_by is not None and name not in measured_by):
-            continue
-        progress(name)
-        found = machine_health(db, name, _description(known), str(known["location"] or ""), chosen, own)
-        number = save_analysis(
-            db, KIND, to_document(found), method=f"{chosen.name}, alarm above {own.risk:g}", machine=name
-        )
-        rows.append((fleet_row(found), number))
-    rows.sort(key=lambda row: by_urgency(row[0]))
+    chosen_machines = [
+        known
+        for known in records(list_machines(db))
+        if machine in (None, str(known["machine"]))
+        and (measured_by is None or str(known["machine"]) in measured_by)
+    ]
     now = (made_at or datetime.now(UTC)).replace(tzinfo=None, microsecond=0)
-    fleet = Fleet(
-        chosen.name, chosen.first, chosen.last, now, f"machine-health-monitor {__version__}", own.risk,
-        tuple(row for row, _ in rows),
-        refused_elsewhere(db, {str(known["machine"]) for known in records(list_machines(db))}, chosen),
-    )  # fmt: skip
-    files = _write(db, fleet, [number for _, number in rows], out or Path(), machine)
+    with _engine(workers, len(chosen_machines)) as engine:
+        rows = _found(db, chosen_machines, chosen, own, engine, progress)
+        fleet = Fleet(
+            chosen.name, chosen.first, chosen.last, now, f"machine-health-monitor {__version__}", own.risk,
+            tuple(row for row, _ in rows),
+            refused_elsewhere(db, {str(known["machine"]) for known in records(list_machines(db))}, chosen),
+        )  # fmt: skip
+        files = _write(db, fleet, [number for _, number in rows], out or Path(), machine, engine)
     return _document(fleet, chosen, files)
+
+
+def _engine(workers: int | None, machines: int) -> AbstractContextManager[Engine]:
+    """Where to compute: no more processes than machines, and none beside this one where it would be the only one."""
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: at least one worker is needed")
+    if workers is None:
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        workers = min(cores, MOST_WORKERS, machines // MACHINES_A_WORKER)
+    wanted = min(workers, machines)
+    return nullcontext(Here()) if wanted <= 1 else processes(wanted)
+
+
+def _found(
+    db: Database,
+    machines: list[Document],
+    week: Week,
+    settings: Settings,
+    engine: Engine,
+    progress: Callable[[str], None],
+) -> list[tuple[FleetRow, int]]:
+    """The machines' lines by urgency, each with the number of its stored record."""
+    in_hand: deque[Begun] = deque()
+
+    def works() -> Iterator[tuple[Work | None]]:
+        for known in machines:
+            one = begun(
+                db, str(known["machine"]), _description(known), str(known["location"] or ""), week, settings
+            )
+            in_hand.append(one)
+            yield (one.work,)
+
+    rows = []
+    for done in in_order(engine, computed, works()):
+        past = in_hand.popleft()
+        progress(past.machine)
+        found = machine_health(db, past, done)
+        number = save_analysis(
+            db, KIND, to_document(found), method=f"{week.name}, alarm above {settings.risk:g}",
+            machine=past.machine,
+        )  # fmt: skip
+        rows.append((fleet_row(found), number))
+    return sorted(rows, key=lambda row: by_urgency(row[0]))
 
 
 def stored_health(db: Database, number: int) -> MachineHealth:
     """The record of a machine as it was stored."""
+    return _record(_text(db, number))
+
+
+def _text(db: Database, number: int) -> str:
     ((text,),) = db.rows("SELECT document FROM v_analyses WHERE analysis_id = ?", [number])
+    return str(text)
+
+
+def _record(text: str) -> MachineHealth:
     return from_document(MachineHealth, json.loads(text))
 
 
-def _write(db: Database, fleet: Fleet, numbers: list[int], out: Path, machine: str | None) -> list[str]:
+def _pdf(fleet: Fleet, texts: list[str], part: int, parts: int) -> bytes:
+    """A part of the PDF from stored records, in whatever process."""
+    return health_pdf(fleet, [_record(text) for text in texts], part, parts)
+
+
+def _write(
+    db: Database, fleet: Fleet, numbers: list[int], out: Path, machine: str | None, engine: Engine
+) -> list[str]:
     stem = f"health-{fleet.week}" + (
         "" if machine is None else "-" + "".join(sign if sign.isalnum() or sign in "-_." else "_" for sign in machine)
     )  # fmt: skip
@@ -99,10 +167,14 @@ def _write(db: Database, fleet: Fleet, numbers: list[int], out: Path, machine: s
             for piece in health_html(fleet, _stored(db, numbers)):
                 stream.write(piece)
         part.replace(page)
-        for place in range(parts):
-            some = numbers[place * MACHINES_A_PART : (place + 1) * MACHINES_A_PART]
-            pdf = health_pdf(fleet, list(_stored(db, some)), place + 1, parts)
-            path = out / (f"{stem}.pdf" if parts == 1 else f"{stem}-part-{place + 1}-of-{parts}.pdf")
+        # Of nearly the same length, so that no worker waits for another.
+        ends = [len(numbers) * place // parts for place in range(parts + 1)]
+        tasks = (
+            (fleet, [_text(db, number) for number in numbers[first:end]], place, parts)
+            for place, (first, end) in enumerate(pairwise(ends), start=1)
+        )
+        for place, pdf in enumerate(in_order(engine, _pdf, tasks), start=1):
+            path = out / (f"{stem}.pdf" if parts == 1 else f"{stem}-part-{place}-of-{parts}.pdf")
             beside = path.with_name(path.name + ".part")
             beside.write_bytes(pdf)
             beside.replace(path)

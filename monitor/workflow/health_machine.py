@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
 
 from monitor.reporting.health import DataQuality, MachineHealth, RefusedImport
-from monitor.store import Database
+from monitor.store import Database, StoredModel
 from monitor.workflow.health_facts import (
     changes_noted,
     conditions_of,
@@ -19,6 +19,7 @@ from monitor.workflow.health_facts import (
 from monitor.workflow.health_history import (
     Event,
     PastRun,
+    Span,
     campaign_span,
     first_run,
     past_events,
@@ -27,14 +28,7 @@ from monitor.workflow.health_history import (
 from monitor.workflow.health_map import map_told
 from monitor.workflow.health_model import model_of
 from monitor.workflow.health_refusals import refused_of
-from monitor.workflow.health_results import (
-    explanation_of,
-    history_of,
-    identified,
-    map_of,
-    tolerances_of,
-    uncertainty_of,
-)
+from monitor.workflow.health_results import Results, found_in, stored_with, tolerances_of, work_of
 from monitor.workflow.health_series import changes_of, drift_of, series_of
 from monitor.workflow.health_verdict import (
     changed_in_words,
@@ -45,6 +39,7 @@ from monitor.workflow.health_verdict import (
     since_when,
     state_of,
 )
+from monitor.workflow.health_work import Done, Work
 from monitor.workflow.models import resolve
 from monitor.workflow.weeks import Week
 
@@ -58,25 +53,72 @@ class Settings:
     risk: float = 0.05
 
 
-def machine_health(
+@dataclass(frozen=True)
+class Begun:
+    """A machine whose past was read; ``work`` is what its page still lacks.
+
+    ``model``, ``span`` and ``found`` are None for a machine that was not measured in the week.
+    """
+
+    machine: str
+    description: str
+    location: str
+    week: Week
+    settings: Settings
+    runs: list[PastRun]
+    events: list[Event]
+    refused: tuple[RefusedImport, ...]
+    remarks: list[str]
+    method: str = ""
+    model: StoredModel | None = None
+    span: Span | None = None
+    found: Results | None = None
+    work: Work | None = None
+
+    @property
+    def here(self) -> list[PastRun]:
+        """The runs of the week."""
+        return [run for run in self.runs if self.week.holds(run.at)]
+
+    @property
+    def last(self) -> PastRun | None:
+        """The last run of the week."""
+        return self.here[-1] if self.here else None
+
+
+def begun(
     db: Database, machine: str, description: str, location: str, week: Week, settings: Settings
-) -> MachineHealth:
-    """The state of a machine at the end of a week. What fails for one machine is said on its page."""
+) -> Begun:
+    """Read the past of a machine up to the end of a week."""
     runs, remarks = past_runs(db, machine, week, settings.campaigns)
-    here = [run for run in runs if week.holds(run.at)]
     events = past_events(db, machine, week)
     refused = refused_of(db, machine, week)
-    if not here:
-        ahead = first_run(db, machine, settings.campaigns)
-        return _not_measured(machine, description, location, runs, ahead, events, refused, remarks, week)
-    last = here[-1]
+    past = Begun(machine, description, location, week, settings, runs, events, refused, remarks)
+    last = past.last
+    if last is None:
+        return past
     (method,) = db.rows("SELECT method FROM v_campaigns WHERE campaign = ?", [last.campaign])[0]
     model = resolve(db, settings.model, method)
     span = campaign_span(db, last.campaign, week)
-    identified(db, machine, method, runs, model, remarks)
-    evaluated = uncertainty_of(db, last, model, span, remarks)
-    explained = explanation_of(db, last.campaign, method, model, span, remarks)
-    mapped = None if evaluated is None else map_of(db, last, model, span, remarks)
+    found = found_in(db, last, method, model, span)
+    work = work_of(db, machine, runs, last, method, model, span, found)
+    return replace(past, method=method, model=model, span=span, found=found, work=work)
+
+
+def machine_health(db: Database, past: Begun, done: Done) -> MachineHealth:
+    """The state of a machine at the end of a week, what was ``done`` stored first. What fails for one machine is said
+    on its page."""
+    machine, description, location, week = past.machine, past.description, past.location, past.week
+    runs, events, refused, remarks, settings = (
+        past.runs, past.events, past.refused, list(past.remarks), past.settings
+    )  # fmt: skip
+    last = past.last
+    if last is None or past.model is None or past.span is None or past.found is None:
+        ahead = first_run(db, machine, settings.campaigns)
+        return _not_measured(machine, description, location, runs, ahead, events, refused, remarks, week)
+    model, span, here = past.model, past.span, past.here
+    results = stored_with(db, past.found, done, past.method, model, span, remarks)
+    evaluated, explained = results.uncertainty, results.explanation
     series = series_of(db, machine, model, runs)
     origin = runs[0].at
     changes = changes_of(series, events, origin)
@@ -107,8 +149,8 @@ def machine_health(
         run=f"run {last.run} of campaign {last.campaign}, {last.at:%Y-%m-%d %H:%M}",
         basis="" if evaluated is None else evaluated["input_covariance"], factor=factor_in_words(evaluated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=conditions_of(here),
-        model=model_of(explained, history_of(db, last.campaign, model, span, remarks), span), quality=quality,
-        map=map_told(mapped),
+        model=model_of(explained, list(results.history or ()), span), quality=quality,
+        map=map_told(results.map),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The results that a health report rests on: what is stored is used, what is lacking is computed and stored.
+"""The results that a health report rests on: what is stored is used, what is lacking is named, computed and stored.
 
 A report is of the end of a week. Where a campaign goes on after it, its uncertainty and its explanation are those of
 the runs up to then, so that a report made late says what one made on Monday would have said.
@@ -7,39 +7,80 @@ the runs up to then, so that a report made late says what one made on Monday wou
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
-from monitor.exceptions import MonitorError, NotFoundError
-from monitor.store import Database, StoredModel, load_analysis, save_analysis
-from monitor.workflow.campaign_parts import kind_of, method_of
-from monitor.workflow.comparison import explain_campaign, history
+from monitor.exceptions import NotFoundError
+from monitor.records import Campaign
+from monitor.store import (
+    Database,
+    StoredModel,
+    load_analysis,
+    load_campaign,
+    model_history,
+    save_analysis,
+    save_identification,
+)
+from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
+from monitor.workflow.comparison import save_explanation
 from monitor.workflow.health_history import PastRun, Span
-from monitor.workflow.identification import identify
-from monitor.workflow.models import label
-from monitor.workflow.uncertainty import uncertainty
-from monitor.workflow.volumetric import volumetric_map
+from monitor.workflow.health_work import COVERAGE, METHOD, Done, Work, kept
+from monitor.workflow.uncertainty import save_uncertainty
+from monitor.workflow.volumetric import save_map
 
 Document = dict[str, Any]
-#: The probability that every expanded uncertainty of the report is stated with.
-COVERAGE = 0.95
-METHOD = "guf"
 
 
-def kept(step: Callable[[], Document], failure: str, remarks: list[str]) -> Document | None:
-    """The result of a step, or a remark that says why there is none: one machine does not stop the fleet's report."""
-    try:
-        return step()
-    except MonitorError as error:
-        remarks.append(f"{failure}: {error}")
-        return None
+@dataclass(frozen=True)
+class Results:
+    """What the pages of a machine say, of its last run and of its campaign; None where there is none."""
+
+    uncertainty: Document | None
+    explanation: Document | None
+    map: Document | None
+    history: tuple[Document, ...] | None
 
 
-def identified(
-    db: Database, machine: str, method: str, runs: list[PastRun], model: StoredModel, remarks: list[str]
-) -> None:
-    """Every past run of a machine identified under the model: what came in since the last report, and the history of a
-    machine whose first report this is. Campaigns of another method have other parameters and are left alone."""
+def found_in(db: Database, last: PastRun, method: str, model: StoredModel, span: Span) -> Results:
+    """What is stored of the run ``last`` and of the runs of ``span`` of its campaign."""
+    of_campaign = {"campaign": last.campaign, "model": model.name, "model_version": model.version}
+    of_run = {**of_campaign, "run": last.run}
+    uncertainty = _stored(db, "uncertainty", span.before, METHOD, **of_run)
+    # A user may have asked for another probability, or for the runs of another campaign.
+    if uncertainty is not None and (
+        uncertainty["p"] != COVERAGE or uncertainty["input_covariance"].startswith("selection")
+    ):
+        uncertainty = None
+    explanation = _stored(db, "explanation", span.before, method, **of_campaign)
+    # A version before 0.1 stored no pictures with it.
+    if explanation is not None and "residual_map" not in explanation:
+        explanation = None
+    history: tuple[Document, ...] | None = ()
+    # With one version only there is no history.
+    if model.parent is not None:
+        steps = _stored(db, "model history", span.before, METHOD, **of_campaign)
+        history = None if steps is None else tuple(steps["steps"])
+    return Results(
+        uncertainty, explanation, _stored(db, "volumetric map", span.before, METHOD, **of_run), history
+    )
+
+
+def work_of(
+    db: Database,
+    machine: str,
+    runs: list[PastRun],
+    last: PastRun,
+    method: str,
+    model: StoredModel,
+    span: Span,
+    found: Results,
+) -> Work | None:
+    """What is still to be computed for a machine, None where everything is stored.
+
+    Every past run is identified under the model: what came in since the last report, and the history of a machine
+    whose first report this is. Campaigns of another method have other parameters and are left alone.
+    """
     done = set(
         db.rows(
             "SELECT campaign, run FROM v_identified_runs WHERE machine = ? AND model = ? AND model_version = ?",
@@ -52,97 +93,86 @@ def identified(
             "SELECT campaign FROM v_campaigns WHERE machine = ? AND method = ?", [machine, method]
         )
     }
-    for campaign in dict.fromkeys(one.campaign for one in runs if (one.campaign, one.run) not in done):
-        if campaign in same:
-            kept(
-                lambda name=campaign: identify(db, name, label(model)),  # type: ignore[misc]
-                f"campaign {campaign} could not be identified",
-                remarks,
-            )
+    names = dict.fromkeys(one.campaign for one in runs if (one.campaign, one.run) not in done)
+    identify = {name: _bare(load_campaign(db, name)) for name in names if name in same}
+    versions = () if found.history is not None else model_history(db, model.name, model.version)
+    lacks = None in (found.uncertainty, found.explanation, found.map, found.history)
+    if not identify and not lacks:
+        return None
+    whole = identify.get(last.campaign) or _bare(load_campaign(db, last.campaign))
+    return Work(
+        model=model,
+        identify=tuple(identify.values()),
+        known=runs_before(whole, span.before),
+        whole=span.before is None,
+        run=last.run,
+        uncertainty=found.uncertainty is None,
+        explanation=found.explanation is None,
+        map=found.map is None,
+        versions=tuple(versions),
+    )
 
 
-def uncertainty_of(
-    db: Database, last: PastRun, model: StoredModel, span: Span, remarks: list[str]
-) -> Document | None:
-    """The uncertainty of a run from the runs of ``span``; None, with a remark, where there is none."""
-    before = span.before
-    known = _stored(
-        db, "uncertainty", before, METHOD, campaign=last.campaign, run=last.run, model=model.name,
-        model_version=model.version,
-    )  # fmt: skip
-    # A user may have asked for another probability, or for the runs of another campaign.
-    if known is not None and known["p"] == COVERAGE and not known["input_covariance"].startswith("selection"):
-        return known
-    return kept(
-        lambda: uncertainty(
-            db, last.campaign, last.run, model=label(model), method=METHOD, p=COVERAGE, before=before
-        ),
+def stored_with(
+    db: Database, found: Results, done: Done, method: str, model: StoredModel, span: Span, remarks: list[str]
+) -> Results:
+    """Store what was computed; everything that there is now, and in ``remarks`` what could not be kept."""
+    remarks += done.remarks
+    for one in done.identified:
+        kept(
+            lambda one=one: save_identification(db, one),  # type: ignore[misc]
+            f"campaign {one.campaign} could not be identified",
+            remarks,
+        )
+    uncertainty = _saved(
+        done.uncertainty,
+        lambda new: save_uncertainty(db, new, model, METHOD, span.before),
         "the uncertainty of the last run could not be evaluated",
         remarks,
     )
-
-
-def explanation_of(
-    db: Database, campaign: str, method: str, model: StoredModel, span: Span, remarks: list[str]
-) -> Document | None:
-    """What the model leaves of the runs of ``span``, and what it lacks; None, with a remark, where it is unknown."""
-    known = _stored(
-        db,
-        "explanation",
-        span.before,
-        method,
-        campaign=campaign,
-        model=model.name,
-        model_version=model.version,
-    )
-    # A version before 0.1 stored no pictures with it.
-    if known is not None and "residual_map" in known:
-        return known
-    return kept(
-        lambda: explain_campaign(db, campaign, label(model), before=span.before)[0],
+    explanation = _saved(
+        done.explanation,
+        lambda new: save_explanation(db, new, method, model, span.before),
         "model and measurement could not be compared",
         remarks,
     )
-
-
-def map_of(
-    db: Database, last: PastRun, model: StoredModel, span: Span, remarks: list[str]
-) -> Document | None:
-    """The volumetric error of a run over the strokes, from the runs of ``span``; None, with a remark, without one."""
-    known = _stored(
-        db, "volumetric map", span.before, METHOD, campaign=last.campaign, run=last.run, model=model.name,
-        model_version=model.version,
-    )  # fmt: skip
-    if known is not None:
-        return known
-    return kept(
-        lambda: volumetric_map(
-            db, last.campaign, last.run, model=label(model), p=COVERAGE, before=span.before
-        )[0],
+    mapped = _saved(
+        done.map,
+        lambda new: save_map(db, new, model, span.before),
         "the volumetric error could not be mapped",
         remarks,
     )
+    if done.history is not None:
+        save_analysis(
+            db, kind_of("model history", span.before), {"steps": list(done.history)},
+            method=method_of(METHOD, span.before), campaign=done.history[0]["campaign"], model=model.name,
+            model_version=model.version,
+        )  # fmt: skip
+    every = Results(
+        found.uncertainty or uncertainty,
+        found.explanation or explanation,
+        found.map or mapped,
+        found.history if found.history is not None else done.history,
+    )
+    return every if every.uncertainty is not None else replace(every, map=None)
 
 
-def history_of(
-    db: Database, campaign: str, model: StoredModel, span: Span, remarks: list[str]
-) -> list[Document]:
-    """The error of every version of the model on the runs of ``span``; empty where there is one version only."""
-    if model.parent is None:
-        return []
-    which: dict[str, Any] = {"campaign": campaign, "model": model.name, "model_version": model.version}
-    known = _stored(db, "model history", span.before, METHOD, **which)
-    if known is None:
-        known = kept(
-            lambda: {"steps": history(db, label(model), campaign, before=span.before)},
-            "the versions of the model could not be compared",
-            remarks,
-        )
-        if known is None:
-            return []
-        method = method_of(METHOD, span.before)
-        save_analysis(db, kind_of("model history", span.before), known, method=method, **which)
-    return list(known["steps"])
+def _saved(
+    new: Document | None, save: Callable[[Document], None], failure: str, remarks: list[str]
+) -> Document | None:
+    if new is None:
+        return None
+
+    def saved() -> Document:
+        save(new)
+        return new
+
+    return kept(saved, failure, remarks)
+
+
+def _bare(campaign: Campaign) -> Campaign:
+    """A campaign without the bytes of its files: nothing is computed from them, and a worker need not get them."""
+    return replace(campaign, files=())
 
 
 def _stored(db: Database, kind: str, before: datetime | None, method: str, **which: Any) -> Document | None:

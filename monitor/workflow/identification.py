@@ -8,13 +8,26 @@ import numpy as np
 
 from monitor.methods import method_named
 from monitor.methods.identification import Identification, RunIdentification
+from monitor.methods.problem import Solver, solve_problem
 from monitor.records import Array, Campaign
-from monitor.store import Database, StoredIdentification, StoredRun, load_campaign, save_identification
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    StoredModel,
+    StoredRun,
+    load_campaign,
+    save_identification,
+)
 from monitor.units import MICROMETRE, Unit
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.models import as_model, resolve
 
 Document = dict[str, Any]
+
+# Residuals so many times as large as stated: the statement of a probe is seldom wrong by a factor of three.
+TOO_LARGE = 3.0
+# And so small a part: no probe is twenty times better than its owner says.
+TOO_SMALL = 0.05
 
 
 def parameter_document(estimate: float, u: float, unit: Unit) -> Document:
@@ -42,7 +55,26 @@ def _run_document(found: Identification, run: RunIdentification) -> Document:
         "chi_square": run.chi_square,
         "degrees_of_freedom": run.degrees_of_freedom,
         "iterations": found.iterations,
+        "note": _note(run),
     }
+
+
+def _note(run: RunIdentification) -> str:
+    """What has to be known before the standard uncertainties of a run are used; empty where nothing has."""
+    if run.degrees_of_freedom < 1:
+        return ""
+    times = float(np.sqrt(run.chi_square / run.degrees_of_freedom))
+    if times > TOO_LARGE:
+        return (
+            f"run {run.run}: the residuals are {times:.2g} times what the stated uncertainties leave, so u does not "
+            "hold; compare and explain say where the model fails and what is missing"
+        )
+    if times < TOO_SMALL:
+        return (
+            f"run {run.run}: the residuals are far smaller than the stated uncertainties leave ({times:.1g} of it): "
+            "check the units of the columns and the statement"
+        )
+    return ""
 
 
 def _stored(campaign: Campaign, found: Identification, model: str, version: int) -> StoredIdentification:
@@ -72,6 +104,17 @@ def _stored(campaign: Campaign, found: Identification, model: str, version: int)
     )
 
 
+def identified(
+    campaign: Campaign, model: StoredModel, solve: Solver = solve_problem
+) -> tuple[Identification, StoredIdentification]:
+    """Identify a campaign under a model, and the same as it is stored.
+
+    ``solve`` gives the solution of the method's problem. Raises as ``identify``.
+    """
+    found: Identification = method_named(campaign.method).identify(campaign, as_model(model), solve)
+    return found, _stored(campaign, found, model.name, model.version)
+
+
 def identify(db: Database, campaign: str, model: str | None = None, run: int | None = None) -> Document:
     """Identify a campaign, or one of its runs, under a model, and store the result.
 
@@ -82,8 +125,8 @@ def identify(db: Database, campaign: str, model: str | None = None, run: int | N
     if run is not None:
         loaded = only_run(loaded, run)
     stored_model = resolve(db, model, loaded.method)
-    found = method_named(loaded.method).identify(loaded, as_model(stored_model))
-    save_identification(db, _stored(loaded, found, stored_model.name, stored_model.version))
+    found, kept = identified(loaded, stored_model)
+    save_identification(db, kept)
     return {
         "campaign": campaign,
         "model": found.model,

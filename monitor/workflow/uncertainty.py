@@ -12,6 +12,7 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery import Fit, fit
 from monitor.discovery.compare import lack_of_fit
@@ -87,8 +88,17 @@ class Evaluated:
 MOST_READINGS, MOST_READINGS_MCM = 4000, 1200
 
 
+@dataclass(frozen=True)
+class SelectedReadings:
+    """Readings (runs, 3n) in mm of the runs of the stored selection ``name``, and the day of each."""
+
+    name: str
+    values: Array
+    days: npt.NDArray[np.int64]
+
+
 def _reading_inputs(
-    db: Database, found: Fit, campaign: Campaign, one: OneRun, model: StoredModel, select: str | None
+    found: Fit, campaign: Campaign, one: OneRun, chosen: SelectedReadings | None
 ) -> tuple[Inputs, str]:
     """Inputs of the readings of a run, and in words where their covariance is from: all runs, or a stored selection."""
     problem, names = found.problem, one.reading_names
@@ -96,12 +106,12 @@ def _reading_inputs(
     units = ("mm",) * count
     days = {run.run: run.day for run in campaign.runs}
     labels = np.array([days[int(run)] for run in problem.runs])
-    if select is not None:
-        values, labels = selected_readings(db, select, campaign.name, model, problem)
+    if chosen is not None:
+        values, labels = chosen.values, chosen.days
         if len(labels) - 1 < FEWEST_DEGREES_OF_FREEDOM:
             raise DataError(
-                f"--select {select}: {len(labels)} runs leave {len(labels) - 1} degrees of freedom for a covariance; "
-                f"at least {FEWEST_DEGREES_OF_FREEDOM} are needed"
+                f"--select {chosen.name}: {len(labels)} runs leave {len(labels) - 1} degrees of freedom for a "
+                f"covariance; at least {FEWEST_DEGREES_OF_FREEDOM} are needed"
             )
     else:
         try:
@@ -123,8 +133,8 @@ def _reading_inputs(
         words = f"the probe's stated standard uncertainty of {stated * 1e3:g} µm; too few repeated runs of one plan"
         if u > stated:
             words = f"the repeatability of {u * 1e3:.2g} µm, which exceeds the probe's statement; too few runs for more"
-    if select is not None:
-        words = f"selection {select}: {words}"
+    if chosen is not None:
+        words = f"selection {chosen.name}: {words}"
     # The estimate is that of the run itself: its results are stated.
     own = Inputs(
         inputs.names, inputs.units, one.inputs[:count], inputs.covariance, inputs.sources, inputs.dof
@@ -180,23 +190,43 @@ def evaluate(
     Runs that began at or after ``before`` (local time without a zone) take no part.
     The trials go to ``workers`` processes or the Dask scheduler at the address ``cluster``, else to threads.
     """
-    if method not in ("guf", "mcm", "both"):
-        raise InputError(f"--method {method}: choose guf, mcm or both")
-    if not 1 <= digits <= 4:
-        raise InputError(f"--digits {digits}: choose 1 to 4 significant digits")
-    if not 0 <= seed < 2**63:
-        raise InputError(f"--seed {seed}: a seed is a whole number from 0 to 9223372036854775807")
-    if not 0.0 < p < 1.0:
-        raise InputError(f"-p {p}: a coverage probability lies between 0 and 1")
+    _check(method, digits, seed, p)
     loaded = runs_before(load_campaign(db, campaign), before)
     stored = resolve(db, model, loaded.method)
     found = fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
+    chosen = None
+    if select is not None:
+        chosen = SelectedReadings(select, *selected_readings(db, select, loaded.name, stored, found.problem))
+    return evaluate_fit(
+        loaded, stored, found, run, method=method, digits=digits, seed=seed, p=p,
+        model_uncertainty=model_uncertainty, workers=workers, cluster=cluster, chosen=chosen,
+        linear_axes=linear_axes,
+    )  # fmt: skip
+
+
+def evaluate_fit(
+    loaded: Campaign,
+    stored: StoredModel,
+    found: Fit,
+    run: int | None = None,
+    *,
+    method: str = "both",
+    digits: int = 2,
+    seed: int = 1,
+    p: float = 0.95,
+    model_uncertainty: bool = True,
+    workers: int | None = None,
+    cluster: str | None = None,
+    chosen: SelectedReadings | None = None,
+    linear_axes: LinearAxes | None = None,
+) -> Evaluated:
+    """As ``evaluate``, of a campaign with a model fitted to it: nothing is read from the database."""
     number = int(found.problem.runs[-1]) if run is None else run
     # The uncertainty of shared effects and time constants is not propagated into a run's own parameters.
     fixed, coefficients = found.problem.resolved(found.solution.common)
     one = run_problem(fixed, number, coefficients)
     _refuse_too_many(len(one.reading_names), method)
-    readings, words = _reading_inputs(db, found, loaded, one, stored, select)
+    readings, words = _reading_inputs(found, loaded, one, chosen)
     calibrated = _calibrated_inputs(one)
     inputs = joined(readings, calibrated) if calibrated is not None else readings
     place = int(np.flatnonzero(found.problem.runs == number)[0])
@@ -248,6 +278,17 @@ def evaluate(
     advice = method_named(loaded.method).advice
     refused = refusals(found.problem, found.solution.null_space[place], number, advice)
     return Evaluated(loaded, stored, found, number, framework, units, refused, words, mcm, validation, causes)
+
+
+def _check(method: str, digits: int, seed: int, p: float) -> None:
+    if method not in ("guf", "mcm", "both"):
+        raise InputError(f"--method {method}: choose guf, mcm or both")
+    if not 1 <= digits <= 4:
+        raise InputError(f"--digits {digits}: choose 1 to 4 significant digits")
+    if not 0 <= seed < 2**63:
+        raise InputError(f"--seed {seed}: a seed is a whole number from 0 to 9223372036854775807")
+    if not 0.0 < p < 1.0:
+        raise InputError(f"-p {p}: a coverage probability lies between 0 and 1")
 
 
 def _refuse_too_many(readings: int, method: str) -> None:
@@ -413,6 +454,14 @@ def uncertainty(db: Database, campaign: str, run: int | None = None, **options: 
     before = options.get("before")
     found = evaluate(db, campaign, run, **options)
     result = document(found)
+    save_uncertainty(db, result, found.model, options.get("method", "both"), before)
+    return result
+
+
+def save_uncertainty(
+    db: Database, result: Document, model: StoredModel, method: str, before: datetime | None
+) -> None:
+    """Keep the document of an evaluation, ``partial`` where runs from ``before`` on took no part."""
     # How long it took is no part of what is stored: the same result has the same document.
     kept = (
         {**result, "mcm": {k: v for k, v in result["mcm"].items() if k != "seconds"}}
@@ -420,8 +469,7 @@ def uncertainty(db: Database, campaign: str, run: int | None = None, **options: 
         else result
     )
     save_analysis(
-        db, kind_of("uncertainty", before), kept, method=method_of(options.get("method", "both"), before),
-        campaign=campaign, run=found.run, model=found.model.name, model_version=found.model.version,
-        seed=None if found.monte_carlo is None else found.monte_carlo.seed,
+        db, kind_of("uncertainty", before), kept, method=method_of(method, before),
+        campaign=result["campaign"], run=result["run"], model=model.name, model_version=model.version,
+        seed=result["mcm"]["seed"] if "mcm" in result else None,
     )  # fmt: skip
-    return result

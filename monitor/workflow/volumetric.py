@@ -12,7 +12,7 @@ import numpy as np
 from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
 from monitor.records import Array, Campaign
-from monitor.store import Database, save_analysis
+from monitor.store import Database, StoredModel, save_analysis
 from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -111,12 +111,17 @@ def volumetric_map(
         db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty, before=before
     )
     mapped = map_of(found, points, absolute)
-    document = _document(mapped, p)
-    save_analysis(
-        db, kind_of("volumetric map", before), document, method=method_of("guf", before), campaign=campaign,
-        run=found.run, model=found.model.name, model_version=found.model.version,
-    )  # fmt: skip
+    document = map_document(mapped, p)
+    save_map(db, document, found.model, before)
     return document, mapped
+
+
+def save_map(db: Database, document: Document, model: StoredModel, before: datetime | None) -> None:
+    """Keep a map, ``partial`` where runs from ``before`` on took no part."""
+    save_analysis(
+        db, kind_of("volumetric map", before), document, method=method_of("guf", before),
+        campaign=document["campaign"], run=document["run"], model=model.name, model_version=model.version,
+    )  # fmt: skip
 
 
 def _um(length: float) -> float:
@@ -152,7 +157,8 @@ def _point(mapped: Mapped, place: int, k: float) -> Document:
     }
 
 
-def _document(mapped: Mapped, p: float) -> Document:
+def map_document(mapped: Mapped, p: float) -> Document:
+    """A map as people see it, in display units."""
     error, chain = mapped.error, mapped.known.chain
     k = error.factor(p)
     mean, rms = error.mean, error.rms

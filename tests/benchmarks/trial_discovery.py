@@ -497,6 +497,11 @@ def _opened(path: Path) -> str:
     return gzip.decompress(path.read_bytes()).decode() if path.suffix == ".gz" else path.read_text()
 
 
+def _keep(path: Path, text: str) -> None:
+    data = text.encode()
+    path.write_bytes(gzip.compress(data, mtime=0) if path.suffix == ".gz" else data)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seeds", type=int, default=10)
@@ -527,7 +532,7 @@ def main() -> None:
                 break
             records += pool.map(judge, todo[start : start + size])
             if options.log:
-                options.log.write_text("\n".join(json.dumps(vars(one), default=float) for one in records))
+                _keep(options.log, "\n".join(json.dumps(vars(one), default=float) for one in records))
     seconds = float(np.median([one.seconds for one in records if not one.skipped]))
     head = (
         "# Trial of power of `explain`\n\n"

@@ -111,6 +111,9 @@ def show(found: dict[str, Any]) -> None:
         rows,
         left=2,
     )
+    notes = [one["note"] for one in runs if one["note"]]
+    if notes:
+        output.say(notes[0] + (f" (and {len(notes) - 1} more of these runs)" if len(notes) > 1 else ""))
     for why in dict.fromkeys(refusal["why"] for one in found["runs"] for refusal in one["refused"]):
         output.say(f"no number: {why}")
     for name, value in found["added"].items():

@@ -34,6 +34,11 @@ def options(parser: ArgumentParser) -> None:
         help="probability of being out of tolerance above which a machine alarms (default 0.05)",
     )  # fmt: skip
     parser.add_argument(
+        "--workers", type=int, metavar="N",
+        help="processes that compute; the report is the same for any number (default: the cores, at most 4, fewer "
+        "for few machines)",
+    )  # fmt: skip
+    parser.add_argument(
         "--fail-on-alarm",
         action="store_true",
         help="exit status 1 where a machine is, or may be, out of tolerance",
@@ -51,7 +56,9 @@ def run(options: Namespace) -> int:
         read_mail_settings(options.mail)  # what is wrong with it is said before the work, not after
     settings = Settings(options.model, tuple(options.campaign), options.risk)
     with opened(options, threads=1) as db, output.working("reporting"):
-        found = report(db, options.week, options.machine, options.out, settings=settings)
+        found = report(
+            db, options.week, options.machine, options.out, settings=settings, workers=options.workers
+        )
     found["mailed_to"] = [] if options.mail is None else mail_report(options.mail, found)
     if options.json:
         output.document(found)

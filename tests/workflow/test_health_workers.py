@@ -1,0 +1,100 @@
+"""The report by several processes: the same to the last byte as by one, and Ctrl-C ends them all."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+
+from monitor.exceptions import InputError
+from monitor.store import Database, verify_audit
+from monitor.workflow.campaigns import import_folders
+from monitor.workflow.health import report
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+MADE = datetime.fromisoformat("2026-03-09T06:00:00+00:00")
+STOPPED = "monitor: stopped; what was not finished was not stored\n"
+
+
+@pytest.fixture
+def fleet(tmp_path: Path) -> Path:
+    """Three machines: one lacks an effect, one was measured only in February, one has nothing to report."""
+    path = tmp_path / "fleet.duckdb"
+    with Database(path, threads=1) as db:
+        for example in ("hidden-b-indexing", "cold-cold", "nothing-hidden"):
+            folder = tmp_path / example
+            shutil.copytree(EXAMPLES / example, folder)
+            file = folder / "campaign.toml"
+            text = re.sub('campaign = ".*?"', f'campaign = "{example}"', file.read_text("utf-8"), count=1)
+            file.write_text(text.replace('id = "HU40-T"', f'id = "on {example}"', 1), "utf-8")
+            import_folders(db, [folder])
+    return path
+
+
+def test_one_process_and_two_write_the_same_bytes_and_store_the_same(
+    fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Two parts, so that the PDF is spread too.
+    monkeypatch.setattr("monitor.workflow.health.MACHINES_A_PART", 2)
+    files, stored = [], []
+    for workers in (1, 2):
+        path, out = tmp_path / f"{workers}.duckdb", tmp_path / f"by-{workers}"
+        shutil.copy(fleet, path)
+        with Database(path, threads=1) as db:
+            found = report(db, "2026-W10", out=out, made_at=MADE, workers=workers)
+            stored.append(
+                db.rows(
+                    "SELECT kind, machine, campaign, run, method, document FROM v_analyses ORDER BY analysis_id"
+                )
+                + db.rows("SELECT * FROM v_parameters ORDER BY ALL")
+            )
+            assert verify_audit(db).ok
+        assert len(found["files"]) == 3
+        files.append({Path(name).name: Path(name).read_bytes() for name in found["files"]})
+    assert stored[0] == stored[1]
+    assert files[0] == files[1]
+    assert {row[0] for row in stored[0] if row[1] is not None} >= {"health"}
+
+
+def test_no_worker_is_too_few(fleet: Path, tmp_path: Path) -> None:
+    with (
+        Database(fleet, threads=1) as db,
+        pytest.raises(InputError, match=r"^--workers 0: at least one worker is needed$"),
+    ):
+        report(db, "2026-W10", out=tmp_path, workers=0)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks for the workers in /proc")
+def test_ctrl_c_ends_the_workers_without_a_word_of_theirs(fleet: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "monitor.cli", "--db", str(fleet), "report", "--week", "2026-W10"]
+    with subprocess.Popen(
+        [*command, "--workers", "2", "--out", str(tmp_path / "out")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    ) as process:  # fmt: skip
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        deadline = time.monotonic() + 120
+        # The two workers, and Python's tracker of resources.
+        while (
+            process.poll() is None and len(children.read_text().split()) < 3 and time.monotonic() < deadline
+        ):
+            time.sleep(0.05)
+        workers = children.read_text().split()
+        assert len(workers) == 3
+        # As a terminal does: to all processes of the group, while the workers still import.
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+    assert (process.returncode, out, err) == (130, "", STOPPED)
+    deadline = time.monotonic() + 30
+    while any(Path(f"/proc/{one}").exists() for one in workers) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not [one for one in workers if Path(f"/proc/{one}").exists()]
+    with Database(fleet) as db:
+        assert verify_audit(db).ok
