@@ -49,7 +49,7 @@ def test_a_refused_folder_is_recorded_and_settled_when_it_is_imported_well(
 
 
 def test_a_campaign_that_comes_from_another_folder_settles_it_too(db: Database, spoilt: Path) -> None:
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match="was refused, nothing of it was kept"):
         import_folders(db, [spoilt])
     import_folders(db, [EXAMPLES / "five-days"])
     assert refusals(db)[0].cleared_at is None

@@ -187,7 +187,7 @@ class Killed(BaseException):
 
 
 def killed(*_: object, **__: object) -> None:
-    raise Killed
+    raise Killed("here")
 
 
 def test_stopped_before_the_entry_no_file_bears_the_name_of_a_certificate(
@@ -195,7 +195,7 @@ def test_stopped_before_the_entry_no_file_bears_the_name_of_a_certificate(
 ) -> None:
     before = set(list_certificates(db)["number"])
     monkeypatch.setattr(certificates, "save_certificate", killed)
-    with pytest.raises(Killed):
+    with pytest.raises(Killed, match="here"):
         issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="K-1", issued_on=DAY)
     assert set(list_certificates(db)["number"]) == before
     assert list(tmp_path.iterdir()) == []
@@ -205,7 +205,7 @@ def test_stopped_behind_the_entry_the_database_gives_the_document_back(
     db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(certificates, "publish", killed)
-    with pytest.raises(Killed):
+    with pytest.raises(Killed, match="here"):
         issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="K-2", issued_on=DAY)
     assert list(tmp_path.glob("*.pdf")) == []
     made = stored_file(db, "K-2", tmp_path)

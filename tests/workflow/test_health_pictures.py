@@ -211,7 +211,7 @@ def test_a_refusal_that_was_settled_is_marked_and_no_longer_news(tmp_path: Path)
     good = (folder / "runs.csv").read_bytes()
     with Database(tmp_path / "one.duckdb", threads=1) as db:
         (folder / "runs.csv").write_bytes(good.replace(b"true", b"perhaps").replace(b"false", b"perhaps"))
-        with pytest.raises(CampaignError):
+        with pytest.raises(CampaignError, match="perhaps"):
             import_folders(db, [folder])
         (refused,) = refusals(db)
         (folder / "runs.csv").write_bytes(good)
