@@ -25,6 +25,7 @@ from monitor.discovery.refine import refine, refine_all
 from monitor.discovery.scan import ScanResult, scan
 from monitor.discovery.steps import Step, find_steps
 from monitor.discovery.suspects import Suspects, find_suspects, with_effects
+from monitor.discovery.tables import with_tables
 from monitor.discovery.variants import cycles_of_unknown_pitch, variants_of, with_drivers
 from monitor.discovery.varying import tell_varying
 from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Variant, Visible, see
@@ -144,22 +145,27 @@ def explain(
 def _scanned(
     now: Fit, variants: Sequence[Variant], drivers: Sequence[str], runs: npt.NDArray[np.int64], rate: float
 ) -> tuple[Visible, ScanResult]:
-    """The scan of a fit; where gears stand out of what it leaves, once more with them."""
+    """The scan of a fit; where gears stand out of what it leaves, once more with them; at last with tables instead
+    of several shapes."""
     gears: list[Variant] = []
     visible = see(now, variants)
-    while True:
-        result = scan(
+
+    def scanned(visible: Visible) -> ScanResult:
+        return scan(
             visible,
             rate=rate,
             more=partial(_driven, now, drivers),
             accept=partial(_stands, now, visible, runs, rate),
             best_value=partial(_at_best, now, visible),
         )
+
+    while True:
+        result = scanned(visible)
         known = {one.effect.text for one in gears}
         found = gear_variants(now, visible, [one.candidate for one in result.findings], rate)
         new = [one for one in found if one.effect.text not in known]
         if not new or len(gears) > MOST_GEARS:
-            return visible, result
+            return with_tables(now, visible, result, scanned)
         gears += new
         visible = replace(visible, candidates=(*visible.candidates, *see(now, new).candidates))
 

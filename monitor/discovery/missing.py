@@ -136,8 +136,8 @@ def _amplitude(candidate: Candidate, coefficients: Array, covariance: Array) -> 
 
 
 def _name(candidate: Candidate) -> str:
-    """The effect as written; a searched pitch or order is part of it, a searched time constant is not."""
-    searched = candidate.family.endswith((":cyclic", ":harmonic"))
+    """The effect as written; searched pitches, orders and nodes are part of it, a searched time constant is not."""
+    searched = candidate.family.endswith((":cyclic", ":harmonic", ":table"))
     return candidate.variant.effect.text if searched else candidate.family
 
 

@@ -79,8 +79,7 @@ def scan(
     beside others (a period that the data cannot separate from one found before); ``better`` has the last word on a
     rival that would take the place of one of the chosen.
     """
-    pool = Pool(tuple(one for one in visible.candidates if one.share > SMALLEST_SHARE))
-    families = len({candidate.family for candidate in pool.candidates})
+    pool = _pool(visible)
     chosen: list[Candidate] = []
     for _ in range(MOST_STEPS):
         found = best_of_families(_weighed(visible, pool, chosen, allowed))
@@ -101,8 +100,22 @@ def scan(
         pool = pool.with_more([one for one in more(best.candidate) if one.share > SMALLEST_SHARE])
         chosen = _exchange(visible, pool, chosen, best_value, allowed, better)
         chosen = _merge(visible, pool, chosen, allowed, better)
+    return ScanResult(findings_of(visible, chosen, pool, allowed), tuple(found))
+
+
+def _pool(visible: Visible) -> Pool:
+    return Pool(tuple(one for one in visible.candidates if one.share > SMALLEST_SHARE))
+
+
+def findings_of(
+    visible: Visible, chosen: list[Candidate], pool: Pool | None = None, allowed: Allowed | None = None
+) -> tuple[Finding, ...]:
+    """The chosen effects with their evidence given the others and their rivals of ``pool`` (of all candidates where
+    there is none), most convincing first."""
+    families = len({one.family for one in visible.candidates if one.share > SMALLEST_SHARE})
+    pool = _pool(visible) if pool is None else pool
     findings = [_finding(visible, pool, chosen, place, families, allowed) for place in range(len(chosen))]
-    return ScanResult(tuple(sorted(findings, key=lambda one: -one.evidence.score)), tuple(found))
+    return tuple(sorted(findings, key=lambda one: -one.evidence.score))
 
 
 def _weighed(

@@ -54,8 +54,10 @@ def _turns(chain: Chain) -> Iterable[str]:
 
 def _heat(chain: Chain, base: Iterable[str], drivers: Iterable[str]) -> Iterable[str]:
     spindle = [f"E{axis}{joint.name}:const" for joint in chain.of_kind("spindle") for axis in "XYZAB"]
+    # What follows a driver already has only one.
+    plain = [text for text in base if not parse_effect(text, chain).driver_text]
     for driver in drivers:
-        for effect in (*base, *spindle):
+        for effect in (*plain, *spindle):
             yield f"{effect}@{driver}"
 
 

@@ -161,6 +161,20 @@ def test_an_added_effect_is_missing_no_more_and_a_removed_one_is_again(virtual_c
     assert [one.effect for one in again.missing] == ["EXX:reversal"]
 
 
+@pytest.mark.parametrize(
+    "effect", ["EZC1:const@warmup", "EB0C@run_time", "EZC:const@gravity", "artefact:expansion@run_time"]
+)
+def test_an_added_effect_that_follows_a_driver_is_missing_no_more(virtual_campaigns, effect):
+    sim = virtual_campaigns.simulator()
+    width = 3 if effect.endswith("gravity") else 1
+    hidden = sim.Effect(effect, peak_um=8.0, direction=(1.0, 0.5, 0.2)[:width])
+    campaign, _ = virtual_campaigns.virtual(3, [hidden])
+    grown = problem_of(campaign, Model("grown", added=(effect,)))
+    answer = explain(campaign, grown, "grown", rng=np.random.default_rng(1))
+    assert answer.missing == ()
+    assert answer.comparison.verdict == "explained"
+
+
 def test_rates_over_forty_small_campaigns(virtual_campaigns, explained):
     """Nothing hidden, four runs: at 2 % a campaign, five or more alarms in 40 are a chance of 1e-3."""
     alarms = sum(
