@@ -8,7 +8,7 @@ from typing import Any
 
 from monitor.cli import output
 from monitor.store import Database
-from monitor.workflow import curves
+from monitor.workflow import curve_documents, curves
 
 Document = dict[str, Any]
 
@@ -72,7 +72,7 @@ def summary(found: Document) -> None:
     noise = found["autocorrelation"]
     if noise["noticed"]:
         output.say(
-            f"neighbouring rows resemble each other under this model: {curves.correlation(noise)} (a missing "
+            f"neighbouring rows resemble each other under this model: {curve_documents.correlation(noise)} (a missing "
             "effect or correlated noise; explain tells which)"
         )
     output.say(f"verdict: {found['verdict']}")
@@ -143,7 +143,7 @@ def coefficients(found: Document) -> None:
     noise = found["autocorrelation"]
     if noise["noticed"]:
         output.say(
-            f"neighbouring rows resemble each other ({curves.correlation(noise)}); u allows for it: "
+            f"neighbouring rows resemble each other ({curve_documents.correlation(noise)}); u allows for it: "
             f"{noise['effective_rows']:.0f} of {noise['rows']} rows for a mean"
         )
 

@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from monitor.discovery.curve_explain import explain_curve
-from monitor.methods.curve import problem_of
+from monitor.methods.curve_problem import problem_of
 from monitor.records import CurveCampaign, Instrument
 
 Rows = np.ndarray
