@@ -12,6 +12,7 @@ from monitor.discovery.curve_scene import effect_of
 from monitor.discovery.curve_search import Round
 from monitor.discovery.evidence import Evidence, orthonormal, without
 from monitor.discovery.scan import Finding
+from monitor.discovery.visible import Candidate
 from monitor.effects.curve import CurveEffect, coefficient_names
 from monitor.effects.curve_words import calendar_period, describe_curve
 from monitor.effects.words import Words
@@ -29,10 +30,14 @@ class CurveMissing:
     """A missing effect, everything in the unit of the response or as its ``units`` say.
 
     ``effect`` is found from the data, ``written`` how it is to be added: a searched value rounded to its
-    uncertainty, or a period of the calendar that it agrees with.
+    uncertainty, or a period of the calendar that it agrees with. ``noise_alone`` is how often correlated noise alone
+    would do as well, its search paid for; above the rate of the scan the finding is likely, not ``certain``, and that
+    is its p-value.
     """
 
     effect: CurveEffect
+    certain: bool
+    noise_alone: float
     written: str
     words: Words
     names: tuple[str, ...]
@@ -60,15 +65,52 @@ def tell(rounds: Sequence[Round], noise: Assessed) -> tuple[CurveMissing, ...]:
     told: list[CurveMissing] = []
     before = fit(replace(rounds[0].scene.fit.problem, left_out=left_out))
     for now in rounds:
+        doubts = _doubts(now)
         for finding in now.result.findings:
             after = fit(before.settled.with_effects([effect_of(finding.candidate)]))
-            told.append(_missing(now, finding, len(told), (before, after, rounds[-1].under), noise))
+            fits = before, after, rounds[-1].under
+            told.append(_missing(now, finding, len(told), fits, noise, doubts[finding.candidate.family]))
             before = after
     return tuple(told)
 
 
+def _doubts(now: Round) -> dict[str, float]:
+    """By finding, how often noise alone would do as well.
+
+    Beside those only that are certain already: two cycles that are plain beside each other may both be noise.
+    """
+    ask = now.acceptance
+    waiting = [one.candidate for one in now.result.findings]
+    certain: list[Candidate] = []
+    found: dict[str, float] = {}
+
+    def doubt(others: Sequence[Candidate], one: Candidate) -> float:
+        return min(1.0, ask.doubts[one.family]) if ask.stands(others, one) else 1.0
+
+    for _ in range(len(waiting)):
+        for one in waiting:
+            found[one.family] = doubt(certain, one)
+            if found[one.family] <= ask.rate:
+                certain.append(one)
+                waiting.remove(one)
+                break
+        else:
+            break
+    if waiting:
+        # What is not certain by itself may be together.
+        together = min(1.0, ask.doubt_of_all(certain, waiting))
+        shared = min(max(found[one.family] for one in waiting), together)
+        found.update({one.family: shared for one in waiting})
+    return found
+
+
 def _missing(
-    now: Round, finding: Finding, place: int, fits: tuple[CurveFit, CurveFit, CurveFit], noise: Assessed
+    now: Round,
+    finding: Finding,
+    place: int,
+    fits: tuple[CurveFit, CurveFit, CurveFit],
+    noise: Assessed,
+    doubt: float,
 ) -> CurveMissing:
     """One finding at ``place``; ``fits`` are those before it, with it, and with everything."""
     before, after, final = fits
@@ -88,9 +130,15 @@ def _missing(
     unit = inputs.units.get(effect.column, "")
     p_value = finding.evidence.p_value
     if noise.noticed:
-        p_value = max(p_value, now.acceptance.p_values.get(finding.candidate.family, p_value))
+        others = [one.candidate for one in now.result.findings if one is not finding]
+        p_value = max(p_value, now.acceptance.p_value(others, finding.candidate))
+    certain = doubt <= now.acceptance.rate
+    if not certain:
+        p_value = max(p_value, doubt)
     return CurveMissing(
         effect=effect,
+        certain=certain,
+        noise_alone=doubt,
         written=written.text,
         words=describe_curve(written, final.problem.curve.response, unit, clock=clock),
         names=tuple(final.names[n] for n in own),
@@ -102,7 +150,7 @@ def _missing(
         peak=float(np.abs(contribution - contribution.mean()).max()),
         u_value=u_value,
         p_value=p_value,
-        q_value=min(1.0, p_value * now.acceptance.families),
+        q_value=min(1.0, p_value * now.acceptance.families) if certain else p_value,
         rms_before=before.rms,
         rms_after=after.rms,
         held_out_before=held_out(before),

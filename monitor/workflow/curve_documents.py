@@ -18,14 +18,13 @@ from monitor.discovery.curve_missing import CurveMissing
 from monitor.discovery.curve_quality import bic
 from monitor.effects.curve import SEARCHED
 from monitor.methods.curve import CurveFit
-from monitor.methods.curve_problem import NAME, problem_of
+from monitor.methods.curve_problem import NAME
 from monitor.records import CurveCampaign
 from monitor.statistics.noise import Assessed, effective_number
 from monitor.units import MICROMETRE
+from monitor.workflow.curve_answer import answer
 
 Document = dict[str, Any]
-#: So many rows on average at each value of a column make it look set rather than read.
-ROWS_A_SETTING = 4
 #: Lengths in millimetres, for the keys that end in _um.
 LENGTHS = {"pm": 1e-9, "nm": 1e-6, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "km": 1e6, "in": 25.4}
 
@@ -51,12 +50,6 @@ def noise_document(found: Assessed, rows: int) -> Document:
         "rows": rows,
         "effective_rows": effective_number(found.noise, rows) if seen else float(rows),
     }
-
-
-def correlation(noise: Document) -> str:
-    """The noise in words: both of its numbers, for what a mean is worth depends on how slowly it fades."""
-    told = f"correlation {noise['lag_one']:.2f}"
-    return f"{told}, times {noise['slow']:.2f} with each further row" if noise["lag_one"] > 0.0 else told
 
 
 def rows_kept(found: CurveFit) -> int:
@@ -106,6 +99,8 @@ def _missing(curve: CurveCampaign, rank: int, found: CurveMissing) -> Document:
     document: Document = {
         "rank": rank,
         "effect": found.written,
+        "certain": found.certain,
+        "noise_alone_p": found.noise_alone,
         "meaning": found.words.meaning,
         "cause": found.words.cause,
         "remedy": found.words.remedy,
@@ -180,65 +175,5 @@ def explanation_document(found: CurveExplanation, model: str) -> Document:
     document["blind_spots"] = list(found.blind)
     document["not_recorded"] = dict(found.refused)
     document["autocorrelation_after"] = noise_document(found.noise, rows_kept(found.final))
-    document["answer"] = _answer(document, found)
+    document["answer"] = answer(document, found)
     return document
-
-
-def _exchanged(curve: CurveCampaign) -> str | None:
-    """A hint where the response looks like what was set and an input of the base like what was read."""
-    values = len(np.unique(curve.measured))
-    if values * ROWS_A_SETTING > len(curve):
-        return None
-    for effect in problem_of(curve).base:
-        taken = len(np.unique(curve.columns[effect.column])) if effect.column in curve.columns else 0
-        if effect.column != curve.time and 2 * taken > len(curve):
-            return (
-                f"{curve.response} takes only {values} different values and {effect.column} {taken}: if "
-                f"{curve.response} was set and {effect.column} was read, exchange them in response and base."
-            )
-    return None
-
-
-def _answer(document: Document, found: CurveExplanation) -> str:
-    """The finding in a few sentences."""
-    parts = []
-    missing = document["missing"]
-    if missing:
-        parts.append(f"The model lacks {missing[0]['effect']}: {missing[0]['meaning']}.")
-        if len(missing) > 1:
-            parts.append(f"After that {', then '.join(one['effect'] for one in missing[1:])}.")
-        if missing[0]["indistinguishable_from"]:
-            parts.append(
-                f"These rows cannot rule out {', '.join(missing[0]['indistinguishable_from'])} in its place."
-            )
-    elif document["verdict"] == SOMETHING_IS_MISSING:
-        parts.append(
-            "The model does not explain the measurements, but no effect that the columns allow explains more."
-        )
-    elif found.first.exact:
-        parts.append("The model fits exactly, to the rounding of the numbers; nothing is left to explain.")
-    else:
-        parts.append("Nothing is missing that these rows can show.")
-    hint = _exchanged(found.first.problem.curve)
-    if hint is not None:
-        parts.append(hint)
-    if missing and found.final.exact:
-        parts.append("With all of it the model fits exactly, to the rounding of the numbers.")
-    noise = document["autocorrelation_after"]
-    if noise["noticed"]:
-        resembles = "resemble" if noise["lag_one"] > 0 else "alternate against"
-        parts.append(
-            f"Neighbouring rows {resembles} each other ({correlation(noise)}): "
-            + (
-                f"for a mean they are worth {noise['effective_rows']:.0f} of {noise['rows']} rows, and "
-                if noise["lag_one"] > 0
-                else ""
-            )
-            + "all uncertainties and tests allow for it."
-        )
-    if document["suspect_data"]:
-        rows = ", ".join(str(one["sequence"]) for one in document["suspect_data"])
-        one = len(document["suspect_data"]) == 1
-        parts.append(f"{'Row' if one else 'Rows'} {rows} {'contradicts' if one else 'contradict'} the rest and "
-                     f"{'was' if one else 'were'} left out.")  # fmt: skip
-    return " ".join(parts)

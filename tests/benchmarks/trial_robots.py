@@ -115,16 +115,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--poses", type=int, default=1000)
+    parser.add_argument("--hidden", type=int, nargs="+", default=[0, 1, 2, 3], help="effects at once")
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
     options = parser.parse_args()
     print(
         "| hidden | robots | effects | named first | not ruled out | false findings | identify / s | explain / s |"
     )
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     notes: tuple[str, ...] = ()
-    for count in range(4):
+    for count in options.hidden:
         tally = Tally()
-        for seed in range(options.seeds):
+        for seed in range(options.first, options.first + options.seeds):
             trial(seed, count, options.poses, tally)
+            print(
+                f"{count} hidden, seed {seed}: {tally.found} of {tally.hidden} named first, {tally.held} not ruled "
+                f"out, {tally.false} false so far; explain {tally.explain_s[-1]:.1f} s",
+                file=sys.stderr,
+                flush=True,
+            )
         notes += tally.missed
         print(
             f"| {count} | {tally.trials} | {tally.hidden} | {tally.found} | {tally.held} | {tally.false} | "
