@@ -21,6 +21,7 @@ from monitor.discovery.fit import Fit, fit
 from monitor.discovery.gears import gear_variants
 from monitor.discovery.held_out import held_out_error
 from monitor.discovery.missing import Missing, Surroundings, tell
+from monitor.discovery.poses import p_value_by_poses, poses_of_rows
 from monitor.discovery.refine import refine, refine_all
 from monitor.discovery.scan import ScanResult, scan
 from monitor.discovery.steps import Step, find_steps
@@ -147,12 +148,13 @@ def _scanned(
     """The scan of a fit; where gears stand out of what it leaves, once more with them."""
     gears: list[Variant] = []
     visible = see(now, variants)
+    poses = poses_of_rows(now)
     while True:
         result = scan(
             visible,
             rate=rate,
             more=partial(_driven, now, drivers),
-            accept=partial(_stands, now, visible, runs, rate),
+            accept=partial(_stands, now, visible, runs, rate, poses),
             best_value=partial(_at_best, now, visible),
         )
         known = {one.effect.text for one in gears}
@@ -178,12 +180,16 @@ def _stands(
     visible: Visible,
     runs: npt.NDArray[np.int64],
     rate: float,
+    pose: npt.NDArray[np.int64] | None,
     others: Sequence[Candidate],
     found: Candidate,
 ) -> bool:
-    """Whether an effect stands out from how its size scatters from run to run, and lowers the error on runs that
-    took no part in its fit (blocks of poses where there is one run; true where it has few)."""
+    """Whether an effect stands out with every pose as one observation and from how its size scatters from run to run,
+    and lowers the error on runs that took no part in its fit (blocks of poses where there is one run; true where it
+    has few)."""
     families = len({one.family for one in visible.candidates if one.share > SMALLEST_SHARE})
+    if pose is not None and p_value_by_poses(found, visible, others, pose) * families > rate:
+        return False
     if p_value_against_runs(found, visible, others) * families > rate:
         return False
     before = np.concatenate([visible.added, *(one.columns for one in others)], axis=1)

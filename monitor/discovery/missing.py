@@ -11,6 +11,7 @@ import numpy.typing as npt
 from monitor.discovery.evidence import Evidence, best_of_families, orthonormal, weigh, without
 from monitor.discovery.fit import Fit
 from monitor.discovery.held_out import held_out_error
+from monitor.discovery.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.refine import Refined, Searched, refine
 from monitor.discovery.scan import Finding, ScanResult, amplitudes
 from monitor.discovery.separate import Separation, separating_poses
@@ -103,6 +104,10 @@ def tell(
     values = amplitudes(visible, chosen)
     # The searched values widen the covariance of the sizes; their estimates stay those at the best value.
     wide = amplitudes(visible, chosen, slopes).covariance
+    poses = poses_of_rows(fit)
+    if poses is not None:
+        wider = widening(visible, chosen, poses)
+        wide = wider[:, None] * wide * wider
     told = []
     start = 0
     for place, finding in enumerate(findings):
@@ -112,7 +117,7 @@ def tell(
         told.append(
             _missing(
                 fit, visible, finding, refined[place], chosen, place, values.estimate[own], wide[own, own],
-                known,
+                known, poses,
             )
         )  # fmt: skip
     return tuple(told)
@@ -166,8 +171,16 @@ def _missing(
     coefficients: Array,
     covariance: Array,
     known: Surroundings,
+    poses: npt.NDArray[np.int64] | None,
 ) -> Missing:
     candidate = refined.candidate
+    p_value, q_value = finding.evidence.p_value, finding.q_value
+    if poses is not None:
+        by_poses = p_value_by_poses(
+            candidate, visible, [one for one in chosen if one is not candidate], poses
+        )
+        q_value = max(q_value, min(1.0, by_poses * q_value / p_value)) if p_value > 0.0 else by_poses
+        p_value = max(p_value, by_poses)
     effect = candidate.variant.effect
     amplitude, u = _amplitude(candidate, coefficients, covariance)
     before, after = chosen[:place], chosen[: place + 1]
@@ -185,8 +198,8 @@ def _missing(
         unit_factor=effect.unit.factor,
         peak=float(np.linalg.norm(candidate.raw @ coefficients, axis=1).max()),
         searched=refined.searched,
-        p_value=finding.evidence.p_value,
-        q_value=finding.q_value,
+        p_value=p_value,
+        q_value=q_value,
         rms_before=_rms(fit, visible, before),
         rms_after=_rms(fit, visible, after),
         held_out_before=_held_out(fit, visible, before, known.runs),

@@ -148,7 +148,7 @@ def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, comm
         before = size
     raise DataError(
         f"the identification did not converge in {MOST_ITERATIONS} steps: the readings contradict the machine file; "
-        "check the axis signs, the topology and the order of the targets"
+        "check the axis signs, the topology, the order of the targets and the units"
     )
 
 

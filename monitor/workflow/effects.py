@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from monitor.discovery.curve_candidates import catalogue as curve_catalogue
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
+from monitor.effects.curve import SEARCHED
 from monitor.effects.curve_words import describe_curve
 from monitor.effects.words import Words, describe
 from monitor.machine import parse_topology
 from monitor.methods import method_named
 from monitor.methods.base_effects import base_effects
 from monitor.methods.curve import fit
+from monitor.methods.curve_problem import grid
 from monitor.methods.curve_problem import problem_of as curve_problem_of
 from monitor.readers import read_campaign
 from monitor.records import Campaign, CurveCampaign
@@ -80,7 +83,19 @@ def effects_of(campaign: Campaign | CurveCampaign, text: str | None = None) -> D
         found = []
         for effect in curve_catalogue(problem):
             own = problem.inputs.units.get(effect.column, "")
-            words = describe_curve(effect, campaign.response, own, clock=effect.column == campaign.time)
+            shown = effect
+            if effect.free:
+                values = grid(effect, problem.inputs)
+                if len(values) == 0:
+                    continue
+                shown = effect.at(float(values[0]))
+            words = describe_curve(shown, campaign.response, own, clock=effect.column == campaign.time)
+            if effect.free:
+                what = SEARCHED[effect.shape]
+                words = replace(
+                    words,
+                    meaning=f"{effect.shape} of {effect.column} in {campaign.response}, its {what} searched",
+                )
             found.append(_told(effect.text, unit, words))
         return {"campaign": campaign.name, "base": [campaign.base], "effects": _with(found, text)}
     machine = method_named(campaign.method).problem_of(campaign)
