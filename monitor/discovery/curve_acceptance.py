@@ -27,10 +27,11 @@ MOST_BENDS = 2.0
 AGAINST_NOISE = 0.05
 #: Effects that are asked together whether they, rather than noise, make neighbours resemble each other.
 MOST_TOGETHER = 5
-#: The two explanations do not nest, and F makes too much of the better one: of 300 series of 168 rows of noise alone
-#: (correlation 0.85 in 40 % of the variance, what the StRD's ENSO leaves around its annual cycle) 7.3 % had two
-#: cycles as good as those of ENSO, where F and the price of the search come to 2.8 %.
-EXAGGERATES = 3.0
+#: The two explanations do not nest, and F makes too much of the better one. Noise of ENSO's length (correlation 0.85 in
+#: 40 % of the variance, what its annual cycle leaves) has two cycles as good as those of ENSO in 7.3 % of 300 series,
+#: where F and the price of the search come to 2.8 %; of 200 series of slower noise (0.95) 5 % have some as good as
+#: 0.3 %. Half the square root of what F says agrees with both within their scatter.
+HALF = 0.5
 #: Effects in company that noise alone would bring forth in at most so many series are told, as likely and with that
 #: probability; they count as found where it is below the rate of the scan.
 LIKELY = 0.1
@@ -147,7 +148,7 @@ class Acceptance:
         together = [found, *same]
         # Slow noise is a line and some cycles too: one cycle has to make a line plain.
         most = 2 if line else max(MOST_TOGETHER, len(same) + 1)
-        level = LINE_AGAINST_NOISE if line else LIKELY / EXAGGERATES
+        level = LINE_AGAINST_NOISE if line else (LIKELY / HALF) ** 2
         while len(together) <= most:
             enough = len(together) > 1 and self.likelier(rest, together, level)
             if enough and not self.noise_after([*rest, *together]).noticed:
@@ -177,7 +178,7 @@ class Acceptance:
     def doubt_of_all(self, others: Sequence[Candidate], together: Sequence[Candidate]) -> float:
         """How often noise alone would do as well as effects together beside others."""
         self.likelier(others, together, LIKELY)
-        return EXAGGERATES * self.odds[_key(others, together)]
+        return HALF * math.sqrt(self.odds[_key(others, together)])
 
     def alone(self, others: Sequence[Candidate], found: Candidate) -> float:
         """p-value in independent noise, the search paid for."""
