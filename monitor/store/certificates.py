@@ -171,8 +171,11 @@ def _check_step(db: Database, number: str, state: State) -> None:
     last = db.rows("SELECT state FROM certificate WHERE number = ? ORDER BY entry DESC LIMIT 1", [number])
     present = last[0][0] if last else None
     if state not in _NEXT[present]:
-        allowed = " or ".join(_NEXT[present]) or "nothing else"
-        raise InputError(f"certificate {number} is {present}; it can become {allowed}, not {state}")
+        allowed = " or ".join(_NEXT[present])
+        raise InputError(
+            f"certificate {number} is {present}; "
+            + (f"it can become {allowed}, not {state}" if allowed else "that is final, nothing can be changed")
+        )
 
 
 def _append(

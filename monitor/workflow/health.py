@@ -26,6 +26,7 @@ from monitor.store.catalogue import check_machine
 from monitor.uncertainty.engine import Engine, Here, in_order
 from monitor.uncertainty.processes import processes
 from monitor.workflow.campaigns import records
+from monitor.workflow.certificate_files import why_not
 from monitor.workflow.health_history import check_campaigns, makers
 from monitor.workflow.health_machine import Begun, Settings, begun, machine_health
 from monitor.workflow.health_refusals import refused_elsewhere
@@ -77,6 +78,10 @@ def report(
         if machine in (None, str(known["machine"]))
         and (measured_by is None or str(known["machine"]) in measured_by)
     ]
+    try:
+        (out or Path()).mkdir(parents=True, exist_ok=True)  # before minutes of computing
+    except OSError as error:
+        raise InputError(f"the report cannot be written to {out}: {why_not(out or Path(), error)}") from error
     now = (made_at or datetime.now(UTC)).replace(tzinfo=None, microsecond=0)
     with _engine(workers, len(chosen_machines)) as engine:
         rows = _found(db, chosen_machines, chosen, own, engine, progress)
@@ -161,7 +166,6 @@ def _write(
     parts = max(1, -(-len(numbers) // MACHINES_A_PART))
     files = [page]
     try:
-        out.mkdir(parents=True, exist_ok=True)
         part = page.with_name(page.name + ".part")
         with part.open("w", encoding="utf-8") as stream:
             for piece in health_html(fleet, _stored(db, numbers)):
@@ -180,7 +184,7 @@ def _write(
             beside.replace(path)
             files.append(path)
     except OSError as error:
-        raise InputError(f"the report cannot be written to {out}: {error.strerror or error}") from error
+        raise InputError(f"the report cannot be written to {out}: {why_not(out, error)}") from error
     return [str(path) for path in files]
 
 

@@ -127,7 +127,7 @@ def test_17025_7_8_8_a_withdrawn_draft_and_a_withdrawn_certificate_stay_what_the
     withdraw(db, "W-1", "was only a try")
     for number in ("W-1",):
         with pytest.raises(
-            InputError, match=f"certificate {number} is withdrawn; it can become nothing else"
+            InputError, match=f"certificate {number} is withdrawn; that is final"
         ):
             withdraw(db, number, "again")
         with pytest.raises(InputError, match="is withdrawn; only an issued one can be replaced"):
