@@ -25,9 +25,7 @@ def add_issuing(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, metavar="PATH", help="a folder, or a file ending in .pdf")
     parser.add_argument("--number", metavar="NUMBER", help="default: the next of the year")
-    parser.add_argument(
-        "--date", type=_day, metavar="YYYY-MM-DD", help="of issue; default: today"
-    )
+    parser.add_argument("--date", type=_day, metavar="YYYY-MM-DD", help="of issue; default: today")
     parser.add_argument("--model", metavar="NAME")
     parser.add_argument(
         "--linear-axes", type=Path, metavar="FILE",

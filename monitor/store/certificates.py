@@ -174,7 +174,11 @@ def _check_step(db: Database, number: str, state: State) -> None:
         allowed = " or ".join(_NEXT[present])
         raise InputError(
             f"certificate {number} is {present}; "
-            + (f"it can become {allowed}, not {state}" if allowed else "that is final, nothing can be changed")
+            + (
+                f"it can become {allowed}, not {state}"
+                if allowed
+                else "that is final, nothing can be changed"
+            )
         )
 
 

@@ -27,7 +27,7 @@ from monitor.reporting.results import RefusedParameters
 
 Make = Callable[..., CertificateRecord]
 #: A4 and the side margins of the style sheet, in points.
-WIDTH, HEIGHT, MARGIN = 210 / 25.4 * 72, 297 / 25.4 * 72, 17 / 25.4 * 72
+WIDTH, HEIGHT, MARGIN, EDGE = (length / 25.4 * 72 for length in (210, 297, 17, 6))
 LONG_NAME = "Precision Engineering and Calibration Services of Nowhere Ltd"
 
 
@@ -60,7 +60,9 @@ def assert_inside_the_margins(pdf: bytes) -> None:
     outside = [
         span
         for span in spans
-        if span[0] < MARGIN - 1 or span[1] > WIDTH - MARGIN + 1 or not 20 < span[2] < span[3] < HEIGHT - 20
+        if span[0] < MARGIN - 1
+        or span[1] > WIDTH - MARGIN + 1
+        or not EDGE < span[2] < span[3] < HEIGHT - EDGE
     ]
     assert outside == []
 
