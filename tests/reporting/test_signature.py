@@ -124,7 +124,7 @@ def test_keys_that_do_not_open_are_refused(plain: bytes, keys: dict[str, Path], 
         sign(plain, FileKey(keys["other.pem"]))
     with pytest.raises(InputError, match="cannot be read: No such file"):
         sign(plain, FileKey(tmp_path / "none.p12"))
-    with pytest.raises(InputError, match="holds no certificates in PEM or DER"):
+    with pytest.raises(InputError, match=r"none\.pem cannot be read: No such file"):
         check_signature(sign(plain, FileKey(keys["lab"], "words")), tmp_path / "none.pem")
 
 
