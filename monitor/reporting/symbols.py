@@ -19,7 +19,9 @@ _DIRECTIONS = {
 _AT = re.compile(r"(?P<symbol>E[XYZABC]0?(?P<axis>[XYZUVWABC]\d*))\((?P<place>[^()]+)\)")
 _SHAPE = re.compile(r"shape\((?P<point>.+)\)")
 #: ``J2`` is a joint of a robot: the name does not say along which direction its axis lies.
-_SYMBOL = re.compile(r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*|J\d+)(?::(?P<rest>.+))?")
+_SYMBOL = re.compile(
+    r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*|J\d+)(?::(?P<rest>.+))?"
+)
 
 
 def describe(symbol: str, texts: Texts | None = None) -> str:
