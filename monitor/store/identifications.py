@@ -101,7 +101,7 @@ def identification_by_number(db: Database, number: int) -> StoredIdentification:
     """The identification of a number that ``save_identification`` returned. Raises NotFoundError."""
     head = db.rows(
         "SELECT campaign, model, model_version, i.method, parameters, units, display_factors "
-        "FROM identification AS i JOIN campaign USING (campaign_id) WHERE identification_id = ?",
+        "FROM identification AS i JOIN imported_campaign USING (campaign_id) WHERE identification_id = ?",
         [number],
     )
     if not head:

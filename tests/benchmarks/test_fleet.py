@@ -56,12 +56,13 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
     n = {"m": machines, "n": machines * weeks}
     name = "'M' || lpad(CAST(i % $m AS VARCHAR), 5, '0')"
     db.execute(
-        f"INSERT INTO machine SELECT {name}, 'w C B X b Z Y (C1) t', TIMESTAMP '2021-01-04' FROM range($m) AS r(i)",
+        f"INSERT INTO registered_machine SELECT i + 1, {name}, 'w C B X b Z Y (C1) t', TIMESTAMP '2021-01-04' "
+        "FROM range($m) AS r(i)",
         {"m": machines},
     )
     db.execute(
-        f"INSERT INTO campaign SELECT i + 1, {name} || '-W' || (i // $m), {name}, 'samba', '{{}}', '{{}}', '{{}}', "
-        "'', '0', TIMESTAMP '2021-01-04' FROM range($n) AS r(i)",
+        f"INSERT INTO imported_campaign SELECT i + 1, {name} || '-W' || (i // $m), {name}, 'samba', '{{}}', '{{}}', "
+        "'{}', '', '0', TIMESTAMP '2021-01-04' FROM range($n) AS r(i)",
         n,
     )
     db.execute(

@@ -45,13 +45,13 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "GROUP BY ALL ORDER BY 1"
         )
         description = json.loads(topology_of)
-        first = db.next_number("campaign", "campaign_id")
+        first = db.next_number("imported_campaign", "campaign_id")
         heads = pd.DataFrame(
             {"number": np.arange(first, first + WEEKS), "description": json.dumps(description)}
         )
         db.insert(
-            f"INSERT INTO campaign SELECT number, 'past-' || number, '{machine}', 'samba', description, '{{}}', "
-            "'{}', '', '', TIMESTAMP '2024-01-01' FROM incoming",
+            f"INSERT INTO imported_campaign SELECT number, 'past-' || number, '{machine}', 'samba', description, "
+            "'{}', '{}', '', '', TIMESTAMP '2024-01-01' FROM incoming",
             heads,
         )
         week = np.repeat(np.arange(WEEKS), RUNS)

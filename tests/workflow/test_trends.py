@@ -36,8 +36,12 @@ def add_machine(
 ):
     """Weekly campaigns of four runs: ``values`` name to (weeks, runs) in µm."""
     weeks, runs = next(iter(values.values())).shape
-    db.execute("INSERT INTO machine VALUES (?, 'w C B X b Z Y (C1) t', TIMESTAMP '2024-01-01')", [machine])
-    first = db.next_number("campaign", "campaign_id")
+    db.execute(
+        "INSERT INTO registered_machine SELECT count(*) + 1, ?, 'w C B X b Z Y (C1) t', TIMESTAMP '2024-01-01' "
+        "FROM registered_machine",
+        [machine],
+    )
+    first = db.next_number("imported_campaign", "campaign_id")
     description = json.dumps({"id": machine, "tolerances": dict.fromkeys(values, limit)})
     number = np.repeat(np.arange(first, first + weeks), runs)
     run = np.tile(np.arange(1, runs + 1), weeks)
@@ -47,7 +51,7 @@ def add_machine(
     frame["ambient"] = np.full(len(number), 20.0) if ambient is None else ambient.ravel()
     heads = pd.DataFrame({"number": np.arange(first, first + weeks)})
     db.insert(
-        f"INSERT INTO campaign SELECT number, '{machine}-' || (number - {first}), '{machine}', 'samba', "
+        f"INSERT INTO imported_campaign SELECT number, '{machine}-' || (number - {first}), '{machine}', 'samba', "
         f"'{description}', "
         "'{}', '{}', '', '', TIMESTAMP '2024-01-01' FROM incoming",
         heads,
