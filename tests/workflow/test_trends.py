@@ -14,7 +14,7 @@ import pytest
 from monitor.cli import main
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
-from monitor.store import Database, import_campaign, load_analysis, record_event
+from monitor.store import Database, import_campaign, load_analysis, machine_history, record_event
 from monitor.workflow.fleet import fleet
 from monitor.workflow.runs_statistics import stats
 from monitor.workflow.selections import select, side_by_side
@@ -124,6 +124,15 @@ def test_a_change_is_found_at_its_date_and_not_fitted_as_a_trend(made: Database)
     assert abs(found["slope_per_year"]) < 4 * found["u_slope"]
     assert found["control"]["shewhart"]["state"] == "alarm"
     assert found["control"]["cusum"]["state"] == "alarm"
+
+
+def test_the_latest_mean_has_its_uncertainty_and_its_runs(made: Database) -> None:
+    found = trends(made, "M").document["parameters"]["EX0B"]
+    history = machine_history(made, "M")
+    values = history.values[-4:, history.parameters.index("EX0B")]
+    assert found["latest_runs"] == 4
+    assert found["latest"] == pytest.approx(values.mean())
+    assert found["latest_u"] == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)))
 
 
 def test_a_quiet_parameter_raises_nothing_and_a_dependence_has_its_unit(made: Database) -> None:
