@@ -63,6 +63,10 @@ def find_mistakes(campaign: Campaign, problem_of: Maker, found: Fit | None) -> t
     cannot say which it was. Empty where none of those tried is enough.
     """
     before = float("inf") if found is None else found.rms
+    # Quick, and what it finds no exchange of whole columns would bring to the noise.
+    relabelled = _relabelled(campaign, problem_of, found)
+    if relabelled is not None:
+        return (relabelled,)
     part = _part(campaign, found)
     trials: list[tuple[str, Campaign, float]] = []
     for what, undo in _systematic(campaign):
@@ -75,9 +79,6 @@ def find_mistakes(campaign: Campaign, problem_of: Maker, found: Fit | None) -> t
         for what, corrected, rms in trials
         if rms <= 2.0 * best and (after := _cured(corrected, problem_of, before)) is not None
     ]
-    if not told:
-        relabelled = _relabelled(campaign, problem_of, found)
-        told = [] if relabelled is None else [relabelled]
     return tuple(sorted(told, key=lambda one: one.rms_undone))
 
 

@@ -100,7 +100,7 @@ class ChainProblem(ABC):
         if self.context.expected is not None or not self.measured_joints:
             return self
         bare = replace(self, added=())
-        return replace(self, context=self.context.expecting(_stops(bare, solve_problem(bare))))
+        return replace(self, context=self.context.expecting(stops(bare, solve_problem(bare))))
 
     def for_search(self) -> Self:
         """The problem in which missing effects are looked for."""
@@ -292,7 +292,7 @@ class ChainProblem(ABC):
         return self.padded(told / self.sigma.reshape(self.sigma.shape + (1,) * (told.ndim - 2)))
 
 
-def _stops(problem: ChainProblem, solution: Solution) -> Array:
+def stops(problem: ChainProblem, solution: Solution) -> Array:
     """Where the measured joints stop (n, J) under a solution: the readings less the shortest move that would do away
     with a row's residual."""
     chain, measured = problem.context.chain, list(problem.measured_joints)
@@ -300,9 +300,9 @@ def _stops(problem: ChainProblem, solution: Solution) -> Array:
     assert seen.by_error is not None
     along = np.array([chain.joints[place].direction for place in measured])
     moved = problem.observe(np.einsum("nrac,ac->nra", seen.by_error[:, :, measured, MOTION, :3], along))
-    stops = problem.context.positions.copy()
-    stops[:, measured] -= np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(seen.residual))
-    return stops
+    places = problem.context.positions.copy()
+    places[:, measured] -= np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(seen.residual))
+    return places
 
 
 #: What gives the solution of a problem: ``solve_problem``, or who has it already.

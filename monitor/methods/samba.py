@@ -60,7 +60,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TouchProblem
     present = np.isin(
         [run.run for run in sorted(campaign.runs, key=lambda run: run.run)], campaign.probings.run
     )
-    return TouchProblem(
+    problem = TouchProblem(
         context=context_of(campaign, chain),
         base=model.base_of(chain),
         added=model.added_to(chain),
@@ -68,6 +68,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TouchProblem
         distances=(Distance(bar.balls, bar_length(campaign)[present], bar.standard_uncertainty),),
         tip=campaign.probe.tip or (0.0, 0.0, 0.0),
     )
+    return problem.foreseen() if problem.added else problem
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:

@@ -6,14 +6,17 @@ unit of length.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from monitor.machine import Evaluation
-from monitor.methods.problem import ChainProblem
+from monitor.methods.problem import ChainProblem, solve_problem, stops
 from monitor.records import Array
+
+# mm; more than the stylus' offset moves an axis as the spindle turns, less than any plan means to move it.
+STILL = 1.0
 
 
 @dataclass(frozen=True)
@@ -27,10 +30,14 @@ class Distance:
 
 @dataclass(frozen=True)
 class TouchProblem(ChainProblem):
-    """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is told."""
+    """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is told.
+
+    ``beside`` (n, 3) mm is what the readings differ by where the chain stands at expected places.
+    """
 
     distances: tuple[Distance, ...] = ()
     tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    beside: Array | None = None
 
     @cached_property
     def own_names(self) -> tuple[str, ...]:
@@ -56,12 +63,36 @@ class TouchProblem(ChainProblem):
         return tuple(place for place, joint in enumerate(self.context.chain.joints) if not joint.turns)
 
     def foreseen(self) -> TouchProblem:
-        """As read: balls at many poses move every axis by millimetres from touch to touch.
+        """As read, unless an axis stands still while a ball is probed at all its poses.
 
-        Effects that a plan cannot see are blind exactly there, as the chain stands at the readings; at expected places
-        1 µm of noise over 0.1 m leaves 1e-5 of their columns, which looks like something seen.
+        Where balls move every axis by millimetres from touch to touch, the reading is as good as the expected place. An
+        axis that stands still (along a single rotary axis) tells little but its noise, and leaves gains to what moves
+        the others least: the chain is then taken where it is expected to stop, what the readings differ by beside it.
         """
-        return self
+        if self.context.expected is not None or not self._stands_still:
+            return self
+        bare = replace(self, added=())
+        solution = solve_problem(bare)
+        places = stops(bare, solution)
+        return replace(
+            self,
+            context=replace(self.context.expecting(places), positions=places),
+            beside=bare.evaluated(solution.local, solution.common).residual,
+        )
+
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
+        """The chain where it stands, and what the readings differ by."""
+        seen = super().evaluated(local, common, jacobian=jacobian)
+        return seen if self.beside is None else replace(seen, residual=seen.residual + self.beside)
+
+    @property
+    def _stands_still(self) -> bool:
+        """Whether there is a linear axis that every ball moves by less than ``STILL`` over all its probings."""
+        order = np.argsort(self._target, kind="stable")
+        first = np.searchsorted(self._target[order], np.arange(len(self.targets)))
+        read = self.context.positions[order]
+        moved = (np.maximum.reduceat(read, first) - np.minimum.reduceat(read, first)).max(axis=0)
+        return any(moved[place] < STILL for place in self.measured_joints)
 
     @property
     def extra_names(self) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ import pytest
 from scipy import stats
 
 from monitor.store import Database, fleet_sums
+from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import cell_tests
 from monitor.workflow.trends import trends
 
@@ -72,8 +73,8 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
         n,
     )
     db.execute(
-        f"INSERT INTO identification SELECT i + 1, i + 1, 'samba', 1, 'samba', {NAMES}, [], [], 4, '0', "
-        "TIMESTAMP '2021-01-04' FROM range($n) AS r(i)",
+        f"INSERT INTO identification SELECT i + 1, i + 1, 'samba', 1, 'samba', {NAMES}, {['µm'] * 15}, {[1e-3] * 15}, "
+        "4, '0', TIMESTAMP '2021-01-04' FROM range($n) AS r(i)",
         {"n": n["n"]},
     )
     db.execute(
@@ -83,6 +84,7 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
         "0.5e-3, 'µm', 1e-3 FROM range($n * 60) AS r(i)",
         {"n": n["n"]},
     )
+    gather_values(db)
 
 
 def test_a_small_copy_gives_the_numbers_of_the_bare_query(tmp_path: Path) -> None:

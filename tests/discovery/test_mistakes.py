@@ -99,7 +99,9 @@ def test_the_sign_of_a_rotary_axis() -> None:
 
 def test_balls_exchanged_at_one_indexation() -> None:
     (what,) = told(recorded("five-days", exchanged("1", "3", slice(0, 6))))
-    assert what.startswith("balls 1 and 3 were exchanged in 2 probings (run 1, sequence 1; run 1, sequence")
+    assert what.startswith(
+        "balls 1 and 3 were exchanged in 3 probings (run 1, sequence 1; run 1, sequence 3;"
+    )
 
 
 def test_one_ball_under_the_name_of_another() -> None:

@@ -111,3 +111,37 @@ def virtual(
         plan, machine, schedule, told, keep=mask, stated_um=stated_um, with_channels=with_channels
     )
     return campaign, told
+
+
+#: Machines beside the HU40-T: topology, the axes that are indexed (tilt, turn), where gravity points, the tip.
+OTHER_MACHINES = {
+    "trunnion": ("w C A b Y X Z (C1) t", ("A", "C"), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)),
+    "tilting table on X": ("w C A X b Y Z (C1) t", ("A", "C"), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)),
+    "head and table": ("w C b X Y Z B (C1) t", ("B", "C"), (0.0, 0.0, -1.0), (0.0, 0.0, -200.0)),
+    "fork head": ("w X b Y Z C B (C1) t", ("B", "C"), (0.0, 0.0, -1.0), (0.0, 0.0, -200.0)),
+    "one rotary table": ("w B X b Z Y (C1) t", ("B", ""), (0.0, -1.0, 0.0), (0.0, 0.0, 0.0)),
+}
+_PAIRS = [(-60, -235), (0, -135), (0, 0), (0, 90), (30, 175), (90, 270), (50, 170), (0, 135)]
+_PAIRS += [(15, 0), (0, -50), (-45, -90), (-90, -270)]
+
+
+def on_machine(
+    kind: str, seed: int, effects: Any = (), *, noise_um: float = 1.0, stated_um: float | None = None
+) -> tuple[Campaign, dict[str, Any]]:
+    """A campaign of five days on one of ``OTHER_MACHINES``, indexed as in the five-days plan."""
+    sim = simulator()
+    topology, (tilt, turn), down, tip = OTHER_MACHINES[kind]
+    poses = [{tilt: a, turn: c, "C1": 0} if turn else {tilt: a or c / 2, "C1": 0} for a, c in _PAIRS]
+    poses += [{tilt: 0, **({turn: 0} if turn else {}), "C1": c1} for c1 in (90, 180, 270)]
+    plan = sim.indexed_plan(kind, poses, bar_after=3, probe_uncertainty_um=1.0)
+    schedule = sim.working_days(np.random.default_rng(seed))
+    machine = sim.SimulatedMachine(
+        topology=topology,
+        signs={name.strip("()"): 1.0 for name in topology.split() if name not in "wbt"},
+        terms={"EXX:poly1": 18e-6, "EYY:poly1": -12e-6, "EZZ:poly1": 25e-6},
+        effects=tuple(effects),
+        tip_mm=tip,
+        down=down,
+    )
+    told = sim.simulate(plan, machine, schedule, np.random.default_rng((seed, 5)), noise_um=noise_um)
+    return as_campaign(plan, machine, schedule, told, stated_um=stated_um or noise_um), told

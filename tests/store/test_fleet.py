@@ -19,6 +19,7 @@ from monitor.records import Campaign
 from monitor.statistics import anova, bartlett, pool, trend
 from monitor.statistics.sufficient import GroupSums, cells_from_sums, drift_from_sums
 from monitor.store import Database, FleetSums, fleet_sums, machine_history
+from monitor.store.identified_values import gather_values
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd"
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -68,6 +69,7 @@ def keep(
         f"INSERT INTO parameter_value SELECT {own}, run, '{parameter}', value, 1.0, '1', {factor} FROM incoming",
         frame,
     )
+    gather_values(db)
     return own
 
 

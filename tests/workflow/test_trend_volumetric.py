@@ -14,6 +14,7 @@ from scipy import optimize
 
 from monitor.cli import main
 from monitor.store import Database
+from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.campaigns import import_folders
 from monitor.workflow.identification import identify
@@ -66,8 +67,9 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
         )
         names = [row[0] for row in found]
         db.insert(
-            f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {names}::VARCHAR[], [], [], "
-            f"{RUNS}, '', TIMESTAMP '2024-01-01' FROM incoming",
+            f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {names}::VARCHAR[], "
+            f"{[row[1] for row in found]}, {[FACTOR[row[1]] for row in found]}, {RUNS}, '', "
+            "TIMESTAMP '2024-01-01' FROM incoming",
             heads,
         )
         for name, unit, mean, u in found:
@@ -77,6 +79,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 f"{FACTOR[unit]} FROM incoming",
                 frame.assign(value=past * FACTOR[unit]),
             )
+        gather_values(db)
     return place
 
 

@@ -15,6 +15,7 @@ from monitor.cli import main
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign, load_analysis, machine_history, record_event
+from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import fleet
 from monitor.workflow.runs_statistics import stats
 from monitor.workflow.selections import select, side_by_side
@@ -61,8 +62,8 @@ def add_machine(
         frame,
     )
     db.insert(
-        f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {list(values)}::VARCHAR[], [], [], "
-        f"{runs}, '', TIMESTAMP '2024-01-01' FROM incoming",
+        f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {list(values)}::VARCHAR[], "
+        f"{['µm'] * len(values)}, {[1e-3] * len(values)}, {runs}, '', TIMESTAMP '2024-01-01' FROM incoming",
         heads,
     )
     for name, matrix in values.items():
@@ -71,6 +72,7 @@ def add_machine(
             f"INSERT INTO parameter_value SELECT number, run, '{name}', value, 0.5e-3, 'µm', 1e-3 FROM incoming",
             own,
         )
+    gather_values(db)
 
 
 @pytest.fixture(scope="module")
