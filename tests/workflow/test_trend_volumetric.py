@@ -120,6 +120,10 @@ def test_the_date_is_that_of_the_exact_chain_at_the_extrapolated_parameters(db: 
     )
     assert 0.0 < ahead["in_tolerance_at_next_check"] <= 1.0
     assert ahead["predicted_interval_um"][0] < ahead["predicted_um"] < ahead["predicted_interval_um"][1]
+    tested = ahead["backtest"]
+    assert tested["made"] == 8
+    assert tested["inside"] >= 6
+    assert abs(tested["bias_um"]) <= tested["rms_um"] < 15.0
 
 
 def test_a_limit_already_passed_is_crossed_now_and_a_far_one_never(db: Database) -> None:
@@ -144,6 +148,7 @@ def test_the_command_prints_the_forecast_the_next_check_and_the_backtest(path: P
     said = capsys.readouterr().out
     assert "limit 216 µm; reaches its limit on 20" in said
     assert "at the next check, " in said
+    assert " of 8 past days, each foretold by the days before it, lay in the interval (" in said
     assert "later values (" in said
     assert main(["--db", str(path), "trend", "HU40-T", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

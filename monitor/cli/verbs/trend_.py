@@ -207,6 +207,12 @@ def _forecasts(found: dict[str, Any]) -> None:
             f"{output.probability(ahead['in_tolerance_at_next_check'])}; check within "
             f"{ahead['recommended_interval_days']:.0f} days"
         )
+        tested = ahead["backtest"]
+        if tested is not None:
+            output.say(
+                f"  {tested['inside']} of {tested['made']} past days, each foretold by the days before it, lay in the "
+                f"interval ({_three(tested['rms_um'])} µm off, root mean square)"
+            )
     elif ahead is not None and ahead["limit_um"] is not None:
         output.say(ahead["why"])
     intervals = {
