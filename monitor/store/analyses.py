@@ -134,7 +134,7 @@ def stored_analyses(
         SELECT a.analysis_id, a.kind, a.machine, c.campaign, a.run, a.model, a.model_version, a.method, a.seed,
                a.document, a.software_version, a.computed_at
         FROM analysis AS a LEFT JOIN campaign AS c USING (campaign_id)
-        WHERE a.kind = $kind
+        WHERE a.kind = $kind AND (a.campaign_id IS NULL OR c.campaign IS NOT NULL)
           AND ($campaign IS NULL OR c.campaign = $campaign)
           AND ($machine IS NULL OR coalesce(a.machine, c.machine) = $machine)
           AND ($run IS NULL OR a.run = $run) AND ($model IS NULL OR a.model = $model)

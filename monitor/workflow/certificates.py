@@ -197,10 +197,9 @@ def _replaced(db: Database, number: str, reason: str, draft: bool, campaign: Cam
         raise InputError("a draft replaces nothing; leave --replaces out until it is issued")
     if not reason.strip():
         raise InputError(f"say why certificate {number} is replaced: --reason TEXT")
-    machine = load_campaign(db, old.campaign).machine.id
-    if machine != campaign.machine.id:
+    if old.machine != campaign.machine.id:
         raise InputError(
-            f"campaign {campaign.name} is of machine {campaign.machine.id}, certificate {number} of {machine}: "
+            f"campaign {campaign.name} is of machine {campaign.machine.id}, certificate {number} of {old.machine}: "
             "it cannot replace it"
         )
     issued_on = date.fromisoformat(str(old.record["issued_on"]))
