@@ -20,13 +20,14 @@ from monitor.discovery.evidence import p_value_against_runs
 from monitor.discovery.fit import Fit, fit
 from monitor.discovery.gears import gear_variants
 from monitor.discovery.held_out import held_out_error
-from monitor.discovery.missing import Missing, Surroundings, tell
+from monitor.discovery.missing import Missing, Surroundings, stands_out, tell
+from monitor.discovery.mistakes import Mistake
 from monitor.discovery.poses import p_value_by_poses, poses_of_rows
 from monitor.discovery.refine import refine, refine_all
 from monitor.discovery.scan import ScanResult, scan
 from monitor.discovery.steps import Step, find_steps
 from monitor.discovery.suspects import Suspects, find_suspects, with_effects
-from monitor.discovery.variants import cycles_of_unknown_pitch, variants_of, with_drivers
+from monitor.discovery.variants import cycles_of_unknown_pitch, resolvable, variants_of, with_drivers
 from monitor.discovery.varying import tell_varying
 from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Variant, Visible, see
 from monitor.effects.catalogue import catalogue, drivers_of
@@ -45,7 +46,7 @@ class Explanation:
 
     ``suspect`` points were left out, ``moves`` and ``steps`` are changes told as such; ``blind`` effects leave
     nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
-    recorded column follows it.
+    recorded column follows it. Where the file itself looks wrong, ``mistakes`` says how, and nothing else is told.
     """
 
     comparison: Comparison
@@ -56,6 +57,7 @@ class Explanation:
     blind: tuple[str, ...]
     refused: tuple[tuple[str, str], ...]
     final: Fit
+    mistakes: tuple[Mistake, ...] = ()
 
 
 def _surroundings(campaign: Campaign, problem: ChainProblem) -> Surroundings:
@@ -94,7 +96,7 @@ def explain(
     known = [effect.text for effect in (*problem.base, *problem.added)]
     effects = catalogue(problem.context.chain, known, drivers, pitches, problem.method_effects(drivers))
     variants = [variant for effect in effects for variant in variants_of(effect)]
-    variants += cycles_of_unknown_pitch(problem.context.chain)
+    variants += resolvable(cycles_of_unknown_pitch(problem.context.chain), problem.context)
     suspects = Suspects()
     for _ in range(MOST_ROUNDS):
         out, own = suspects.left_out(problem), suspects.effects(problem)
@@ -158,6 +160,7 @@ def _scanned(
             best_value=partial(_at_best, now, visible),
         )
         known = {one.effect.text for one in gears}
+        result = stands_out(visible, result)
         found = gear_variants(now, visible, [one.candidate for one in result.findings], rate)
         new = [one for one in found if one.effect.text not in known]
         if not new or len(gears) > MOST_GEARS:

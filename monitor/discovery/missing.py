@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,8 @@ UNDECIDED = 12.0
 GRID_LOSS = 12.0
 # An effect coincides with another where so much of it is explained by the other at any size.
 COINCIDES = 0.999
+# An effect of less than twice its standard uncertainty is no answer.
+SMALLEST_RATIO = 2.0
 # Orders of a gear closer than this are the same: less than a turn of the joint tells no more.
 ONE_ORDER = 2.0
 
@@ -121,6 +123,29 @@ def tell(
             )
         )  # fmt: skip
     return tuple(told)
+
+
+def stands_out(visible: Visible, result: ScanResult) -> ScanResult:
+    """The findings whose size, fitted together with the others, exceeds its standard uncertainty by a factor of two.
+
+    Two effects that can hardly be told apart may each stand the scan and be fitted with sizes that cancel; the
+    weaker one is taken out, and the other's size is known again.
+    """
+    findings = list(result.findings)
+    while findings:
+        chosen = [finding.candidate for finding in findings]
+        values = amplitudes(visible, chosen)
+        ends = np.cumsum([one.columns.shape[1] for one in chosen])
+        ratios = []
+        for one, end in zip(chosen, ends, strict=True):
+            own = slice(end - one.columns.shape[1], end)
+            size, u = _amplitude(one, values.estimate[own], values.covariance[own, own])
+            ratios.append(abs(size) / u if u > 0 else np.inf)
+        weak = [place for place, ratio in enumerate(ratios) if ratio < SMALLEST_RATIO]
+        if not weak:
+            break
+        del findings[max(weak, key=lambda place: -findings[place].evidence.score)]
+    return replace(result, findings=tuple(findings))
 
 
 def _amplitude(candidate: Candidate, coefficients: Array, covariance: Array) -> tuple[float, float]:
