@@ -60,15 +60,28 @@ class CampaignError(InputError):
     """A campaign folder that was refused as a whole; ``faults`` holds everything that is wrong with it."""
 
     SHOWN_IN_FULL = 20
+    #: More faults with the same words in one column are told once, with their number.
+    ALIKE_IN_FULL = 5
 
     def __init__(self, folder: str, faults: Sequence[Fault]) -> None:
         self.folder = folder
-        self.faults = tuple(faults)
+        self.faults = tuple(dict.fromkeys(faults))
         count = len(self.faults)
         lines = [f"{folder} was refused, nothing of it was kept: {count} fault{'s' if count != 1 else ''}."]
-        lines += [f"  {fault}" for fault in self.faults[: self.SHOWN_IN_FULL]]
-        if count > self.SHOWN_IN_FULL:
-            lines.append(f"  ... and {count - self.SHOWN_IN_FULL} more.")
+        alike: dict[tuple[str, str | None, str], list[Fault]] = {}
+        for fault in self.faults:
+            alike.setdefault((fault.file, fault.column, fault.message), []).append(fault)
+        told: list[list[Fault]] = []
+        for group in alike.values():
+            told += [group] if len(group) > self.ALIKE_IN_FULL else [[fault] for fault in group]
+        places = {fault: place for place, fault in enumerate(self.faults)}
+        shown = sorted(told, key=lambda group: places[group[0]])[: self.SHOWN_IN_FULL]
+        for first, *more in shown:
+            last = f" (and {len(more)} more like it, to line {more[-1].line})" if more else ""
+            lines.append(f"  {first}{last}")
+        left = count - sum(len(group) for group in shown)
+        if left:
+            lines.append(f"  ... and {left} more.")
         super().__init__("\n".join(lines))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from monitor.cli import output
 from monitor.store import Database
 from monitor.workflow import curves
+from monitor.workflow.curve_answer import correlation
 
 Document = dict[str, Any]
 
@@ -72,7 +73,7 @@ def summary(found: Document) -> None:
     noise = found["autocorrelation"]
     if noise["noticed"]:
         output.say(
-            f"neighbouring rows resemble each other under this model: {curves.correlation(noise)} (a missing "
+            f"neighbouring rows resemble each other under this model: {correlation(noise)} (a missing "
             "effect or correlated noise; explain tells which)"
         )
     output.say(f"verdict: {found['verdict']}")
@@ -108,7 +109,12 @@ def explain(db: Database, options: Namespace) -> int:
 
 
 def _effect(one: Document, unit: str) -> None:
-    output.say(f"{one['rank']}. {one['effect']}: {one['meaning']}")
+    doubt = (
+        ""
+        if one["certain"]
+        else f" (likely, not certain: noise alone would do in {one['noise_alone_p']:.0%})"
+    )
+    output.say(f"{one['rank']}. {one['effect']}: {one['meaning']}{doubt}")
     output.say(
         f"   {stated(one['amplitude'], one['u'])} {one['unit']}, at most {four(one['peak'])} {unit} from its mean; "
         f"{output.stated('p', one['p_value'])}, {output.stated('q', one['q_value'])}"
@@ -143,7 +149,7 @@ def coefficients(found: Document) -> None:
     noise = found["autocorrelation"]
     if noise["noticed"]:
         output.say(
-            f"neighbouring rows resemble each other ({curves.correlation(noise)}); u allows for it: "
+            f"neighbouring rows resemble each other ({correlation(noise)}); u allows for it: "
             f"{noise['effective_rows']:.0f} of {noise['rows']} rows for a mean"
         )
 

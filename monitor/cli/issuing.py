@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -25,9 +25,7 @@ def add_issuing(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, metavar="PATH", help="a folder, or a file ending in .pdf")
     parser.add_argument("--number", metavar="NUMBER", help="default: the next of the year")
-    parser.add_argument(
-        "--date", type=date.fromisoformat, metavar="YYYY-MM-DD", help="of issue; default: today"
-    )
+    parser.add_argument("--date", type=_day, metavar="YYYY-MM-DD", help="of issue; default: today")
     parser.add_argument("--model", metavar="NAME")
     parser.add_argument(
         "--linear-axes", type=Path, metavar="FILE",
@@ -73,6 +71,13 @@ def add_fonts(parser: ArgumentParser) -> None:
         "--font", type=Path, action="append", default=[], metavar="FILE",
         help="a TrueType or OpenType font for letters that DejaVu Sans lacks, such as Chinese; may be repeated",
     )  # fmt: skip
+
+
+def _day(text: str) -> date:
+    try:
+        return date.fromisoformat(text)
+    except ValueError as error:
+        raise ArgumentTypeError(f"'{text}' is no day; write it as 2026-03-02") from error
 
 
 def issuing(options: Namespace) -> dict[str, Any]:

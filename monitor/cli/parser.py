@@ -16,6 +16,7 @@ from monitor.cli.database import check_path
 VERBS = {
     "demo": "the main job on the example campaigns",
     "import": "campaign folders into the database, all or nothing each",
+    "withdraw": "a campaign no longer counts, its name is free for the corrected folder",
     "campaigns": "the campaigns in the database",
     "runs": "the runs of a campaign with their conditions",
     "identify": "geometric errors of every run, stored",

@@ -8,6 +8,7 @@ from monitor.discovery.compare import Comparison, compare
 from monitor.discovery.explain import Explanation, explain
 from monitor.discovery.fit import Fit, fit
 from monitor.discovery.missing import Missing
+from monitor.discovery.mistakes import Mistake, find_mistakes, is_gross
 from monitor.discovery.version_error import VersionError, version_error
 
 __all__ = [
@@ -15,9 +16,12 @@ __all__ = [
     "Explanation",
     "Fit",
     "Missing",
+    "Mistake",
     "VersionError",
     "compare",
     "explain",
+    "find_mistakes",
     "fit",
+    "is_gross",
     "version_error",
 ]

@@ -1,28 +1,22 @@
-"""What a curve may lack: every effect that its columns allow, as candidates for the same scan that machines have.
-
-A polynomial is tried as the part of its power that the lower ones cannot do (orthogonal over the measured
-rows), so that neither origin nor unit of the input matters and a line is not taken for a parabola.
-"""
+"""What a curve may lack: every effect that its columns allow, as candidates for the same scan that machines have."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import cast
 
 import numpy as np
 from scipy import optimize
 
+from monitor.discovery.curve_scene import Scene, effect_of, variant
 from monitor.discovery.evidence import orthonormal, weigh, without
-from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Variant, Visible
-from monitor.effects import ChainEffect
-from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, curve_columns, group_names
+from monitor.discovery.visible import Candidate, Visible
+from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, group_names
 from monitor.effects.curve_words import CALENDAR
-from monitor.methods.curve import SHORTEST_CONSTANT, CurveFit, CurveProblem, grid
+from monitor.methods.curve_problem import SHORTEST_CONSTANT, CurveProblem, grid
 from monitor.records import Array
-from monitor.statistics.noise import Noise
 
 POWERS = (1, 2, 3)
 #: Numbers in all candidates together: 160 MB. Beyond, only the values that explain most by themselves are kept;
@@ -35,27 +29,6 @@ MOST_PERIODS = 6000
 FEWEST_CYCLES = 1.5
 #: Two periods of one input are told apart from a whole cycle over its range on (Rayleigh's criterion).
 APART = 1.0
-
-
-@dataclass(frozen=True)
-class CurveVariant(Variant):
-    """A variant of an effect of a curve. The scan itself reads family, tries and odds only."""
-
-    @property
-    def curve(self) -> CurveEffect:
-        """The effect."""
-        return cast(CurveEffect, self.effect)
-
-
-def variant(effect: CurveEffect, tries: int = 1, family: str | None = None) -> CurveVariant:
-    """An effect as the scan takes it."""
-    return CurveVariant(family or effect.family, cast(ChainEffect, effect), tries)
-
-
-def effect_of(candidate: Candidate) -> CurveEffect:
-    """The effect of a candidate of a curve."""
-    assert isinstance(candidate.variant, CurveVariant)
-    return candidate.variant.curve
 
 
 def tries_of(effect: CurveEffect, values: Array) -> list[int]:
@@ -118,86 +91,6 @@ def rows_are_sorted(problem: CurveProblem) -> bool:
             blocks = np.unique(both, return_inverse=True)[1]
             nested += 1
     return nested > 1
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A fitted curve as the scan sees it: rows with weight in the order of time, whitened by ``noise``.
-
-    ``design`` (m, c) are the whitened columns of the model and ``basis`` spans them; ``measured`` (m,) is the
-    whitened response.
-    """
-
-    fit: CurveFit
-    noise: Noise
-    measured: Array
-    design: Array
-    basis: Array
-
-    def whitened(self, columns: Array) -> Array:
-        """Columns (n, k) of all rows as the scan sees them, the model not yet taken out."""
-        return self.noise.whiten(columns[self.fit.problem.order])[0]
-
-    def candidate(self, effect: CurveEffect, tries: int = 1, family: str | None = None) -> Candidate:
-        """One candidate, the model taken out of its columns."""
-        return self.candidates([effect], [tries], [family])[0]
-
-    def candidates(
-        self,
-        effects: Sequence[CurveEffect],
-        tries: Sequence[int],
-        families: Sequence[str | None] | None = None,
-    ) -> list[Candidate]:
-        """Several candidates at once, the model taken out of their columns."""
-        raw = [self.columns(effect) for effect in effects]
-        if not raw:
-            return []
-        white = self.whitened(np.concatenate(raw, axis=1))
-        left = without(self.basis, white)
-        before, after = np.linalg.norm(white, axis=0), np.linalg.norm(left, axis=0)
-        share = after / np.where(before == 0, 1.0, before)
-        left[:, share <= SMALLEST_SHARE] = 0.0
-        made, place = [], 0
-        for number, effect in enumerate(effects):
-            own = slice(place, place + raw[number].shape[1])
-            place = own.stop
-            family = None if families is None else families[number]
-            made.append(
-                Candidate(
-                    variant(effect, tries[number], family),
-                    left[:, own],
-                    np.zeros((0, 3, own.stop - own.start)),
-                    float(share[own].max(initial=0.0)),
-                    np.inf,
-                )
-            )
-        return made
-
-    def columns(self, effect: CurveEffect, value: float | None = None) -> Array:
-        """Columns (n, k) of an effect; of a polynomial the part that the lower powers cannot do."""
-        if not effect.order:
-            return curve_columns(effect, self.fit.problem.inputs, value)
-        x = self.fit.problem.inputs.numbers[effect.column]
-        kept = x[self.fit.problem.order]
-        middle, half = (kept.max() + kept.min()) / 2.0, (kept.max() - kept.min()) / 2.0 or 1.0
-        powers = ((x - middle) / half)[:, None] ** np.arange(effect.order + 1)
-        lower, own = powers[:, :-1], powers[:, -1:]
-        rows = self.fit.problem.order
-        return np.asarray(own - lower @ np.linalg.lstsq(lower[rows], own[rows], rcond=1e-12)[0])
-
-
-def scene_of(fit: CurveFit, noise: Noise) -> Scene:
-    """A fit as the scan sees it."""
-    rows = fit.problem.order
-    white = noise.whiten(np.column_stack([fit.problem.curve.measured, fit.design])[rows])[0]
-    return Scene(fit, noise, white[:, 0], white[:, 1:], orthonormal_to_full_precision(white[:, 1:]))
-
-
-def orthonormal_to_full_precision(columns: Array) -> Array:
-    """An orthonormal basis (m, r) of columns, to full precision: calendar years to the third power."""
-    scale = np.linalg.norm(columns, axis=0)
-    u, values, _ = np.linalg.svd(columns / np.where(scale == 0, 1.0, scale), full_matrices=False)
-    return np.asarray(u[:, values > 1e-12 * max(values.max(initial=0.0), 1e-300)])
 
 
 def see(scene: Scene) -> Visible:

@@ -25,7 +25,8 @@ from monitor.discovery.compare import (
     Part,
     split,
 )
-from monitor.discovery.curve_explain import explain_curve, noise_of
+from monitor.discovery.curve_explain import explain_curve
+from monitor.discovery.curve_quality import noise_of
 from monitor.effects.curve import SEQUENCE
 from monitor.methods.curve import CurveFit
 from monitor.statistics.noise import Assessed, assess

@@ -20,13 +20,15 @@ from monitor.discovery.evidence import p_value_against_runs
 from monitor.discovery.fit import Fit, fit
 from monitor.discovery.gears import gear_variants
 from monitor.discovery.held_out import held_out_error
-from monitor.discovery.missing import Missing, Surroundings, tell
+from monitor.discovery.missing import Missing, Surroundings, stands_out, tell
+from monitor.discovery.mistakes import Mistake
+from monitor.discovery.poses import p_value_by_poses, poses_of_rows
 from monitor.discovery.refine import refine, refine_all
 from monitor.discovery.scan import ScanResult, scan
 from monitor.discovery.steps import Step, find_steps
 from monitor.discovery.suspects import Suspects, find_suspects, with_effects
 from monitor.discovery.tables import with_tables
-from monitor.discovery.variants import cycles_of_unknown_pitch, variants_of, with_drivers
+from monitor.discovery.variants import cycles_of_unknown_pitch, resolvable, variants_of, with_drivers
 from monitor.discovery.varying import tell_varying
 from monitor.discovery.visible import SMALLEST_SHARE, Candidate, Variant, Visible, see
 from monitor.effects.catalogue import catalogue, drivers_of
@@ -45,7 +47,7 @@ class Explanation:
 
     ``suspect`` points were left out, ``moves`` and ``steps`` are changes told as such; ``blind`` effects leave
     nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
-    recorded column follows it.
+    recorded column follows it. Where the file itself looks wrong, ``mistakes`` says how, and nothing else is told.
     """
 
     comparison: Comparison
@@ -56,6 +58,7 @@ class Explanation:
     blind: tuple[str, ...]
     refused: tuple[tuple[str, str], ...]
     final: Fit
+    mistakes: tuple[Mistake, ...] = ()
 
 
 def _surroundings(campaign: Campaign, problem: ChainProblem) -> Surroundings:
@@ -94,7 +97,7 @@ def explain(
     known = [effect.text for effect in (*problem.base, *problem.added)]
     effects = catalogue(problem.context.chain, known, drivers, pitches, problem.method_effects(drivers))
     variants = [variant for effect in effects for variant in variants_of(effect)]
-    variants += cycles_of_unknown_pitch(problem.context.chain)
+    variants += resolvable(cycles_of_unknown_pitch(problem.context.chain), problem.context)
     suspects = Suspects()
     for _ in range(MOST_ROUNDS):
         out, own = suspects.left_out(problem), suspects.effects(problem)
@@ -149,19 +152,21 @@ def _scanned(
     of several shapes."""
     gears: list[Variant] = []
     visible = see(now, variants)
+    poses = poses_of_rows(now)
 
     def scanned(visible: Visible) -> ScanResult:
         return scan(
             visible,
             rate=rate,
             more=partial(_driven, now, drivers),
-            accept=partial(_stands, now, visible, runs, rate),
+            accept=partial(_stands, now, visible, runs, rate, poses),
             best_value=partial(_at_best, now, visible),
         )
 
     while True:
         result = scanned(visible)
         known = {one.effect.text for one in gears}
+        result = stands_out(visible, result)
         found = gear_variants(now, visible, [one.candidate for one in result.findings], rate)
         new = [one for one in found if one.effect.text not in known]
         if not new or len(gears) > MOST_GEARS:
@@ -184,12 +189,16 @@ def _stands(
     visible: Visible,
     runs: npt.NDArray[np.int64],
     rate: float,
+    pose: npt.NDArray[np.int64] | None,
     others: Sequence[Candidate],
     found: Candidate,
 ) -> bool:
-    """Whether an effect stands out from how its size scatters from run to run, and lowers the error on runs that
-    took no part in its fit (blocks of poses where there is one run; true where it has few)."""
+    """Whether an effect stands out with every pose as one observation and from how its size scatters from run to run,
+    and lowers the error on runs that took no part in its fit (blocks of poses where there is one run; true where it
+    has few)."""
     families = len({one.family for one in visible.candidates if one.share > SMALLEST_SHARE})
+    if pose is not None and p_value_by_poses(found, visible, others, pose) * families > rate:
+        return False
     if p_value_against_runs(found, visible, others) * families > rate:
         return False
     before = np.concatenate([visible.added, *(one.columns for one in others)], axis=1)

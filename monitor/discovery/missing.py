@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from monitor.discovery.evidence import Evidence, best_of_families, orthonormal, weigh, without
 from monitor.discovery.fit import Fit
 from monitor.discovery.held_out import held_out_error
+from monitor.discovery.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.refine import Refined, Searched, refine
 from monitor.discovery.scan import Finding, ScanResult, amplitudes
 from monitor.discovery.separate import Separation, separating_poses
@@ -29,6 +30,8 @@ UNDECIDED = 12.0
 GRID_LOSS = 12.0
 # An effect coincides with another where so much of it is explained by the other at any size.
 COINCIDES = 0.999
+# An effect of less than twice its standard uncertainty is no answer.
+SMALLEST_RATIO = 2.0
 # Orders of a gear closer than this are the same: less than a turn of the joint tells no more.
 ONE_ORDER = 2.0
 
@@ -103,6 +106,10 @@ def tell(
     values = amplitudes(visible, chosen)
     # The searched values widen the covariance of the sizes; their estimates stay those at the best value.
     wide = amplitudes(visible, chosen, slopes).covariance
+    poses = poses_of_rows(fit)
+    if poses is not None:
+        wider = widening(visible, chosen, poses)
+        wide = wider[:, None] * wide * wider
     told = []
     start = 0
     for place, finding in enumerate(findings):
@@ -112,10 +119,33 @@ def tell(
         told.append(
             _missing(
                 fit, visible, finding, refined[place], chosen, place, values.estimate[own], wide[own, own],
-                known,
+                known, poses,
             )
         )  # fmt: skip
     return tuple(told)
+
+
+def stands_out(visible: Visible, result: ScanResult) -> ScanResult:
+    """The findings whose size, fitted together with the others, exceeds its standard uncertainty by a factor of two.
+
+    Two effects that can hardly be told apart may each stand the scan and be fitted with sizes that cancel; the
+    weaker one is taken out, and the other's size is known again.
+    """
+    findings = list(result.findings)
+    while findings:
+        chosen = [finding.candidate for finding in findings]
+        values = amplitudes(visible, chosen)
+        ends = np.cumsum([one.columns.shape[1] for one in chosen])
+        ratios = []
+        for one, end in zip(chosen, ends, strict=True):
+            own = slice(end - one.columns.shape[1], end)
+            size, u = _amplitude(one, values.estimate[own], values.covariance[own, own])
+            ratios.append(abs(size) / u if u > 0 else np.inf)
+        weak = [place for place, ratio in enumerate(ratios) if ratio < SMALLEST_RATIO]
+        if not weak:
+            break
+        del findings[max(weak, key=lambda place: -findings[place].evidence.score)]
+    return replace(result, findings=tuple(findings))
 
 
 def _amplitude(candidate: Candidate, coefficients: Array, covariance: Array) -> tuple[float, float]:
@@ -166,8 +196,16 @@ def _missing(
     coefficients: Array,
     covariance: Array,
     known: Surroundings,
+    poses: npt.NDArray[np.int64] | None,
 ) -> Missing:
     candidate = refined.candidate
+    p_value, q_value = finding.evidence.p_value, finding.q_value
+    if poses is not None:
+        by_poses = p_value_by_poses(
+            candidate, visible, [one for one in chosen if one is not candidate], poses
+        )
+        q_value = max(q_value, min(1.0, by_poses * q_value / p_value)) if p_value > 0.0 else by_poses
+        p_value = max(p_value, by_poses)
     effect = candidate.variant.effect
     amplitude, u = _amplitude(candidate, coefficients, covariance)
     before, after = chosen[:place], chosen[: place + 1]
@@ -185,8 +223,8 @@ def _missing(
         unit_factor=effect.unit.factor,
         peak=float(np.linalg.norm(candidate.raw @ coefficients, axis=1).max()),
         searched=refined.searched,
-        p_value=finding.evidence.p_value,
-        q_value=finding.q_value,
+        p_value=p_value,
+        q_value=q_value,
         rms_before=_rms(fit, visible, before),
         rms_after=_rms(fit, visible, after),
         held_out_before=_held_out(fit, visible, before, known.runs),

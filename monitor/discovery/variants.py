@@ -6,12 +6,15 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from monitor.discovery.visible import Variant
-from monitor.effects import ArtefactEffect, ChainEffect, parse_effect, with_time_constant
+from monitor.effects import ArtefactEffect, ChainEffect, Context, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, WarmUp, parse_driver
-from monitor.effects.shapes import Compliance
+from monitor.effects.shapes import Compliance, Cyclic
 from monitor.effects.weight import Load
 from monitor.machine import COMPONENTS, Chain
+from monitor.records import Array
 
 # Warm-up takes from ten minutes (a small spindle) to a shift (a machine bed); neighbours differ by a factor of
 # two, within which exponentials seen over some hours agree to a few per cent.
@@ -19,6 +22,9 @@ TIME_CONSTANTS_S = tuple(600.0 * 2.0**step for step in range(7))
 # Pitches searched for an unknown cycle, from fine screw leads up to a third of a small machine's stroke. The
 # grid is even in 1/pitch; its step is half a period over a travel of 400 mm.
 SHORTEST_PITCH_MM, LONGEST_PITCH_MM, FREQUENCY_STEP = 4.0, 130.0, 1.0 / 800.0
+
+# Positions closer than this are one; a cycle needs its two coefficients, the base's zero and gain, and some to spare.
+GRID_TOLERANCE_MM, FEWEST_PLACES = 0.05, 6
 
 # A driver that hardly varies makes nearly the same columns as none; where the data cannot decide, the plain effect
 # leads and the driven one is told as its rival. 2 log 400 = 12 is what counts as decided.
@@ -53,6 +59,42 @@ def cycles_of_unknown_pitch(chain: Chain) -> tuple[Variant, ...]:
             text = f"{term}:cyclic{pitch:.6g}mm"
             found.append(Variant(f"{term}:cyclic", parse_effect(text, chain), count))
     return tuple(found)
+
+
+def resolvable(variants: Iterable[Variant], context: Context) -> list[Variant]:
+    """The cycles that the plan can tell from longer ones, by where it brought their axis.
+
+    Positions that all stand on a grid (modules 50 mm apart) take every pitch below twice its step for a longer one
+    (Nyquist), and a cycle between fewer than ``FEWEST_PLACES`` places fits whatever is there. Positions that lie
+    anyhow have no such limit.
+    """
+    limits = {
+        joint.name: _shortest_pitch(context.positions[:, place])
+        for place, joint in enumerate(context.chain.joints)
+        if joint.kind == "linear"
+    }
+    kept = []
+    for variant in variants:
+        effect = variant.effect
+        assert isinstance(effect, ChainEffect)
+        assert isinstance(effect.shape, Cyclic)
+        if effect.shape.pitch >= limits[context.chain.joints[effect.term.joint].name]:
+            kept.append(variant)
+    return kept
+
+
+def _shortest_pitch(positions: Array) -> float:
+    """The shortest pitch in mm that positions (n,) of an axis can tell; infinite where there are too few."""
+    places = np.unique(np.round(positions / GRID_TOLERANCE_MM)) * GRID_TOLERANCE_MM
+    steps = np.diff(places)
+    # Touches of one nominal place scatter by less than a step of the grid.
+    real = steps[steps > SHORTEST_PITCH_MM / 2.0]
+    if len(real) + 1 < FEWEST_PLACES:
+        return float("inf") if not len(steps) or len(real) == len(steps) else 0.0
+    step = float(real.min())
+    multiples = real / step
+    on_grid = len(real) == len(steps) and np.all(np.abs(multiples - np.round(multiples)) < 0.02)
+    return 2.0 * step if on_grid else 0.0
 
 
 def with_drivers(effect: ChainEffect | ArtefactEffect, drivers: Iterable[str]) -> list[Variant]:

@@ -114,17 +114,22 @@ def _common_step(left: Array, whole: Array, residual: Array) -> tuple[Array, Arr
     return -inverse @ (u.T @ residual.reshape(-1)), inverse @ inverse.T, free
 
 
-def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, common: Array) -> Solution:
+def solve(
+    linearise: Callable[[Array, Array], Linearisation],
+    local: Array,
+    common: Array,
+    most: int = MOST_ITERATIONS,
+) -> Solution:
     """The least-squares point by Gauss-Newton, from the start ``local`` (R, p) and ``common`` (c,).
 
-    Raises DataError if it does not converge, which means readings that contradict the machine file (a wrong
-    sign, a wrong axis or a ball confused with another).
+    Raises DataError if it does not converge in ``most`` steps, which means readings that contradict the machine file
+    (a wrong sign, a wrong axis or a ball confused with another).
     """
     now = linearise(local, common)
     cost = float(np.sum(now.residual**2))
     space, spanned = eliminate(now.local), now.local
     before = np.inf
-    for iteration in range(1, MOST_ITERATIONS + 1):
+    for iteration in range(1, most + 1):
         if now.local is not spanned:
             space, spanned = eliminate(now.local), now.local
         whole = np.concatenate([now.common, now.residual[..., None]], axis=-1)
@@ -147,8 +152,8 @@ def solve(linearise: Callable[[Array, Array], Linearisation], local: Array, comm
             return _solution(local, common, now, space, covariance, free, iteration)
         before = size
     raise DataError(
-        f"the identification did not converge in {MOST_ITERATIONS} steps: the readings contradict the machine file; "
-        "check the axis signs, the topology and the order of the targets"
+        f"the identification did not converge in {most} steps: the readings contradict the machine file; "
+        "check the axis signs, the topology, the order of the targets and the units"
     )
 
 

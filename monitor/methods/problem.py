@@ -22,7 +22,7 @@ from monitor.effects import Basis, ChainEffect, Context, Effect
 from monitor.effects.catalogue import of_balls
 from monitor.exceptions import DataError
 from monitor.machine import MOTION, Evaluation, evaluate
-from monitor.methods.least_squares import Linearisation, Solution, solve
+from monitor.methods.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.methods.searched import STARTS_S, Added, added_in, resolved
 from monitor.records import Array
 
@@ -133,6 +133,11 @@ class ChainProblem(ABC):
     def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
         """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
         return of_balls(drivers)
+
+    @property
+    def gross_times(self) -> float:
+        """A residual of so many stated standard uncertainties is first of all a mistake of the file."""
+        return 100.0
 
     def contradiction(self, solution: Solution) -> str | None:
         """Why the readings cannot come from this chain, in words; None where they may."""
@@ -304,16 +309,21 @@ def stops(problem: ChainProblem, solution: Solution) -> Array:
 Solver = Callable[[ChainProblem], Solution]
 
 
-def solve_problem(problem: ChainProblem, local: Array | None = None, common: Array | None = None) -> Solution:
+def solve_problem(
+    problem: ChainProblem,
+    local: Array | None = None,
+    common: Array | None = None,
+    most: int = MOST_ITERATIONS,
+) -> Solution:
     """The least-squares point of a problem, from ``local`` (R, p) and ``common`` (c,) or from no errors at all.
 
     A searched time constant is begun from several values and the best end is taken, since the sum of squares
     may have more than one minimum in it. Raises DataError where no start converges, or where the readings fit
-    only another machine.
+    only another machine. ``most`` bounds the steps where nothing is searched.
     """
     begin = problem.start if local is None else local
     if common is not None or not any(added.searched for added in problem.shared):
-        solution = solve(problem.linearise, begin, problem.common_start if common is None else common)
+        solution = solve(problem.linearise, begin, problem.common_start if common is None else common, most)
     else:
         solution = _from_several_starts(problem, begin)
     _refuse_another_machine(problem, solution)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from monitor.effects import context_of
+from monitor.effects import Context, context_of
 from monitor.effects.tracker import measured_points
 from monitor.exceptions import DataError
 from monitor.machine import Chain
@@ -21,10 +21,12 @@ from monitor.methods.model import Model, chain_of
 from monitor.methods.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.results import identification
 from monitor.methods.tracking import TrackingProblem, first_guess
-from monitor.records import Campaign
+from monitor.records import Array, Campaign
 
 NAME = "tracker"
 DEFAULT_MODEL = Model("tracker")
+# Three coordinates agree to the last digit by chance once in thousands of rows.
+MOST_COPIES = 0.05
 
 
 def tool_side(chain: Chain) -> Chain:
@@ -48,6 +50,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
     for run in np.unique(context.run):
         if not np.any((context.run == run) & ~np.isin(context.target, list(fixed))):
             raise DataError(f"run {run} of campaign {campaign.name} measured no reflector on the tool")
+    _refuse_copies(campaign, context, points)
     carried, places = first_guess(context, points, fixed)
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     return TrackingProblem(
@@ -59,6 +62,18 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
         fixed=fixed,
         gear_ratios=tuple((name, ratio) for name, ratio in ratios.items() if ratio is not None),
     )
+
+
+def _refuse_copies(campaign: Campaign, context: Context, points: Array) -> None:
+    """Rows that stand there twice to the last digit are no second measurement: noise would look like effects."""
+    targets = np.unique(context.target, return_inverse=True)[1]
+    rows = np.column_stack([context.run, targets, context.positions, points])
+    copies = len(rows) - len(np.unique(rows, axis=0))
+    if copies > MOST_COPIES * len(rows):
+        raise DataError(
+            f"{copies} of {len(rows)} rows of campaign {campaign.name} repeat another row of the same run to the last "
+            "digit, measured point and all: leave the copies out, they are no measurements of their own"
+        )
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:

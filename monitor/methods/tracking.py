@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from monitor.effects import Context
 from monitor.effects.catalogue import of_tracker
+from monitor.exceptions import DataError
 from monitor.machine import Evaluation, evaluate
 from monitor.machine.chain import rotation_about
 from monitor.methods.least_squares import Solution
@@ -33,6 +34,8 @@ LARGEST_DISPLACEMENT, LARGEST_ANGLE = 5.0, 0.02
 # Geometry alone leaves a robot some tenths of a millimetre over a metre. Where a fiftieth of the spread of the
 # points is left, the chain is another one.
 CONTRADICTS = 0.02
+# Points this many times too small or too large are in another unit (cm, inch, m); no error of a chain comes near.
+OTHER_UNIT = 5.0
 AXES: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -192,8 +195,14 @@ def _frame(
     for axis in range(3):
         columns[np.arange(count), :, 12 + 3 * at + axis] = rotation[:, :, axis]
     flat, wanted = columns.reshape(3 * count, -1), -origin.reshape(-1)
-    free = np.linalg.lstsq(flat, wanted, rcond=1e-8)[0]
-    u, _, vt = np.linalg.svd(free[:9].reshape(3, 3) / size)
+    free, _, rank, _ = np.linalg.lstsq(flat, wanted, rcond=1e-8)
+    u, stretch, vt = np.linalg.svd(free[:9].reshape(3, 3) / size)
+    times = float(np.prod(stretch) ** (1.0 / 3.0))
+    if rank == flat.shape[1] and not 1.0 / OTHER_UNIT < times < OTHER_UNIT:
+        raise DataError(
+            f"the measured points would have to be {times:.3g} times as large to come from this chain: check the units "
+            "of the tracker's columns (mm) and of offset_mm"
+        )
     turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
     left = (origin - arm @ turn.T).reshape(-1)
     rest = np.linalg.lstsq(flat[:, 9:], -left, rcond=1e-8)[0]

@@ -5,6 +5,7 @@ format 1, for virtual campaigns and for handing data on. A format is one file in
 are one file in ``methods``; plug-ins come through the entry points of the group ``monitor.readers``.
 """
 
+from monitor.readers.doubts import doubts
 from monitor.readers.folder_names import names_in
 from monitor.readers.linear_axes import read_linear_axes
 from monitor.readers.method_rules import MethodRules, Plan
@@ -15,6 +16,7 @@ __all__ = [
     "MethodRules",
     "Plan",
     "Reader",
+    "doubts",
     "method_rules",
     "names_in",
     "read_campaign",

@@ -13,13 +13,13 @@ from monitor.reporting.certificate import (
     MethodUsed,
     check_complete,
 )
-from monitor.reporting.certificate_pictures import Picture, map_picture, pictures_of
+from monitor.reporting.certificate_matrix import Block, correlation_blocks
+from monitor.reporting.certificate_pictures import Picture, beside, map_picture, pictures_of
 from monitor.reporting.certificate_tables import (
-    Block,
     Row,
     conformity_rows,
-    correlation_blocks,
     result_rows,
+    result_widths,
 )
 from monitor.reporting.certificate_volumetric import POINTS_FILE, printed_map
 from monitor.reporting.certificate_words import amendment, answer
@@ -35,10 +35,12 @@ class PrintedResult:
     state: str
     k_q: str
     rows: tuple[Row, ...]
+    widths: tuple[float, ...]
     explained: Markup
     refused: tuple[Markup, ...]
     half_axes: Markup
     blocks: tuple[Block, ...]
+    beside: bool
     pictures: tuple[Picture, ...]
 
 
@@ -95,10 +97,15 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
     sign = texts.decimal_sign
     k_q, k_p = written_factor(result.k_q, sign), written_factor(result.k_p, sign)
     half_axes = "; ".join(written_factor(axis, sign) for axis in result.half_axes)
+    rows = result_rows(result, texts)
+    heads = (
+        texts("page.symbol"), texts("page.parameter"), texts("page.estimate"), "u", f"U = {k_q} u", texts("page.unit")
+    )  # fmt: skip
     return PrintedResult(
         state=result.state,
         k_q=k_q,
-        rows=result_rows(result, texts),
+        rows=rows,
+        widths=result_widths(rows, heads),
         explained=texts.markup(
             "page.results_explained",
             k_q=k_q,
@@ -113,6 +120,9 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
             for one in result.refused
         ),
         half_axes=texts.markup("page.half_axes", half_axes=half_axes),
-        blocks=correlation_blocks(result.names, result.correlation, texts),
+        blocks=correlation_blocks(
+            result.names, result.correlation, texts, texts("page.correlation", state=result.state)
+        ),
+        beside=beside(result),
         pictures=pictures_of(result, texts),
     )

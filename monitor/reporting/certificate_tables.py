@@ -5,28 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Decimal
 
-from monitor.records import Array
 from monitor.reporting.certificate import ConformityStatement
 from monitor.reporting.certificate_words import verdict_words
+from monitor.reporting.letter_widths import BOLD, MILLIMETRES_A_POINT, in_mm
 from monitor.reporting.numbers import (
     PLUS_MINUS,
     decimal_of,
     round_result,
     round_to_place,
     round_uncertainty,
-    written_correlation,
 )
+from monitor.reporting.palette import PAGE_WIDTH_MM
 from monitor.reporting.results import ResultSet
 from monitor.reporting.texts import Texts
 
-#: Columns of the correlation matrix that stand side by side; a wider matrix is broken into blocks.
-CORRELATION_COLUMNS = 15
-#: Longer names do not fit above a column of the matrix.
-_LONGEST_COLUMN_NAME = 6
+#: Letters of the tables, and what a column of the results needs besides its letters.
+LETTERS_PT, _PADDING_MM = 8.0, 3.2
+#: Longer symbols are broken.
+_MOST_NAME_MM = 46.0
 #: Width of a digit and of the decimal signs in DejaVu Sans, in em (1303 and 651 of 2048 units).
 _DIGIT_EM, _POINT_EM = 1303 / 2048, 651 / 2048
-#: The darkest grey behind a correlation coefficient: dark letters stay readable on it (contrast above 7).
-_DARKEST = 0.38
 
 
 @dataclass(frozen=True)
@@ -45,23 +43,6 @@ class Row:
     description: str
     numbers: tuple[Number, Number, Number]
     unit: str
-
-
-@dataclass(frozen=True)
-class Cell:
-    """A correlation coefficient and the grey behind it (0 black to 255 white)."""
-
-    text: str
-    grey: int
-
-
-@dataclass(frozen=True)
-class Block:
-    """A part of the correlation matrix: its column names and rows of (name, cells)."""
-
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, tuple[Cell, ...]], ...]
-    numbered: bool
 
 
 @dataclass(frozen=True)
@@ -90,6 +71,31 @@ def result_rows(result: ResultSet, texts: Texts) -> tuple[Row, ...]:
     )
 
 
+def result_widths(rows: tuple[Row, ...], heads: tuple[str, str, str, str, str, str]) -> tuple[float, ...]:
+    """The widths in mm of the six columns of the results; the second, which is broken into lines, takes the rest.
+
+    Known before the page is laid out, which then need not try every cell: a third of the time of 149 parameters.
+    """
+    bold = [BOLD * in_mm(words, LETTERS_PT) + _PADDING_MM for words in heads]
+    names = max((BOLD * in_mm(row.name, LETTERS_PT) for row in rows), default=0.0) + _PADDING_MM
+    numbers = [
+        max(
+            (
+                in_mm(row.numbers[place].text, LETTERS_PT)
+                + row.numbers[place].room * LETTERS_PT * MILLIMETRES_A_POINT
+                for row in rows
+            ),
+            default=0.0,
+        )
+        + _PADDING_MM
+        for place in range(3)
+    ]
+    units = max((in_mm(row.unit, LETTERS_PT) for row in rows), default=0.0) + _PADDING_MM
+    wide = [max(pair) for pair in zip([*numbers, units], bold[2:], strict=True)]
+    symbol = min(max(names, bold[0]), _MOST_NAME_MM)
+    return symbol, PAGE_WIDTH_MM - symbol - sum(wide), *wide
+
+
 def aligned(written: list[str], decimal_sign: str) -> list[Number]:
     """Numbers with the room that each needs behind it for all decimal signs to stand below each other."""
     decimals = [len(text.partition(decimal_sign)[2]) for text in written]
@@ -98,31 +104,6 @@ def aligned(written: list[str], decimal_sign: str) -> list[Number]:
         Number(text, round((most - count) * _DIGIT_EM + (_POINT_EM if most and not count else 0.0), 3))
         for text, count in zip(written, decimals, strict=True)
     ]
-
-
-def correlation_blocks(names: tuple[str, ...], correlation: Array, texts: Texts) -> tuple[Block, ...]:
-    """The lower triangle in blocks of columns; rows wholly above the diagonal are left out.
-
-    Names too long for a column are numbered instead.
-    """
-    long = max(map(len, names), default=0) > _LONGEST_COLUMN_NAME
-    heads = tuple(str(place + 1) for place in range(len(names))) if long else names
-    sides = tuple(f"{name} ({place + 1})" for place, name in enumerate(names)) if long else names
-    blocks = []
-    for start in range(0, len(names), CORRELATION_COLUMNS):
-        columns = range(start, min(start + CORRELATION_COLUMNS, len(names)))
-        rows = tuple(
-            (sides[row], tuple(_cell(correlation[row, one], texts) for one in columns if one <= row))
-            for row in range(start, len(names))
-        )
-        blocks.append(Block(tuple(heads[column] for column in columns), rows, long))
-    return tuple(blocks)
-
-
-def _cell(coefficient: float, texts: Texts) -> Cell:
-    # An opaque grey: transparency is what PDF/A-1 readers stumble over, and paper does not need it.
-    grey = round(255 * (1.0 - _DARKEST * min(abs(float(coefficient)), 1.0)))
-    return Cell(written_correlation(float(coefficient), texts.decimal_sign), grey)
 
 
 def conformity_rows(statement: ConformityStatement, texts: Texts) -> PrintedConformity:

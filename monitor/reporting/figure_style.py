@@ -18,22 +18,11 @@ from typing import Any
 from matplotlib import rc_context, rcdefaults, rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import ScalarFormatter
 
 from monitor.exceptions import InputError
-
-#: Relative luminances 0.02, 0.25, 0.68, 0.88, 0.07 and 0.22: blue and orange differ in grey as well as in colour,
-#: and wherever two series meet they differ in marker or line style too.
-INK = "#22262b"
-MID = "#858b93"
-PALE = "#d3d7dc"
-FAINT = "#f1f2f4"
-BLUE = "#1d4e7c"
-ORANGE = "#cc6420"
+from monitor.reporting.palette import INK, MID
 
 MILLIMETRES_PER_INCH = 25.4
-#: The text width of an A4 page with margins of 17 mm.
-PAGE_WIDTH_MM = 176.0
 PNG_DPI = 150
 _TITLE_SIZE = 10.5
 _CAPTION_SIZE = 7.0
@@ -103,25 +92,6 @@ def caption(figure: Figure, text: str) -> None:
     figure.supxlabel(
         textwrap.fill(_kept_together(text), letters), x=0.008, ha="left", fontsize=_CAPTION_SIZE, color=INK
     )
-
-
-class _Decimals(ScalarFormatter):
-    """Numbers along an axis with the decimal sign of a language; the locale of the machine takes no part."""
-
-    def __init__(self, sign: str) -> None:
-        super().__init__()
-        self._sign = sign
-
-    def __call__(self, x: float, pos: int | None = None) -> str:
-        return str(super().__call__(x, pos)).replace(".", self._sign)
-
-
-def decimal_sign(axes: Axes, sign: str) -> None:
-    """Write the numbers along both axes with another decimal sign than the point."""
-    if sign != ".":
-        for axis in (axes.xaxis, axes.yaxis):
-            if isinstance(axis.get_major_formatter(), ScalarFormatter):  # not where words stand
-                axis.set_major_formatter(_Decimals(sign))
 
 
 def zero_line(axes: Axes, *, vertical: bool = False) -> None:

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.figure_style import BLUE, INK, ORANGE, PAGE_WIDTH_MM, new_figure, style, zero_line
+from monitor.reporting.figure_style import new_figure, style, zero_line
+from monitor.reporting.palette import BLUE, INK, ORANGE, PAGE_WIDTH_MM
 
 PANEL_MM = 30.0
 HEAD_MM = 22.0

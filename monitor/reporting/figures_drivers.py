@@ -11,18 +11,8 @@ from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.figure_style import (
-    BLUE,
-    FAINT,
-    INK,
-    MID,
-    ORANGE,
-    PAGE_WIDTH_MM,
-    caption,
-    new_figure,
-    style,
-    zero_line,
-)
+from monitor.reporting.figure_style import caption, new_figure, style, zero_line
+from monitor.reporting.palette import BLUE, FAINT, INK, MID, ORANGE, PAGE_WIDTH_MM
 
 
 def residual_against_driver(

@@ -11,17 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
-from monitor.reporting.figure_style import (
-    BLUE,
-    INK,
-    MID,
-    ORANGE,
-    PAGE_WIDTH_MM,
-    PALE,
-    new_figure,
-    reference_line,
-    style,
-)
+from monitor.reporting.figure_style import new_figure, reference_line, style
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PAGE_WIDTH_MM, PALE
 
 
 def error_falling(

@@ -1,4 +1,4 @@
-"""Figures of the parameters: one result with its intervals, and every run of a campaign by day."""
+"""Figure of the parameters: every run of a campaign by day."""
 
 from __future__ import annotations
 
@@ -12,75 +12,8 @@ from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.figure_style import (
-    BLUE,
-    FAINT,
-    INK,
-    MID,
-    ORANGE,
-    PAGE_WIDTH_MM,
-    caption,
-    new_figure,
-    style,
-    zero_line,
-)
-from monitor.reporting.figure_style import decimal_sign as set_decimal_sign
-
-_ROW_MM = 3.9
-
-
-def parameter_intervals(
-    names: Sequence[str],
-    units: Sequence[str],
-    estimate: npt.ArrayLike,
-    expanded: npt.ArrayLike,
-    *,
-    title: str = "",
-    tolerances: npt.ArrayLike | None = None,
-    width_mm: float = PAGE_WIDTH_MM / 2,
-    decimal_sign: str = ".",
-) -> Figure:
-    """Estimates (m,) with intervals of half-width ``expanded`` (m,), one panel a unit.
-
-    ``tolerances`` (m,) are limits of absolute values, drawn as brackets; NaN where there is none.
-    """
-    values = _array(estimate, (len(names),), "estimate")
-    half = _array(expanded, (len(names),), "expanded")
-    limits = np.full(len(names), np.nan) if tolerances is None else np.asarray(tolerances, dtype=np.float64)
-    kinds = list(dict.fromkeys(units))
-    members = [[place for place, unit in enumerate(units) if unit == kind] for kind in kinds]
-    height = sum(len(part) * _ROW_MM + 9.5 for part in members) + (7.0 if title else 0.0)
-    with style():
-        figure = new_figure(width_mm, height, title)
-        panels = figure.subplots(
-            len(kinds), 1, squeeze=False, height_ratios=[len(part) + 0.8 for part in members]
-        )[:, 0]
-        for axes, kind, part in zip(panels, kinds, members, strict=True):
-            rows = np.arange(len(part))
-            zero_line(axes, vertical=True)
-            axes.errorbar(
-                values[part],
-                rows,
-                xerr=half[part],
-                fmt="o",
-                color=BLUE,
-                markersize=3.2,
-                elinewidth=1.4,
-                capsize=2,
-            )
-            for row, place in zip(rows, part, strict=True):
-                for limit in (-limits[place], limits[place]):
-                    if math.isfinite(limit):
-                        axes.plot([limit, limit], [row - 0.35, row + 0.35], color=INK, linewidth=1.2)
-            axes.set_yticks(rows, [names[place] for place in part])
-            axes.set_ylim(len(part) - 0.4, -0.6)
-            axes.tick_params(axis="y", length=0)
-            axes.set_xlabel(kind, labelpad=1)
-            axes.spines["left"].set_visible(False)
-            axes.grid(axis="y", color=FAINT, linewidth=3.0)
-            axes.margins(x=0.06)
-            set_decimal_sign(axes, decimal_sign)
-    return figure
+from monitor.reporting.figure_style import caption, new_figure, style
+from monitor.reporting.palette import BLUE, FAINT, INK, MID, ORANGE, PAGE_WIDTH_MM
 
 
 def parameters_by_run(

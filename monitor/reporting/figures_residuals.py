@@ -12,19 +12,9 @@ from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.figure_style import (
-    BLUE,
-    INK,
-    ORANGE,
-    PAGE_WIDTH_MM,
-    PALE,
-    caption,
-    decimal_sign,
-    new_figure,
-    reference_line,
-    style,
-)
-from monitor.reporting.texts import Texts, texts_of
+from monitor.reporting.figure_style import caption, new_figure, reference_line, style
+from monitor.reporting.palette import BLUE, INK, ORANGE, PAGE_WIDTH_MM, PALE
+from monitor.reporting.texts import texts_of
 
 #: A residual's arrow: the longest is this part of the workspace's longest edge.
 _LONGEST_ARROW = 0.2
@@ -38,17 +28,16 @@ def residual_bars(
     title: str = "",
     width_mm: float = PAGE_WIDTH_MM,
     height_mm: float = 62.0,
-    texts: Texts | None = None,
 ) -> Figure:
     """RMS residuals in µm as bars, one panel a grouping: ``{"target": (labels, rms_um), ...}``.
 
     ``level_um`` is the probe's repeatability or stated uncertainty, drawn as a line named ``level_name``.
-    Bars above twice the level are marked. The words around them are those of ``texts``, English without.
+    Bars above twice the level are marked.
     """
     if not groups:
         raise DataError("groups is empty; a grouping such as 'target' with its labels and RMS is needed")
     counts = [max(len(labels), 3) for labels, _ in groups.values()]
-    say = texts or texts_of()
+    say = texts_of()
     with style():
         figure = new_figure(width_mm, height_mm, title)
         marked = False
@@ -82,10 +71,8 @@ def residual_bars(
             marked = marked or bool(np.any(high))
         if level_um is not None:
             more = say("figures.hatched") if marked else ""
-            level = f"{level_um:.2g}".replace(".", say.decimal_sign)
-            caption(figure, say("figures.dashed", name=level_name, level=level) + more)
+            caption(figure, say("figures.dashed", name=level_name, level=f"{level_um:.2g}") + more)
         panels[0].set_ylabel(say("figures.residual_axis"))
-        decimal_sign(panels[0], say.decimal_sign)
         top = max(float(np.nanmax(np.asarray(rms, dtype=np.float64))) for _, rms in groups.values())
         panels[0].set_ylim(0.0, 1.18 * max(top, level_um or 0.0) or 1.0)
     return figure

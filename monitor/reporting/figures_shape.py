@@ -10,17 +10,8 @@ from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.figure_style import (
-    BLUE,
-    INK,
-    MID,
-    ORANGE,
-    PAGE_WIDTH_MM,
-    PALE,
-    caption,
-    new_figure,
-    style,
-)
+from monitor.reporting.figure_style import caption, new_figure, style
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PAGE_WIDTH_MM, PALE
 
 #: The largest deviation is drawn as this part of the workpiece's longest edge.
 _LONGEST = 0.12

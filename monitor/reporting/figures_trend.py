@@ -10,19 +10,8 @@ from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
-from monitor.reporting.figure_style import (
-    BLUE,
-    INK,
-    MID,
-    ORANGE,
-    PAGE_WIDTH_MM,
-    PALE,
-    caption,
-    new_figure,
-    reference_line,
-    style,
-    zero_line,
-)
+from monitor.reporting.figure_style import caption, new_figure, reference_line, style, zero_line
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PAGE_WIDTH_MM, PALE
 
 
 def parameter_over_time(

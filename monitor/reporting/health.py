@@ -11,6 +11,7 @@ from datetime import date, datetime
 from typing import Literal
 
 from monitor.reporting.health_comparison import ModelHealth
+from monitor.reporting.map_slices import Slice
 
 State = Literal[
     "out of tolerance",
@@ -145,7 +146,11 @@ class PoseError:
 
 @dataclass(frozen=True)
 class VolumetricMap:
-    """The stored volumetric error map: where it is worst, its expanded uncertainty there, and pose by pose (µm)."""
+    """The stored volumetric error map: where it is worst, its expanded uncertainty there, and pose by pose (µm).
+
+    ``slices`` are its middle with the rotary axes at zero; empty where the machine has no three linear axes. Their
+    expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``.
+    """
 
     run: int
     region: str
@@ -154,6 +159,9 @@ class VolumetricMap:
     expanded_um: float
     rms_um: float
     by_pose: tuple[PoseError, ...]
+    slices: tuple[Slice, ...] = ()
+    k: float = 2.0
+    p: float = 0.95
 
 
 @dataclass(frozen=True)

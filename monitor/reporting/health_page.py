@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from markupsafe import Markup
+
 from monitor.reporting.health import (
     ALARMS,
     STATES,
@@ -17,7 +19,7 @@ from monitor.reporting.health import (
     VolumetricMap,
     fleet_row,
 )
-from monitor.reporting.health_pictures import PrintedPictures, printed_pictures
+from monitor.reporting.health_pictures import PrintedPictures, map_picture, printed_pictures
 from monitor.reporting.health_refusals import PrintedRefusal, printed_refusal
 from monitor.reporting.health_words import day, in_words, micrometres, p_in_words, percent, plain
 from monitor.reporting.numbers import (
@@ -94,6 +96,7 @@ class PrintedMachine:
     conditions: tuple[tuple[str, str], ...]
     fit: tuple[tuple[str, str], ...]
     map: tuple[tuple[str, str], ...]
+    map_picture: Markup
     blind: str
     refused: tuple[tuple[str, str], ...]
     imports: tuple[PrintedRefusal, ...]
@@ -152,6 +155,7 @@ def _page(health: MachineHealth) -> PrintedMachine:
         ),
         fit=_fit(health),
         map=_map(health.map),
+        map_picture=map_picture(health.map),
         blind=", ".join(blind[:_BLIND_SHOWN]) + more if blind else "",
         refused=health.quality.refused,
         imports=tuple(printed_refusal(one) for one in health.quality.refused_imports),

@@ -1,4 +1,4 @@
-"""The three pictures of a machine's page: where the model fails, what is missing, how far the error falls."""
+"""The pictures of a machine's page: its volumetric error, where the model fails, what is missing, how errors fall."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from monitor.reporting.figure_style import BLUE, INK, MID, ORANGE, PALE
 from monitor.reporting.figures_residuals import view_of
+from monitor.reporting.health import VolumetricMap
 from monitor.reporting.health_comparison import ErrorStep, ModelHealth, ResidualAgainst, ResidualMap
-from monitor.reporting.svg_plot import LETTER, SCALE, WIDE, Drawing, Panel
+from monitor.reporting.map_slices import map_drawing
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PALE
+from monitor.reporting.svg_plot import LETTER, SCALE, WIDE, Drawing, Panel, arrow_head
 
 #: The whole text width of the page, and the two parts that stand side by side.
 WIDTH_MM, LEFT_MM, RIGHT_MM = 176.0, 104.0, 66.0
@@ -51,6 +53,14 @@ def printed_pictures(model: ModelHealth | None) -> PrintedPictures:
     return PrintedPictures(where, against, against_says, steps, steps_say)
 
 
+def map_picture(found: VolumetricMap | None) -> Markup:
+    """The volumetric error in three slices, in the greys of a certificate; empty where there is nothing to draw."""
+    if found is None or not found.slices:
+        return Markup()
+    title = "Volumetric error over the workspace in three slices"
+    return Markup(map_drawing(found.slices, title=title, scale_words="length of the error / µm").svg())
+
+
 def where_it_fails(found: ResidualMap) -> str:
     """Residual vectors, magnified, seen along Z, Y and X; the largest tenth thick and in the accent colour."""
     place, size = np.array(found.place_mm), np.array(found.residual_um)
@@ -71,7 +81,7 @@ def where_it_fails(found: ResidualMap) -> str:
                 end = at + vector * 1e-3 * view.magnify
                 x1, y1, x2, y2 = panel.x(at[across]), panel.y(at[up]), panel.x(end[across]), panel.y(end[up])
                 shafts.append(f"M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}")
-                heads.append(_head(x1, y1, x2, y2, _HEAD * (1.3 if large else 1.0)))
+                heads.append(arrow_head(x1, y1, x2, y2, _HEAD * (1.3 if large else 1.0)))
             on.path("".join(shafts), stroke=colour, width=width)
             on.path("".join(heads), fill=colour)
         if place_of == 0:
@@ -195,16 +205,3 @@ def _square(x: float, y: float, half: float) -> str:
 def _circle(x: float, y: float, radius: float) -> str:
     half = f"a{radius:g} {radius:g} 0 1 0"
     return f"M{x - radius:.1f} {y:.1f}{half} {2 * radius:g} 0{half} {-2 * radius:g} 0Z"
-
-
-def _head(x1: float, y1: float, x2: float, y2: float, size: float) -> str:
-    length = float(np.hypot(x2 - x1, y2 - y1))
-    if length < 1.0:
-        return ""
-    size = min(size, 0.6 * length)
-    ux, uy = (x2 - x1) / length, (y2 - y1) / length
-    bx, by = x2 - 1.6 * size * ux, y2 - 1.6 * size * uy
-    return (
-        f"M{x2 + 0.4 * size * ux:.1f} {y2 + 0.4 * size * uy:.1f}L{bx - 0.7 * size * uy:.1f} {by + 0.7 * size * ux:.1f}"
-        f"L{bx + 0.7 * size * uy:.1f} {by - 0.7 * size * ux:.1f}Z"
-    )

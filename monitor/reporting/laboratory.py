@@ -98,7 +98,8 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
     except OSError as error:
         raise InputError(f"{place} cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{place} is not UTF-8: byte {error.start}") from error
+        line = error.object[: error.start].count(b"\n") + 1
+        raise InputError(f"{place}, line {line}, is not UTF-8; save the file as UTF-8 text") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{place} is not TOML: {error}") from error
     faults: list[str] = []

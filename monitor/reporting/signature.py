@@ -107,8 +107,10 @@ def _context(trusted: Path | None) -> Any:
         return ValidationContext(trust_roots=[], allow_fetching=False)
     try:
         roots = list(load_certs_from_pemder([str(trusted)]))  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise InputError(f"{trusted} cannot be read as certificates: {error}") from error
+    except OSError as error:
+        raise InputError(f"{trusted} cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise InputError(f"{trusted} holds no certificates in PEM or DER: {error}") from error
     return ValidationContext(trust_roots=roots, allow_fetching=False)
 
 

@@ -12,6 +12,7 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,8 @@ Key = FileKey | TokenKey
 def sign(pdf: bytes, key: Key) -> bytes:
     """The PDF with a signature by ``key``.
 
-    Raises InputError where the extra is not installed, the key cannot be opened, or is not there.
+    Raises InputError where the extra is not installed, the key cannot be opened, or is not there, and where its
+    certificate is not valid today.
     """
     need_pyhanko()
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
@@ -69,6 +71,7 @@ def sign(pdf: bytes, key: Key) -> bytes:
     )
     out = io.BytesIO()
     with _token_signer(key) if isinstance(key, TokenKey) else _file_signer(key) as signer:
+        _check_in_force(signer.signing_cert)
         signers.sign_pdf(
             IncrementalPdfFileWriter(io.BytesIO(pdf)),
             meta,
@@ -77,6 +80,16 @@ def sign(pdf: bytes, key: Key) -> bytes:
             bytes_reserved=_ROOM_BYTES,
         )
     return out.getvalue()
+
+
+def _check_in_force(certificate: Any) -> None:
+    """A signature with a certificate that has ended, or has not begun, is accepted by nobody."""
+    first, last, now = certificate.not_valid_before, certificate.not_valid_after, datetime.now(UTC)
+    if not first <= now <= last:
+        raise InputError(
+            f"the signing certificate of {certificate.subject.human_friendly} is valid from {first:%Y-%m-%d} to "
+            f"{last:%Y-%m-%d}, not today ({now:%Y-%m-%d}); sign with one that is"
+        )
 
 
 @contextmanager
@@ -93,7 +106,8 @@ def _file_signer(key: FileKey) -> Iterator[Any]:
     except Exception:  # the library below raises by kind of fault; all mean the same to the user
         signer = None
     if signer is None:
-        raise InputError(f"{key.path} is no PKCS#12 file with a key, or its passphrase is another")
+        hint = "; --passphrase-file FILE names the file with its passphrase" if key.passphrase is None else ""
+        raise InputError(f"{key.path} is no PKCS#12 file with a key, or its passphrase is another{hint}")
     yield signer
 
 

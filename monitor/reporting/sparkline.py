@@ -10,8 +10,8 @@ import base64
 import numpy as np
 
 from monitor.records import Array
-from monitor.reporting.figure_style import BLUE, FAINT, INK, MID, ORANGE
 from monitor.reporting.health import ParameterHealth
+from monitor.reporting.palette import BLUE, FAINT, INK, MID, ORANGE
 
 WIDTH_MM, HEIGHT_MM = 52.0, 7.6
 #: Units of the drawing a millimetre, and the empty frame around it in the same units.

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 from html import escape
 
-from monitor.reporting.figure_style import INK, MID, PALE
+from monitor.reporting.palette import INK, MID, PALE
 
 #: Units a millimetre.
 SCALE = 10.0
@@ -42,6 +42,12 @@ class Drawing:
     def path(self, d: str, *, stroke: str = "none", width: float = 0.0, fill: str = "none") -> None:
         """Any path: many lines of one look in one mark."""
         self.marks.append(f'<path d="{d}" stroke="{stroke}" stroke-width="{width:g}" fill="{fill}"/>')
+
+    def dots(self, d: str, colour: str, size: float) -> None:
+        """Round dots where the lines of no length of ``d`` stand: one mark for all of them."""
+        self.marks.append(
+            f'<path d="{d}" stroke="{colour}" stroke-width="{size:g}" stroke-linecap="round" fill="none"/>'
+        )
 
     def text(
         self, x: float, y: float, words: str, *, anchor: str = "start", bold: bool = False, colour: str = INK,
@@ -88,7 +94,7 @@ class Panel:
     ) -> None:
         """Axes with ticks and names; ``named`` ticks across take the place of numbers."""
         bottom = self.top + self.height
-        shown = {at: _number(at) for at in nice_ticks(*self.across, ticks)} if named is None else named
+        shown = {at: tick_words(at) for at in nice_ticks(*self.across, ticks)} if named is None else named
         for value, words in shown.items():
             at = self.x(value)
             on.line(at, bottom, at, bottom + 8, MID, 2)
@@ -97,7 +103,7 @@ class Panel:
             at = self.y(value)
             on.line(self.left, at, self.left + self.width, at, PALE, 1.5)
             on.line(self.left - 8, at, self.left, at, MID, 2)
-            on.text(self.left - 13, at + 0.36 * LETTER, _number(value), anchor="end")
+            on.text(self.left - 13, at + 0.36 * LETTER, tick_words(value), anchor="end")
         if self.up[0] < 0.0 < self.up[1]:
             on.line(self.left, self.y(0.0), self.left + self.width, self.y(0.0), MID, 2.4)
         on.path(
@@ -119,5 +125,20 @@ def nice_ticks(low: float, high: float, most: int) -> list[float]:
     return [place * step for place in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
-def _number(value: float) -> str:
-    return f"{value:.6g}".replace("-", "\N{MINUS SIGN}") if abs(value) > 1e-12 else "0"
+def tick_words(value: float, sign: str = ".") -> str:
+    """A number along an axis, with the decimal ``sign`` of a language."""
+    return f"{value:.6g}".replace("-", "\N{MINUS SIGN}").replace(".", sign) if abs(value) > 1e-12 else "0"
+
+
+def arrow_head(x1: float, y1: float, x2: float, y2: float, size: float) -> str:
+    """The path of a triangle at the end of a line from (x1, y1), smaller on a short line, none on a point."""
+    length = math.hypot(x2 - x1, y2 - y1)
+    if length < 1.0:
+        return ""
+    size = min(size, 0.6 * length)
+    ux, uy = (x2 - x1) / length, (y2 - y1) / length
+    bx, by = x2 - 1.6 * size * ux, y2 - 1.6 * size * uy
+    return (
+        f"M{x2 + 0.4 * size * ux:.1f} {y2 + 0.4 * size * uy:.1f}L{bx - 0.7 * size * uy:.1f} {by + 0.7 * size * ux:.1f}"
+        f"L{bx + 0.7 * size * uy:.1f} {by - 0.7 * size * ux:.1f}Z"
+    )

@@ -18,7 +18,10 @@ _DIRECTIONS = {
 #: An error of a table at a place, ``EXX(-88)``, and a point of a shape, ``shape(W7)``.
 _AT = re.compile(r"(?P<symbol>E[XYZABC]0?(?P<axis>[XYZUVWABC]\d*))\((?P<place>[^()]+)\)")
 _SHAPE = re.compile(r"shape\((?P<point>.+)\)")
-_SYMBOL = re.compile(r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*)(?::(?P<rest>.+))?")
+#: ``J2`` is a joint of a robot: the name does not say along which direction its axis lies.
+_SYMBOL = re.compile(
+    r"E(?P<direction>[XYZABC])(?P<location>0?)(?P<axis>[XYZUVWABC]\d*|J\d+)(?::(?P<rest>.+))?"
+)
 
 
 def describe(symbol: str, texts: Texts | None = None) -> str:
@@ -39,6 +42,8 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
         return symbol
     direction, turns = _DIRECTIONS[match["direction"]]
     axis, rest = match["axis"], match["rest"]
+    if axis[0] == "J" and not match["location"]:
+        return symbol  # its roll, tilts and displacements cannot be told apart by the name
     spindle = len(axis) > 1 and axis[0] in "ABC"
     named = say("terms.spindle" if spindle else "terms.axis", name=axis)
     kind = (

@@ -22,6 +22,7 @@ from monitor.statistics.fdr import FalseDiscoveries, control_false_discoveries
 from monitor.statistics.forecast import Crossing, Forecast, forecast, predict
 from monitor.statistics.groups import Selection, group_by, select_runs
 from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
+from monitor.statistics.joint_backtest import LengthBacktest, backtest_longest
 from monitor.statistics.joint_forecast import LengthForecast, forecast_longest, residual_correlation
 from monitor.statistics.means import AnalysisOfVariance, GroupTest, anova, kruskal_wallis, welch_anova
 from monitor.statistics.monotone import MonotoneTrend, mann_kendall
@@ -50,6 +51,7 @@ __all__ = [
     "Histogram",
     "History",
     "Homogeneity",
+    "LengthBacktest",
     "LengthForecast",
     "MonotoneTrend",
     "Normality",
@@ -63,6 +65,7 @@ __all__ = [
     "WarmUp",
     "anova",
     "backtest",
+    "backtest_longest",
     "bartlett",
     "box_m",
     "control_false_discoveries",

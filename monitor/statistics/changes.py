@@ -63,6 +63,11 @@ class _Series:
     u: Array | None
     day: npt.NDArray[np.intp] | None
 
+    @property
+    def searched(self) -> bool:
+        """Whether there are runs enough, and any scatter, for a search."""
+        return len(self.y) >= 2 * EDGE + 2 and bool(np.ptp(self.y) > 0.0)
+
     def part(self, start: int, stop: int) -> _Series:
         own = None if self.u is None else self.u[start:stop]
         day = None if self.day is None else np.unique(self.day[start:stop], return_inverse=True)[1]
@@ -139,16 +144,29 @@ class _Search:
         self.rng, self.trials = rng, trials
         self._kept: dict[tuple[object, ...], Scanner] = {}
 
-    def scan(self, series: _Series, base: Base, level: float) -> Scan:
+    def scanner(self, series: _Series, base: Base) -> Scanner:
         plan = (series.t, series.u, series.day)
         key = (base, *(None if one is None else one.tobytes() for one in plan))
         if key not in self._kept:
             self._kept[key] = Scanner(series.t, series.u, base, series.day)
-        return self._kept[key].scan(series.y, self.rng, self.trials, level)
+        return self._kept[key]
+
+    def look(self, every: Sequence[_Series]) -> None:
+        """Prepare the first scan of pieces: those of one plan together."""
+        together: dict[int, tuple[Scanner, list[Array]]] = {}
+        for series in every:
+            if series.searched:
+                scanner = self.scanner(series, "constant")
+                together.setdefault(id(scanner), (scanner, []))[1].append(series.y)
+        for scanner, values in together.values():
+            scanner.look(values)
+
+    def scan(self, series: _Series, base: Base, level: float) -> Scan:
+        return self.scanner(series, base).scan(series.y, self.rng, self.trials, level)
 
     def piece(self, series: _Series, offset: int, level: float) -> tuple[list[Change], list[Change]]:
         """Changes and trends of one piece of history, split again at every step found."""
-        if len(series.y) < 2 * EDGE + 2 or np.ptp(series.y) == 0.0:
+        if not series.searched:
             return [], []
         found = self.scan(series, "constant", level)
         if found.p_value > level:
@@ -197,7 +215,7 @@ def find_changes(
     may share a component. ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
     holds for whatever dependence among them; inside a piece every step that is found splits it again at the
     same level. It holds for runs whose neighbours correlate by up to 0.7 and for day components up to
-    the scatter of a run: whatever of these a series does not refute is allowed for (see ``scan``), so for
+    twice the scatter of a run: whatever of these a series does not refute is allowed for (see ``scan``), so for
     independent runs the rate is below it. Measured rates and power: docs/trials-statistics.md. Pieces of fewer
     than 6 runs are not searched. Raises ``DataError`` for times that fall, unknown names in ``u``, trials that
     cannot reach the level, or non-finite values.
@@ -229,14 +247,17 @@ def find_changes(
     search = _Search(rng, trials)
     changes: list[Change] = []
     trends: list[Change] = []
+    parts = []
     for name, recorded in values.items():
         y = as_vector(recorded, name, length=len(t))
         own = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
         series = _Series(name, y, t, own, _repeated(day))
-        for start, stop in pieces:
-            found, slopes = search.piece(series.part(start, stop), start, level)
-            changes += found
-            trends += slopes
+        parts += [(series.part(start, stop), start) for start, stop in pieces]
+    search.look([part for part, _ in parts])
+    for part, start in parts:
+        found, slopes = search.piece(part, start, level)
+        changes += found
+        trends += slopes
     order = {name: i for i, name in enumerate(values)}
     changes.sort(key=lambda c: (c.index, order[c.parameter]))
     return History(tuple(changes), tuple(trends), false_alarm, trials)

@@ -81,7 +81,7 @@ def residual_correlation(
     return np.where(off, (1.0 - shrink) * r, 1.0), shrink, count
 
 
-def _draws(
+def draw_lines(
     lines: Sequence[Trend], correlation: Array, rng: np.random.Generator, count: int
 ) -> tuple[Array, Array, Array]:
     """Deviations (count, p) of level and slope of each line and of a run about it; each a t of the line's freedom."""
@@ -97,7 +97,7 @@ def _draws(
     return level * heavy, slope * heavy, z[2] * np.array([line.run_sd for line in lines]) * heavy
 
 
-def _longest(parameters: Array, sensitivity: Array, offset: Array) -> Array:
+def longest(parameters: Array, sensitivity: Array, offset: Array) -> Array:
     """Longest of the vectors of each row (m, p) of parameters, (m,)."""
     k = len(offset)
     vectors = parameters @ sensitivity.reshape(3 * k, -1).T + offset.reshape(-1)
@@ -150,7 +150,7 @@ def forecast_longest(
         raise DataError(f"horizon is {horizon}; it must lie after now, {now}.")
     as_probability(reliability, "reliability")
     tail = (1.0 - as_probability(level, "level")) / 2.0
-    level_dev, slope_dev, run_dev = _draws(lines, correlation, rng, draws)
+    level_dev, slope_dev, run_dev = draw_lines(lines, correlation, rng, draws)
     centre = np.array([line.at for line in lines])
 
     def best(t: float) -> Array:
@@ -168,10 +168,10 @@ def forecast_longest(
 
     def lengths(t: float, of_runs: bool) -> Array:
         deviation = level_dev + slope_dev * (t - centre)
-        return _longest(best(t) + deviation + (run_dev if of_runs else 0.0), s, v)
+        return longest(best(t) + deviation + (run_dev if of_runs else 0.0), s, v)
 
     of_lines = np.column_stack([lengths(t, False) for t in times])
-    certain = np.array([[_longest(best(t)[np.newaxis], s, v)[0] for t in times]])
+    certain = np.array([[longest(best(t)[np.newaxis], s, v)[0] for t in times]])
     first = np.sort(_first_crossing(times, of_lines, limit))
     crossing = float(_first_crossing(times, certain, limit)[0])
     # Order statistics: an interpolated quantile of infinities is not a number.

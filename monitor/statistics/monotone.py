@@ -55,7 +55,7 @@ def lag_one(residual: Array, *, fitted: int) -> float:
     return float(np.clip(r + (fitted + (fitted + 3) * r) / n, -0.95, 0.95))
 
 
-def _pairs(values: Array, times: Array) -> tuple[Array, Array]:
+def pairs(values: Array, times: Array) -> tuple[Array, Array]:
     """Rise (m,) and slope (m,) of every pair of different times, the later less the earlier; times must not fall."""
     earlier, later = _places(len(values))
     rise, apart = values[later] - values[earlier], times[later] - times[earlier]
@@ -71,14 +71,17 @@ def _places(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     return earlier, later
 
 
-def theil_sen(values: Array, times: Array, level: float) -> tuple[float, tuple[float, float]]:
+def theil_sen(
+    values: Array, times: Array, level: float, found: tuple[Array, Array] | None = None
+) -> tuple[float, tuple[float, float]]:
     """Median slope of all pairs of ``values`` (n,) over ``times`` (n,), which must not fall, and its interval.
 
     Source: P. K. Sen, J. Am. Stat. Assoc. 63 (1968) 1379, Eq. (2.6) with its variance for ties; the numbers are those
-    of ``scipy.stats.theilslopes``, of which only the ranks that are asked for are sorted out.
+    of ``scipy.stats.theilslopes``, of which only the ranks that are asked for are sorted out. ``found``: the
+    ``pairs``, where they are known.
     """
     n = len(values)
-    slopes = _pairs(values, times)[1]
+    slopes = (found or pairs(values, times))[1]
     many = len(slopes)
     variance = n * (n - 1.0) * (2 * n + 5) / 18.0
     for column in (values, times):
@@ -92,9 +95,16 @@ def theil_sen(values: Array, times: Array, level: float) -> tuple[float, tuple[f
     return median, (float(slopes[low]), float(slopes[high]))
 
 
-def mann_kendall(values: npt.ArrayLike, times: npt.ArrayLike) -> MonotoneTrend:
+def mann_kendall(
+    values: npt.ArrayLike,
+    times: npt.ArrayLike,
+    *,
+    found: tuple[Array, Array] | None = None,
+    slope: float | None = None,
+) -> MonotoneTrend:
     """Mann-Kendall of ``values`` (n,) in the order of ``times`` (n,), which must rise; at least 6 values.
 
+    ``found`` and ``slope``: the ``pairs`` and their median, where they are known.
     Ties are corrected for. Raises ``DataError`` for fewer values, times that do not rise or non-finite
     numbers. Sources: M. G. Kendall, Rank Correlation Methods, 1975; K. H. Hamed and A. R. Rao, J. Hydrology
     204 (1998) 182, for ranks of the detrended series; S. Yue and C. Wang, Water Resour. Manage. 18 (2004)
@@ -109,13 +119,13 @@ def mann_kendall(values: npt.ArrayLike, times: npt.ArrayLike) -> MonotoneTrend:
         raise DataError(
             f"times falls or repeats at index {int(np.argmax(np.diff(t) <= 0)) + 1}; it must rise."
         )
-    rise, pairs = _pairs(y, t)
+    rise, slopes = found or pairs(y, t)
     s = int(np.count_nonzero(rise > 0.0) - np.count_nonzero(rise < 0.0))
     ties = np.unique(y, return_counts=True)[1].astype(np.float64)
     variance = (n * (n - 1.0) * (2 * n + 5) - (ties * (ties - 1) * (2 * ties + 5)).sum()) / 18.0
     if variance == 0.0:
         return MonotoneTrend(0, 0.0, 0.0, 1.0, 1.0, 1.0)
-    slope = float(np.median(pairs))
+    slope = float(np.median(slopes)) if slope is None else slope
     ranks = stats.rankdata(y - slope * t)
     seen = lag_one(np.asarray(ranks), fitted=2)
     r = float(np.clip(seen + SCATTER / np.sqrt(n), 0.0, 0.95))

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy import special
 
 from monitor.records import Array
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, candidates
@@ -25,14 +26,14 @@ GRID = np.arange(0.0, 0.91, 0.1)
 #: Beyond this correlation no level is claimed: some dozens of such runs have no constant mean to change from.
 HIGHEST = 0.7
 #: Day components of which the likelihood is computed, in standard deviations of a run. Beyond the last no level is
-#: claimed: four days of which the last differs would then say nothing, however much it differs.
-DAY_GRID = (0.5, 1.0)
+#: claimed: the larger the component allowed for, the larger a step must be that a handful of days still shows.
+DAY_GRID = (0.5, 1.0, 2.0)
 #: A correlation is refuted where the logarithm of its likelihood is so far below the highest: one-sided 97.7 % for
 #: a normal estimate. Chosen by measured rates (docs/trials-statistics.md): 1 leaves 6 % false alarms of 20 runs.
 REFUTED = 2.0
-#: Simulations until a p-value is clearly no finding: so many exceedances end them (Besag and Clifford,
-#: Biometrika 78 (1991) 301), looked at after each block; most searches end with the first.
-EXCEEDANCES, FIRST_BLOCK, BLOCK = 20, 100, 500
+#: Simulations until a p-value is clearly no finding (Besag and Clifford, Biometrika 78 (1991) 301): they end where so
+#: many exceedances, looked at after each block, had this probability at the level. Most searches end with the first.
+HOPELESS, FIRST_BLOCK, BLOCK = 1e-6, 100, 500
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ class Scanner:
         # Places of the shapes for which the level is claimed.
         self._claimed = {i for i in range(len(shapes)) if i >= len(GRID) or GRID[i] <= HIGHEST + 1e-9}
         self._null: dict[tuple[int, int], Array] = {}
+        self._known: dict[bytes, tuple[Array, Array]] = {}
         self._seed: int | None = None
 
     def _prepare(self, shape: Shape, basis: Array) -> _Prepared:
@@ -217,7 +219,7 @@ class Scanner:
         while done < trials:
             upto = min(done + BLOCK if done else FIRST_BLOCK, trials)
             exceeding += int((self._simulated(family, place, upto, rng)[done:] >= gain).sum())
-            if exceeding >= EXCEEDANCES and exceeding / upto > 2.0 * level:
+            if exceeding and special.bdtrc(exceeding - 1, upto, level) < HOPELESS:
                 return exceeding / upto
             done = upto
         return (1 + exceeding) / (trials + 1)
@@ -234,10 +236,19 @@ class Scanner:
             if likely[list(family)].any()
         ]
 
+    def look(self, every: Sequence[Array]) -> None:
+        """Prepare the scan of several series (n,) at once: parameters of one plan cost little more than one."""
+        columns = np.column_stack([self.root * (y - y.mean()) for y in every])
+        plain, best = self._deviances(columns, range(len(self.prepared)))
+        for i, y in enumerate(every):
+            self._known[y.tobytes()] = plain[:, [i]], best[:, [i]]
+
     def scan(self, y: Array, rng: np.random.Generator, trials: int, level: float) -> Scan:
         """The best candidate for ``y`` (n,) and its p-value from ``trials`` simulated series a shape."""
         weighted = (self.root * (y - y.mean()))[:, np.newaxis]
-        plain, best = self._deviances(weighted, range(len(self.prepared)))
+        if y.tobytes() not in self._known:
+            self.look([y])
+        plain, best = self._known[y.tobytes()]
         gains = [float(plain[list(own)].min() - best[list(own)].min()) for own in self.families]
         p = 0.0
         for family, place in self._not_refuted(best[:, 0]):

@@ -15,7 +15,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
 from monitor.statistics.mixed import MixedFit, fit_with_days
-from monitor.statistics.monotone import MonotoneTrend, mann_kendall, theil_sen
+from monitor.statistics.monotone import MonotoneTrend, mann_kendall, pairs, theil_sen
 from monitor.statistics.sums import label_groups
 
 
@@ -63,7 +63,8 @@ def _result(
     fit: MixedFit, at: float, y: Array, u: Array | None, days: tuple[Array, Array], p: float
 ) -> Trend:
     means, moments = days
-    robust, robust_interval = theil_sen(means, moments, p)
+    both = pairs(means, moments)
+    robust, robust_interval = theil_sen(means, moments, p, both)
     ranked = len(means) >= 6
     low, high = fit.interval(p)[1]
     own = 1.0 if u is None else float(np.sqrt(np.mean(u**2)))
@@ -84,7 +85,9 @@ def _result(
         confidence=p,
         robust_slope=robust,
         robust_interval=robust_interval if ranked else None,
-        monotone=mann_kendall(means, moments) if ranked and (np.diff(moments) > 0.0).all() else None,
+        monotone=mann_kendall(means, moments, found=both, slope=robust)
+        if ranked and (np.diff(moments) > 0.0).all()
+        else None,
     )
 
 

@@ -15,7 +15,13 @@ from monitor.store.analyses import (
 )
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
-from monitor.store.catalogue import described_machines, list_campaigns, list_machines, list_runs
+from monitor.store.catalogue import (
+    described_machines,
+    list_campaigns,
+    list_machines,
+    list_runs,
+    list_withdrawn,
+)
 from monitor.store.certificates import (
     StoredCertificate,
     find_certificate,
@@ -37,11 +43,13 @@ from monitor.store.identifications import (
     load_identification,
     save_identification,
 )
+from monitor.store.import_notes import campaign_notes, run_fingerprints
 from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
 from monitor.store.verification import Verification, verify_audit
+from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
 __all__ = [
     "Backup",
@@ -57,6 +65,8 @@ __all__ = [
     "StoredRun",
     "StoredSelection",
     "Verification",
+    "Withdrawal",
+    "campaign_notes",
     "clear_refusals",
     "curve_names",
     "described_machines",
@@ -81,6 +91,7 @@ __all__ = [
     "list_parameters",
     "list_runs",
     "list_selections",
+    "list_withdrawn",
     "load_analysis",
     "load_campaign",
     "load_certificate",
@@ -94,6 +105,7 @@ __all__ = [
     "record_refusal",
     "refusals",
     "restore",
+    "run_fingerprints",
     "save_analysis",
     "save_certificate",
     "save_identification",
@@ -103,4 +115,5 @@ __all__ = [
     "stored_analyses",
     "take_backup",
     "verify_audit",
+    "withdraw_campaign",
 ]

@@ -9,7 +9,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import pandas as pd
 
@@ -100,40 +100,33 @@ def latest_documents(db: Database, kind: str, campaigns: Sequence[str]) -> dict[
     }
 
 
-def load_analysis(
-    db: Database,
-    kind: str,
-    *,
-    campaign: str | None = None,
-    machine: str | None = None,
-    run: int | None = None,
-    model: str | None = None,
-    model_version: int | None = None,
-    method: str | None = None,
-) -> StoredAnalysis:
+class Which(TypedDict, total=False):
+    """What narrows the choice of results; what is left out or None does not."""
+
+    campaign: str | None
+    machine: str | None
+    run: int | None
+    model: str | None
+    model_version: int | None
+    method: str | None
+
+
+def load_analysis(db: Database, kind: str, **which: Unpack[Which]) -> StoredAnalysis:
     """The latest result of a kind; what is named narrows the choice. Raises NotFoundError."""
-    found = stored_analyses(
-        db, kind, campaign=campaign, machine=machine, run=run, model=model, model_version=model_version,
-        method=method, most=1,
-    )  # fmt: skip
+    found = stored_analyses(db, kind, most=1, **which)
     if not found:
-        named = [campaign, machine, None if run is None else f"run {run}", model, method]
+        run = which.get("run")
+        named = [
+            which.get("campaign"), which.get("machine"), None if run is None else f"run {run}", which.get("model"),
+            which.get("method"),
+        ]  # fmt: skip
         about = ", ".join(name for name in named if name is not None)
         raise NotFoundError(f"there is no stored {kind} result{' of ' + about if about else ''} yet")
     return found[0]
 
 
 def stored_analyses(
-    db: Database,
-    kind: str,
-    *,
-    campaign: str | None = None,
-    machine: str | None = None,
-    run: int | None = None,
-    model: str | None = None,
-    model_version: int | None = None,
-    method: str | None = None,
-    most: int = 20,
+    db: Database, kind: str, *, most: int = 20, **which: Unpack[Which]
 ) -> tuple[StoredAnalysis, ...]:
     """The latest results of a kind, the latest first, at ``most`` so many; what is named narrows the choice."""
     rows = db.rows(
@@ -141,7 +134,7 @@ def stored_analyses(
         SELECT a.analysis_id, a.kind, a.machine, c.campaign, a.run, a.model, a.model_version, a.method, a.seed,
                a.document, a.software_version, a.computed_at
         FROM analysis AS a LEFT JOIN campaign AS c USING (campaign_id)
-        WHERE a.kind = $kind
+        WHERE a.kind = $kind AND (a.campaign_id IS NULL OR c.campaign IS NOT NULL)
           AND ($campaign IS NULL OR c.campaign = $campaign)
           AND ($machine IS NULL OR coalesce(a.machine, c.machine) = $machine)
           AND ($run IS NULL OR a.run = $run) AND ($model IS NULL OR a.model = $model)
@@ -150,12 +143,12 @@ def stored_analyses(
         """,
         {
             "kind": kind,
-            "campaign": campaign,
-            "machine": machine,
-            "run": run,
-            "model": model,
-            "version": model_version,
-            "method": method,
+            "campaign": which.get("campaign"),
+            "machine": which.get("machine"),
+            "run": which.get("run"),
+            "model": which.get("model"),
+            "version": which.get("model_version"),
+            "method": which.get("method"),
             "most": most,
         },
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 from typing import Literal
@@ -14,7 +16,9 @@ from monitor.records import Campaign, CurveCampaign, Run, SourceFile
 from monitor.store import audit, probings, record_json
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
-from monitor.store.curves import curve_content, insert_curve, is_curve, load_curve
+from monitor.store.curves import METHOD as CURVE
+from monitor.store.curves import curve_by_number, curve_content, insert_curve, is_curve
+from monitor.store.import_notes import keep_fingerprints, keep_notes, run_fingerprints
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,10 @@ class Imported:
         return f"{self.campaign}: was imported before with the same content, nothing changed ({size})"
 
 
-def import_campaign(db: Database, campaign: Campaign) -> Imported:
+def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ()) -> Imported:
     """Keep a campaign and the bytes of its files, or say that the same is there already.
+
+    ``notes`` are sentences on what looked like a mistake; they are kept with it.
 
     Raises CampaignError, with nothing kept, where a campaign of that name has other content, or its machine
     has another topology in the database; DataError where a number is not finite.
@@ -60,9 +66,9 @@ def import_campaign(db: Database, campaign: Campaign) -> Imported:
                 raise CampaignError(campaign.name, faults)
             return Imported(done.campaign, "unchanged", done.runs, done.probings)
         _keep_machine(db, campaign)
-        campaign_id = db.next_number("campaign", "campaign_id")
+        campaign_id = db.next_number("imported_campaign", "campaign_id")
         db.execute(
-            "INSERT INTO campaign VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO imported_campaign VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             [
                 campaign_id,
                 campaign.name,
@@ -83,7 +89,9 @@ def import_campaign(db: Database, campaign: Campaign) -> Imported:
             )
         _insert_runs(db, campaign_id, campaign.runs)
         probings.insert(db, campaign_id, rows)
+        keep_fingerprints(db, campaign_id, run_fingerprints(campaign.probings))
         audit.record(db, "import", "campaign", campaign.name, content)
+        keep_notes(db, campaign_id, notes)
     return done
 
 
@@ -99,7 +107,7 @@ def import_curve(db: Database, curve: CurveCampaign) -> Imported:
             if faults:
                 raise CampaignError(curve.name, faults)
             return Imported(curve.name, "unchanged", 0, 0, len(curve))
-        insert_curve(db, db.next_number("campaign", "campaign_id"), curve, content)
+        insert_curve(db, db.next_number("imported_campaign", "campaign_id"), curve, content)
         audit.record(db, "import", "campaign", curve.name, content)
     return Imported(curve.name, "imported", 0, 0, len(curve))
 
@@ -111,15 +119,16 @@ def load_campaign(db: Database, name: str) -> Campaign:
             f"campaign {name} is a curve, not a machine: it can be identified, compared and explained "
             "(monitor identify, compare, explain, model)"
         )
-    campaign, _ = _load(db, name)
+    campaign, _ = _load(db, campaign_number(db, name))
     return campaign
 
 
-def stored_content(db: Database, name: str) -> str:
-    """The content hash of a campaign, computed anew from everything that is stored of it."""
-    if is_curve(db, name):
-        return curve_content(load_curve(db, name))
-    return _content(*_load(db, name))
+def stored_content(db: Database, campaign_id: int) -> str:
+    """The content hash of a campaign, withdrawn or not, computed anew from everything that is stored of it."""
+    ((method,),) = db.rows("SELECT method FROM imported_campaign WHERE campaign_id = ?", [campaign_id])
+    if method == CURVE:
+        return curve_content(curve_by_number(db, campaign_id))
+    return _content(*_load(db, campaign_id))
 
 
 def _check_run(run: Run) -> None:
@@ -169,7 +178,10 @@ def _differences(
     now = {file.name: file.sha256 for file in campaign.files}
     if not before and not now and content != stored:
         return [Fault("campaign", None, None, f"its content differs from that imported on {when}")]
-    advice = "give the new content another campaign name"
+    advice = (
+        "give the new content another campaign name, or withdraw what was imported: "
+        f'`monitor withdraw {shlex.quote(campaign.name)} --reason "..."`'
+    )
     faults = []
     for name in sorted(before.keys() | now.keys()):
         if name not in now:
@@ -183,10 +195,21 @@ def _differences(
 
 def _keep_machine(db: Database, campaign: Campaign) -> None:
     machine = campaign.machine
-    known = db.rows("SELECT topology FROM machine WHERE machine = ?", [machine.id])
-    if not known:
-        db.execute("INSERT INTO machine VALUES (?, ?, ?)", [machine.id, machine.topology, utc_now()])
-    elif known[0][0] != machine.topology:
+    # Only campaigns that count hold a machine to its axes: with the last of them a wrong topology is withdrawn, too.
+    known = db.rows(
+        "SELECT DISTINCT machine_description ->> 'topology' FROM campaign WHERE machine = ? AND method <> ?",
+        [machine.id, CURVE],
+    )
+    registered = db.rows(
+        "SELECT arg_max(topology, registration) FROM registered_machine WHERE machine = ?", [machine.id]
+    )
+    if not known and registered != [(machine.topology,)]:
+        number = db.next_number("registered_machine", "registration")
+        db.execute(
+            "INSERT INTO registered_machine VALUES (?, ?, ?, ?)",
+            [number, machine.id, machine.topology, utc_now()],
+        )
+    elif known and known[0][0] != machine.topology:
         raise CampaignError(
             campaign.name,
             [
@@ -220,10 +243,9 @@ def _insert_runs(db: Database, campaign_id: int, added: tuple[Run, ...]) -> None
         )
 
 
-def _load(db: Database, name: str) -> tuple[Campaign, probings.PrintedProbings]:
-    campaign_id = campaign_number(db, name)
-    ((method, machine, probe, artefact),) = db.rows(
-        "SELECT method, machine_description, probe, artefact FROM campaign WHERE campaign_id = ?",
+def _load(db: Database, campaign_id: int) -> tuple[Campaign, probings.PrintedProbings]:
+    ((name, method, machine, probe, artefact),) = db.rows(
+        "SELECT campaign, method, machine_description, probe, artefact FROM imported_campaign WHERE campaign_id = ?",
         [campaign_id],
     )
     rows = probings.select(db, campaign_id)

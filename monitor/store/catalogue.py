@@ -15,6 +15,11 @@ def list_campaigns(db: Database) -> pd.DataFrame:
     return db.frame("SELECT * FROM v_campaigns ORDER BY campaign_id")
 
 
+def list_withdrawn(db: Database) -> pd.DataFrame:
+    """The campaigns that no longer count, by the time of withdrawal: the view ``v_withdrawn_campaigns``."""
+    return db.frame("SELECT * FROM v_withdrawn_campaigns ORDER BY withdrawn_at, campaign_id")
+
+
 def list_runs(db: Database, campaign: str) -> pd.DataFrame:
     """The runs of a campaign in file order: the view ``v_runs``. Raises NotFoundError."""
     campaign_number(db, campaign)
@@ -41,13 +46,26 @@ def campaign_number(db: Database, name: str) -> int:
     """The number of a campaign in the tables. Raises NotFoundError listing what is there."""
     found = db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [name])
     if not found:
-        raise NotFoundError(f"there is no campaign {name!r}; {_what_is_there(db, 'campaign')}")
+        raise NotFoundError(
+            f"there is no campaign {name!r}; {_withdrawn(db, name)}{_what_is_there(db, 'campaign')}"
+        )
     return int(found[0][0])
+
+
+def _withdrawn(db: Database, name: str) -> str:
+    """Whether a campaign of that name was withdrawn, in words before others; empty where none was."""
+    found = db.rows(
+        "SELECT withdrawn_at, reason FROM v_withdrawn_campaigns WHERE campaign = ? ORDER BY withdrawn_at DESC LIMIT 1",
+        [name],
+    )
+    return f"it was withdrawn on {found[0][0]:%Y-%m-%d} ({found[0][1]}); " if found else ""
 
 
 def check_machine(db: Database, machine: str) -> None:
     """Raise NotFoundError, listing what is there, for a machine that is not."""
-    if not db.rows("SELECT machine FROM machine WHERE machine = ?", [machine]):
+    # Not through the view `machine`, which looks at every campaign of the fleet.
+    known = "SELECT 1 FROM campaign WHERE machine = $machine UNION ALL SELECT 1 FROM event WHERE machine = $machine"
+    if not db.rows(f"{known} LIMIT 1", {"machine": machine}):
         raise NotFoundError(f"there is no machine {machine!r}; {_what_is_there(db, 'machine')}")
 
 

@@ -40,11 +40,18 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class StoredCertificate:
-    """A certificate in its present state; ``record`` and ``pdf`` are those of its last document."""
+    """A certificate in its present state; ``record`` and ``pdf`` are those of its last document.
+
+    ``campaign`` is the name of the campaign that it rests on, ``campaign_id`` its number in the tables:
+    ``campaign_withdrawn`` says why where that one no longer counts, and its name may be another's by now.
+    """
 
     number: str
     state: State
     campaign: str
+    campaign_id: int
+    campaign_withdrawn: str | None
+    machine: str
     runs: tuple[int, ...]
     record: Mapping[str, Any]
     pdf: bytes
@@ -102,15 +109,15 @@ def mark_certificate(
                 raise InputError(f"certificate {number} is amended by one of another number; name it")
             load_certificate(db, replaced_by)
         _check_step(db, number, state)
-        campaign_id = campaign_number(db, old.campaign)
-        _append(db, number, state, campaign_id, list(old.runs), [None, None, None], reason, replaced_by)
+        _append(db, number, state, old.campaign_id, list(old.runs), [None, None, None], reason, replaced_by)
 
 
 def load_certificate(db: Database, number: str) -> StoredCertificate:
     """A certificate in its present state, with its last document. Raises NotFoundError listing numbers."""
     entries = db.rows(
-        "SELECT state, campaign, runs, record, pdf, pdf_sha256, t.software_version, made_at, reason, replaced_by "
-        "FROM certificate AS t JOIN campaign USING (campaign_id) WHERE number = ? ORDER BY entry",
+        "SELECT state, runs, record, pdf, pdf_sha256, t.software_version, made_at, t.reason, replaced_by, campaign, "
+        "campaign_id, w.reason, machine FROM certificate AS t JOIN imported_campaign USING (campaign_id) "
+        "LEFT JOIN withdrawn_campaign AS w USING (campaign_id) WHERE number = ? ORDER BY entry",
         [number],
     )
     if not entries:
@@ -119,18 +126,21 @@ def load_certificate(db: Database, number: str) -> StoredCertificate:
         ]
         there = f"there are {', '.join(known)}" if known else "none was made yet"
         raise NotFoundError(f"there is no certificate {number!r}; {there}")
-    document = next(entry for entry in reversed(entries) if entry[4] is not None)
-    state, campaign, runs, *_, reason, replaced_by = entries[-1]
+    document = next(entry for entry in reversed(entries) if entry[3] is not None)
+    state, runs, _, _, _, _, _, reason, replaced_by, campaign, campaign_id, withdrawn, machine = entries[-1]
     return StoredCertificate(
         number,
         state,
         campaign,
+        campaign_id,
+        withdrawn,
+        machine,
         tuple(runs),
-        json.loads(document[3]),
+        json.loads(document[2]),
+        document[3],
         document[4],
         document[5],
         document[6],
-        document[7],
         reason,
         replaced_by,
     )
@@ -171,8 +181,15 @@ def _check_step(db: Database, number: str, state: State) -> None:
     last = db.rows("SELECT state FROM certificate WHERE number = ? ORDER BY entry DESC LIMIT 1", [number])
     present = last[0][0] if last else None
     if state not in _NEXT[present]:
-        allowed = " or ".join(_NEXT[present]) or "nothing else"
-        raise InputError(f"certificate {number} is {present}; it can become {allowed}, not {state}")
+        allowed = " or ".join(_NEXT[present])
+        raise InputError(
+            f"certificate {number} is {present}; "
+            + (
+                f"it can become {allowed}, not {state}"
+                if allowed
+                else "that is final, nothing can be changed"
+            )
+        )
 
 
 def _append(

@@ -33,7 +33,7 @@ def curve_names(db: Database) -> tuple[str, ...]:
 def insert_curve(db: Database, campaign_id: int, curve: CurveCampaign, content: str) -> None:
     """Add a curve whose name is free; the caller holds the transaction."""
     db.execute(
-        "INSERT INTO campaign VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO imported_campaign VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         [
             campaign_id, curve.name, curve.instrument.id, curve.method, json.dumps(asdict(curve.instrument)),
             "{}", "{}", content, __version__, utc_now(),
@@ -69,9 +69,15 @@ def load_curve(db: Database, name: str) -> CurveCampaign:
     campaign_id = campaign_number(db, name)
     if not is_curve(db, name):
         raise DataError(f"campaign {name} is not a curve; `monitor campaigns` shows the method of each")
-    ((method, instrument, response, base, time, uncertainty, names, units),) = db.rows(
-        "SELECT method, machine_description, response, base, time_column, standard_uncertainty, map_keys(units), "
-        "map_values(units) FROM campaign JOIN curve USING (campaign_id) WHERE campaign_id = ?",
+    return curve_by_number(db, campaign_id)
+
+
+def curve_by_number(db: Database, campaign_id: int) -> CurveCampaign:
+    """A curve by its number in the tables, withdrawn or not."""
+    ((name, method, instrument, response, base, time, uncertainty, names, units),) = db.rows(
+        "SELECT campaign, method, machine_description, response, base, time_column, standard_uncertainty, "
+        "map_keys(units), map_values(units) "
+        "FROM imported_campaign JOIN curve USING (campaign_id) WHERE campaign_id = ?",
         [campaign_id],
     )
     rows = db.rows(

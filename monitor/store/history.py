@@ -6,9 +6,10 @@ Arrays for the statistics; people read the same numbers in the view ``v_paramete
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,27 +18,21 @@ import numpy.typing as npt
 from monitor.records import Array
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database
+from monitor.store.identified_values import IdentifiedValues, values_of
 
-# The numbers of a machine's campaigns are read once and are constants of what follows: they prune the blocks of rows
-# that hold none of them, which a joined table of numbers does not.
+# An index gives the campaigns of a machine. Their numbers are read once and are constants of what follows, for which
+# there are indices too: a joined table of numbers would be held against every row of the fleet.
 _CAMPAIGNS = "SELECT campaign_id, campaign, method FROM campaign WHERE machine = ? ORDER BY campaign_id"
 
-# Of each campaign the identification with the most runs, the later of two: what load_identification takes.
-_CHOSEN = """
-SELECT campaign_id, max((CAST(run_count AS BIGINT) << 32) | identification_id) AS best
+_IDENTIFICATIONS = """
+SELECT campaign_id, run_count, identification_id, parameters, units, display_factors
 FROM identification
 WHERE campaign_id IN ({marks}) AND (model = ? OR CAST(? AS VARCHAR) IS NULL AND model = method)
   AND (CAST(? AS INTEGER) IS NULL OR model_version = ?)
-GROUP BY campaign_id
 """
 
 _RUNS = """
 SELECT campaign_id, run, started_at, utc_offset_s, day, warm_up, conditions FROM run WHERE campaign_id IN ({marks})
-"""
-
-_VALUES = """
-SELECT identification_id, run, parameter, value / display_factor AS value, u / display_factor AS u, unit
-FROM parameter_value WHERE identification_id IN ({marks}) AND value IS NOT NULL
 """
 
 _LATEST = """
@@ -62,6 +57,17 @@ FROM (SELECT campaign_id, run, unnest(map_entries(channels)) AS e FROM probing W
 WHERE e.value IS NOT NULL
 GROUP BY ALL ORDER BY ALL
 """
+
+
+@dataclass(frozen=True)
+class _Identified:
+    """The head of an identification."""
+
+    runs: int
+    number: int
+    parameters: list[str]
+    units: list[str]
+    factors: list[float]
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,7 @@ class MachineHistory:
     tolerances: Mapping[str, float]
     unidentified: tuple[str, ...]
 
-    @property
+    @cached_property
     def seconds(self) -> Array:
         """Start of each run in seconds since 1970 (n,)."""
         return np.array([at.timestamp() for at in self.started_at])
@@ -117,7 +123,7 @@ def machine_history(
     counts = Counter(row[0] for row in every)
     rows = _ordered(every, chosen, start)
     place = {(row[0], row[2]): i for i, row in enumerate(rows)}
-    names, units, values, u = _values(db, place, parameter)
+    names, units, values, u = _values(db, chosen.values(), place, parameter)
     run = np.array([row[2] for row in rows], dtype=np.int64)
     latest = max(every, key=lambda row: (row[2], row[0]))[0] if every else max(campaigns, default=0)
     return MachineHistory(
@@ -139,7 +145,9 @@ def machine_history(
         ),
         tolerances={name: limit for (_, name), limit in _tolerances(db, "?", [latest]).items()},
         unidentified=tuple(
-            name for number, (name, _) in campaigns.items() if chosen.get(number, (0, 0))[1] < counts[number]
+            name
+            for number, (name, _) in campaigns.items()
+            if counts[number] > (chosen[number].runs if number in chosen else 0)
         ),
     )
 
@@ -151,48 +159,69 @@ def _of(db: Database, sql: str, numbers: list[int]) -> list[tuple[Any, ...]]:
 
 def _chosen(
     db: Database, campaigns: list[int], model: str | None, version: int | None
-) -> dict[int, tuple[int, int]]:
-    """Number and count of runs of the identification that each campaign's results are taken from."""
+) -> dict[int, _Identified]:
+    """Of each campaign the identification with the most runs, the later of two: what load_identification takes."""
     if not campaigns:
         return {}
-    sql = _CHOSEN.format(marks=", ".join("?" * len(campaigns)))
-    found = db.rows(sql, [*campaigns, model, model, version, version])
-    return {campaign: (best & 0xFFFFFFFF, best >> 32) for campaign, best in found}
+    sql = _IDENTIFICATIONS.format(marks=", ".join("?" * len(campaigns)))
+    found: dict[int, _Identified] = {}
+    for campaign, *row in db.rows(sql, [*campaigns, model, model, version, version]):
+        one = _Identified(*row)
+        if campaign not in found or (one.runs, one.number) > (found[campaign].runs, found[campaign].number):
+            found[campaign] = one
+    return found
 
 
 def _ordered(
-    every: list[tuple[Any, ...]], chosen: dict[int, tuple[int, int]], since: datetime | None
+    every: list[tuple[Any, ...]], chosen: dict[int, _Identified], since: datetime | None
 ) -> list[tuple[Any, ...]]:
     """The runs with an identification, its number before them, in the order of time."""
     rows = [
-        (chosen[row[0]][0], *row) for row in every if row[0] in chosen and (since is None or row[2] >= since)
+        (chosen[row[0]].number, *row)
+        for row in every
+        if row[0] in chosen and (since is None or row[2] >= since)
     ]
     return sorted(rows, key=lambda row: (row[3], row[0], row[2]))
 
 
 def _values(
-    db: Database, place: dict[tuple[int, int], int], parameter: str | None
+    db: Database, chosen: Iterable[_Identified], place: dict[tuple[int, int], int], parameter: str | None
 ) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
-    numbers = sorted({number for number, _ in place})
-    if not numbers:
-        return (), (), np.zeros((0, 0)), np.zeros((0, 0))
-    found = db.arrays(_VALUES.format(marks=", ".join("?" * len(numbers))), numbers)
-    data = {name: np.ma.getdata(column) for name, column in found.items()}
-    data["parameter"] = data["parameter"].astype(np.str_)
-    if parameter is not None:
-        wanted = data["parameter"] == parameter
-        data = {name: column[wanted] for name, column in data.items()}
-    names, first, column = np.unique(data["parameter"], return_index=True, return_inverse=True)
+    """Names, units, values and u (n, p) of the parameters that any of the runs in ``place`` has."""
+    wanted = {number for number, _ in place}
+    heads = sorted((one for one in chosen if one.number in wanted), key=lambda one: one.number)
+    found = values_of(db, [one.number for one in heads]) if heads else {}
+    # Identifications under one version of a model have the same parameters: they are taken together.
+    alike: dict[tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]], list[IdentifiedValues]] = {}
+    for one in heads:
+        head = (tuple(one.parameters), tuple(one.units), tuple(one.factors))
+        alike.setdefault(head, []).append(found[one.number])
+    units: dict[str, str] = {}
+    stacked = []
+    for head, parts in alike.items():
+        value = np.concatenate([part.value for part in parts]) / np.array(head[2])
+        own_u = np.concatenate([part.u for part in parts]) / np.array(head[2])
+        # A run before `since` has values, but no place.
+        rows = np.array(
+            [place.get((part.number, run), -1) for part in parts for run in part.runs.tolist()],
+            dtype=np.int64,
+        )
+        # A parameter that was refused everywhere is none of the history.
+        known = np.isfinite(value).any(axis=0)
+        here = [i for i, name in enumerate(head[0]) if known[i] and parameter in (None, name)]
+        for i in here:
+            units.setdefault(head[0][i], head[1][i])
+        stacked.append((rows, [head[0][i] for i in here], value[:, here], own_u[:, here]))
+    names = tuple(sorted(units))
     values = np.full((len(place), len(names)), np.nan)
     u = np.full_like(values, np.nan)
-    keys = zip(data["identification_id"].tolist(), data["run"].tolist(), strict=True)
-    rows = np.array([place.get(key, -1) for key in keys], dtype=np.int64)
-    # A run before `since` has values, but no place.
-    kept = rows >= 0
-    values[rows[kept], column[kept]] = data["value"][kept]
-    u[rows[kept], column[kept]] = data["u"][kept]
-    units = tuple(str(data["unit"][i]) for i in first)
-    return tuple(str(name) for name in names), units, values, u
+    for rows, own, value, own_u in stacked:
+        kept = rows >= 0
+        columns = np.array([names.index(name) for name in own], dtype=np.int64)
+        where = np.ix_(rows[kept], columns)
+        values[where] = value[kept]
+        u[where] = np.where(np.isnan(value[kept]), np.nan, own_u[kept])
+    return names, tuple(units[name] for name in names), values, u
 
 
 def _conditions(

@@ -12,7 +12,7 @@ import pandas as pd
 
 from monitor import __version__
 from monitor.exceptions import NotFoundError
-from monitor.store import audit
+from monitor.store import audit, identified_values
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.results import (
@@ -53,6 +53,7 @@ def save_identification(db: Database, identification: StoredIdentification) -> i
         for run in identification.runs:
             _insert_run(db, number, run)
         _insert_values(db, number, identification)
+        identified_values.insert_values(db, number, identification)
         _insert_residuals(db, number, identification.runs)
         audit.record(
             db, "save", "identification", str(number), identification_content(number, identification)
@@ -101,7 +102,7 @@ def identification_by_number(db: Database, number: int) -> StoredIdentification:
     """The identification of a number that ``save_identification`` returned. Raises NotFoundError."""
     head = db.rows(
         "SELECT campaign, model, model_version, i.method, parameters, units, display_factors "
-        "FROM identification AS i JOIN campaign USING (campaign_id) WHERE identification_id = ?",
+        "FROM identification AS i JOIN imported_campaign USING (campaign_id) WHERE identification_id = ?",
         [number],
     )
     if not head:
@@ -139,7 +140,7 @@ def list_parameters(
 
 
 def stored_identification_content(db: Database, number: int) -> str:
-    """The content hash computed anew from what is stored; "" where the parameter rows contradict it."""
+    """The content hash computed anew from what is stored; "" where the parameters stored beside it contradict it."""
     identification = identification_by_number(db, number)
     rows = db.rows(
         "SELECT run, parameter, value, u, unit, display_factor FROM parameter_value "
@@ -150,7 +151,8 @@ def stored_identification_content(db: Database, number: int) -> str:
         tuple(None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row)
         for row in _values(identification).itertuples(index=False, name=None)
     ]
-    return identification_content(number, identification) if rows == expected else ""
+    alike = rows == expected and identified_values.agrees(db, number, identification)
+    return identification_content(number, identification) if alike else ""
 
 
 def _insert_run(db: Database, number: int, run: StoredRun) -> None:

@@ -8,6 +8,7 @@ an earlier state: keep the last hash (``Verification.last_sha256``) elsewhere, f
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -19,9 +20,11 @@ from monitor.store.certificates import certificate_faults
 from monitor.store.connection import Database
 from monitor.store.events import event_content
 from monitor.store.identifications import stored_identification_content
+from monitor.store.import_notes import notes_content
 from monitor.store.models import all_models, model_content, model_key
 from monitor.store.refusals import cleared_content, refusal_content
 from monitor.store.selections import selection_content
+from monitor.store.withdrawals import withdrawal_content
 
 
 @dataclass(frozen=True)
@@ -41,10 +44,13 @@ class Verification:
 def verify_audit(db: Database) -> Verification:
     """Hash everything anew and hold it against the audit; takes as long as reading the whole database."""
     faults = [*audit.chain_faults(db), *certificate_faults(db), *_file_faults(db), *_machine_faults(db)]
-    told = {
-        (subject, key): content
-        for subject, key, content in db.rows("SELECT subject, key, content_sha256 FROM audit ORDER BY entry")
-    }
+    told = {}
+    imports: Counter[str] = Counter()
+    for subject, key, content in db.rows("SELECT subject, key, content_sha256 FROM audit ORDER BY entry"):
+        if subject == "campaign":
+            imports[key] += 1
+            key = _of_several(key, imports[key])
+        told[subject, key] = content
     found = dict(_contents(db))
     for subject, key in sorted(told.keys() | found.keys()):
         name = f"{subject} {key}"
@@ -60,13 +66,15 @@ def verify_audit(db: Database) -> Verification:
 
 
 def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
-    for (name,) in db.rows("SELECT campaign FROM campaign ORDER BY campaign_id"):
+    imports: Counter[str] = Counter()
+    for number, name in db.rows("SELECT campaign_id, campaign FROM imported_campaign ORDER BY campaign_id"):
+        imports[name] += 1
         try:
-            content = stored_content(db, name)
+            content = stored_content(db, number)
         except (MonitorError, ValueError, KeyError, TypeError):
             # What can no longer be read was altered, too; the empty hash agrees with nothing.
             content = ""
-        yield ("campaign", name), content
+        yield ("campaign", _of_several(name, imports[name])), content
     for model in all_models(db):
         yield ("model", model_key(model.name, model.version)), model_content(model)
     for (number,) in db.rows("SELECT identification_id FROM identification ORDER BY ALL"):
@@ -85,13 +93,23 @@ def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
         yield ("refused import", str(number)), refusal_content(db, number)
     for (number,) in db.rows("SELECT refusal_id FROM refusal_cleared ORDER BY ALL"):
         yield ("cleared refusal", str(number)), cleared_content(db, number)
+    for (number,) in db.rows("SELECT DISTINCT campaign_id FROM import_note ORDER BY ALL"):
+        yield ("import notes", str(number)), notes_content(db, number)
+    for (number,) in db.rows("SELECT campaign_id FROM withdrawn_campaign ORDER BY ALL"):
+        yield ("withdrawn campaign", str(number)), withdrawal_content(db, number)
     for number, entry, own in db.rows("SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"):
         yield ("certificate", f"{number} entry {entry}"), own
 
 
+def _of_several(name: str, nth: int) -> str:
+    """The key of the nth import of a campaign's name: a name is free again once its campaign is withdrawn."""
+    return name if nth == 1 else f"{name} (import {nth} of that name)"
+
+
 def _file_faults(db: Database) -> Iterator[str]:
     for campaign, file, content, sha256 in db.rows(
-        "SELECT campaign, file, content, sha256 FROM source_file JOIN campaign USING (campaign_id) ORDER BY ALL"
+        "SELECT campaign, file, content, sha256 FROM source_file JOIN imported_campaign USING (campaign_id) "
+        "ORDER BY ALL"
     ):
         if hashlib.sha256(content).hexdigest() != sha256:
             yield f"the file {file} of campaign {campaign} was altered after it was imported"
@@ -99,8 +117,9 @@ def _file_faults(db: Database) -> Iterator[str]:
 
 def _machine_faults(db: Database) -> Iterator[str]:
     for campaign, machine in db.rows(
-        "SELECT campaign, machine FROM campaign LEFT JOIN machine USING (machine) "
-        "WHERE method <> 'curve' AND topology IS DISTINCT FROM (machine_description ->> 'topology') "
+        "SELECT campaign, machine FROM imported_campaign AS c WHERE method <> 'curve' AND NOT EXISTS ("
+        "SELECT 1 FROM registered_machine AS r WHERE r.machine = c.machine "
+        "AND r.topology = (c.machine_description ->> 'topology')) "
         "OR machine IS DISTINCT FROM (machine_description ->> 'id') ORDER BY ALL"
     ):
         yield f"machine {machine} was altered: it differs from its description in campaign {campaign}"

@@ -9,19 +9,22 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import CampaignError, InputError, NotFoundError, StoreError
-from monitor.readers import names_in, read_campaign
+from monitor.readers import doubts, names_in, read_campaign
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import (
     Database,
     Imported,
+    campaign_notes,
     clear_refusals,
     import_campaign,
     import_curve,
     list_campaigns,
     list_runs,
+    list_withdrawn,
     load_campaign,
     record_refusal,
 )
+from monitor.workflow.copied_runs import check_copies
 from monitor.workflow.curve_base import check_base
 
 Document = dict[str, Any]
@@ -52,6 +55,7 @@ def import_folders(
                 "runs": imported.runs,
                 "probings": imported.probings,
                 "rows": imported.rows,
+                "notes": _notes(db, imported),
                 "message": str(imported),
             }
         )
@@ -67,7 +71,8 @@ def _import(db: Database, folder: Path) -> Imported:
             check_base(found)
             imported = import_curve(db, found)
         else:
-            imported = import_campaign(db, found)
+            notes = (*check_copies(db, found), *doubts(found))
+            imported = import_campaign(db, found, notes)
     except StoreError:
         # Nothing is wrong with the folder; and where the database cannot be written nothing can be recorded.
         raise
@@ -81,6 +86,11 @@ def _import(db: Database, folder: Path) -> Imported:
     return imported
 
 
+def _notes(db: Database, imported: Imported) -> list[str]:
+    """What was noticed at this import; nothing of a campaign that was there already."""
+    return list(campaign_notes(db, imported.campaign)) if imported.state == "imported" else []
+
+
 def _whole(folder: Path) -> str:
     try:
         return str(folder.resolve())
@@ -89,13 +99,20 @@ def _whole(folder: Path) -> str:
 
 
 def campaigns(db: Database) -> Document:
-    """The campaigns in the database."""
-    return {"campaigns": records(list_campaigns(db))}
+    """The campaigns in the database, and those that were withdrawn."""
+    return {
+        "campaigns": records(list_campaigns(db)),
+        "withdrawn": records(list_withdrawn(db).drop(columns="campaign_id")),
+    }
 
 
 def runs(db: Database, campaign: str) -> Document:
     """The runs of a campaign with their conditions."""
-    return {"campaign": campaign, "runs": records(list_runs(db, campaign))}
+    return {
+        "campaign": campaign,
+        "runs": records(list_runs(db, campaign)),
+        "notes": list(campaign_notes(db, campaign)),
+    }
 
 
 def records(frame: Any) -> list[Document]:

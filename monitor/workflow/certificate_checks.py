@@ -39,6 +39,7 @@ def summary(db: Database, number: str) -> Document:
         "number": number,
         "state": found.state,
         "campaign": found.campaign,
+        "campaign_withdrawn": found.campaign_withdrawn,
         "runs": list(found.runs),
         "sha256": found.pdf_sha256,
         "software_version": found.software_version,
@@ -148,7 +149,7 @@ def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
         "hash": number is not None,
         "chain": chain.ok,
         "signature": signature.good,
-        "database": state == "issued",
+        "database": state == "issued" and found is not None and found.campaign_withdrawn is None,
     }
     faults = [*signature.faults, *chain.faults]
     if found is None:
@@ -156,6 +157,12 @@ def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
         faults.insert(0, f"no certificate of this database has the content of {file.name}: {why}")
     elif state != "issued":
         faults.insert(0, _no_longer(found))
+    elif found.campaign_withdrawn is not None:
+        faults.insert(
+            0,
+            f"the campaign {found.campaign}, which certificate {number} rests on, was withdrawn: "
+            f"{found.campaign_withdrawn}",
+        )
     ok = all(value for value in checks.values() if value is not None)
     return {
         "number": number,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import hashlib
 import os
@@ -36,6 +37,14 @@ def keep_issued(db: Database, path: Path) -> None:
         raise InputError(f"{path} is certificate {there}; name another file")
 
 
+def why_not(folder: Path, error: OSError) -> str:
+    """Why nothing can be written into a folder, in words: the system calls a file in its place "File exists"."""
+    at = next((one for one in (folder, *folder.parents) if one.exists()), None)
+    return (
+        f"{at} is a file, not a folder" if at is not None and at.is_file() else error.strerror or str(error)
+    )
+
+
 def prepared(path: Path, content: bytes) -> Path:
     """The content, whole on the disk, beside ``path`` under a name that is no certificate's.
 
@@ -51,7 +60,11 @@ def prepared(path: Path, content: bytes) -> Path:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        raise InputError(f"the certificate cannot be written to {path}: {error.strerror or error}") from error
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)  # half a file where the disk is full
+        raise InputError(
+            f"the certificate cannot be written to {path}: {why_not(path.parent, error)}"
+        ) from error
     return part
 
 

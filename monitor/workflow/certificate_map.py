@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.reporting.volumetric_result import Length, Place, VolumetricResult
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.uncertainty import Evaluated
-from monitor.workflow.volumetric import Mapped, map_of
+from monitor.workflow.volumetric import Mapped, at_zero, map_of
 
 
 def volumetric_result(found: Evaluated, state: str) -> VolumetricResult:
-    """The map of an evaluated run in display units. Raises InputError for a machine without three linear axes."""
+    """The map of an evaluated run in display units. Raises InputError where not three linear axes moved."""
     mapped = map_of(found)
-    error, chain, p = mapped.error, mapped.known.chain, found.framework.p
-    linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
-    if len(linear) != 3:
-        raise InputError(f"the map is printed for three linear axes; '{chain.topology}' has {len(linear)}")
-    flat = [name for name, (first, last) in mapped.ranges.items() if not last > first]
-    if flat:
-        raise InputError(
-            f"the map is printed over a volume, but the campaign stood still along {' and '.join(flat)}: say the "
-            "strokes in [machine.axes] of its campaign.toml, or leave the map out"
-        )
+    drawn = at_zero(mapped)
+    error, p = mapped.error, found.framework.p
     k = error.factor(p)
-    each = mapped.points**3  # the first pose: rotary axes at zero
-    signs = np.array([chain.joints[place].sign for place in linear])
     worst = error.worst
     return VolumetricResult(
         state=state,
@@ -48,10 +35,10 @@ def volumetric_result(found: Evaluated, state: str) -> VolumetricResult:
         mean=_length(*error.mean, k),
         rms=_length(*error.rms, k),
         left_out=tuple(mapped.left_out.items()),
-        axes=tuple(chain.joints[place].name for place in linear),
-        readings_mm=error.positions[:each][:, linear] * signs,
-        vectors_um=error.vectors[:each] / MICROMETRE.factor,
-        expanded_um=k * error.u_lengths[:each] / MICROMETRE.factor,
+        axes=drawn.axes,
+        readings_mm=drawn.readings_mm,
+        vectors_um=drawn.vectors_um,
+        expanded_um=k * drawn.u_um,
     )
 
 

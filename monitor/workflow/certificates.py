@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from monitor import __version__
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, NotFoundError
 from monitor.records import Campaign, LinearAxes
 from monitor.reporting.assembly import certificate_record
 from monitor.reporting.certificate import CertificateRecord, Replaced
@@ -70,7 +70,7 @@ def next_number(db: Database, year: int) -> str:
 def issue(
     db: Database,
     campaign: str,
-    run: int,
+    run: int | None,
     laboratory: Path,
     *,
     out: Path | None = None,
@@ -80,13 +80,17 @@ def issue(
 ) -> Document:
     """Issue a certificate for one run: PDF in ``out`` (a folder or a file), record and document in the database.
 
-    ``wishes`` are the fields of ``Wishes``. Raises IncompleteCertificateError with the list of what the laboratory's
-    file and the campaign leave open, InputError where the campaign states no tolerances or the key does not open.
+    ``run`` may be None where the campaign has one run only. ``wishes`` are the fields of ``Wishes``. Raises
+    IncompleteCertificateError with the list of what the laboratory's file and the campaign leave open, InputError where
+    the campaign states no tolerances or the key does not open.
     """
     wanted = Wishes(**wishes)
     stated = read_laboratory(laboratory)
     loaded = load_campaign(db, campaign)
     day = issued_on or date.today()
+    run = _run_of(loaded, run)
+    if number is not None:
+        _check_number(db, number)
     _check_day(loaded, run, day)
     replaced = None
     if wanted.replaces is not None:
@@ -119,6 +123,32 @@ def issue(
         raise
     publish(part, path, chosen)
     return {**summary(db, chosen), "file": str(path)}
+
+
+def _run_of(campaign: Campaign, run: int | None) -> int:
+    """The run that is certified: the one that was asked for, or the only one. Raises InputError where it is open."""
+    known = [one.run for one in campaign.runs]
+    if run is None and len(known) == 1:
+        return known[0]
+    if run is None:
+        raise InputError(
+            f"campaign {campaign.name} has {len(known)} runs ({min(known)} to {max(known)}): --run N says which "
+            "one the certificate is of"
+        )
+    return run
+
+
+def _check_number(db: Database, number: str) -> None:
+    """Before anything is computed: a number is used once. Raises InputError."""
+    try:
+        old = load_certificate(db, number)
+    except NotFoundError:
+        return
+    if old.state != "draft":
+        raise InputError(
+            f"the number {number} is taken, by the {old.state} certificate of campaign {old.campaign}; leave --number "
+            "out for the next free one"
+        )
 
 
 def _check_day(campaign: Campaign, run: int, day: date) -> None:
@@ -167,10 +197,9 @@ def _replaced(db: Database, number: str, reason: str, draft: bool, campaign: Cam
         raise InputError("a draft replaces nothing; leave --replaces out until it is issued")
     if not reason.strip():
         raise InputError(f"say why certificate {number} is replaced: --reason TEXT")
-    machine = load_campaign(db, old.campaign).machine.id
-    if machine != campaign.machine.id:
+    if old.machine != campaign.machine.id:
         raise InputError(
-            f"campaign {campaign.name} is of machine {campaign.machine.id}, certificate {number} of {machine}: "
+            f"campaign {campaign.name} is of machine {campaign.machine.id}, certificate {number} of {old.machine}: "
             "it cannot replace it"
         )
     issued_on = date.fromisoformat(str(old.record["issued_on"]))

@@ -3,17 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
 import numpy as np
 
-from monitor.discovery import Comparison, Explanation, Fit, Missing, explain, fit, version_error
+from monitor.discovery import (
+    Comparison,
+    Explanation,
+    Fit,
+    Missing,
+    Mistake,
+    explain,
+    find_mistakes,
+    fit,
+    is_gross,
+    version_error,
+)
 from monitor.discovery import compare as compare_fit
 from monitor.discovery.compare import SOMETHING_IS_MISSING, Part
 from monitor.discovery.steps import Step
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.methods import method_named
+from monitor.methods.problem import ChainProblem
 from monitor.methods.shared_effects import shared_parameters
 from monitor.records import Campaign
 from monitor.store import Database, StoredModel, is_curve, load_campaign, model_history, save_analysis
@@ -29,6 +42,13 @@ Document = dict[str, Any]
 SEED = 20260302
 # The false discovery rate of a search for missing effects.
 RATE = 0.01
+# Beyond so many stated standard uncertainties after the search nothing of it is an answer.
+HOPELESS_TIMES = 100.0
+# What is said first where more is left than any effect leaves, and no simple exchange brings it down.
+GROSS = (
+    "More is left than the effects of a machine leave: look first for exchanged columns or targets, a wrong sign or "
+    "unit, or the geometry in campaign.toml; of the simple mistakes that were tried none alone explains it. "
+)
 ONE_RUN = (
     "with one run nobody can say what varies from run to run, what stepped between runs, or how well a reading "
     "repeats; measure the same plan again"
@@ -190,9 +210,22 @@ def explanation_document(found: Explanation) -> Document:
         "not_recorded": dict(found.refused),
         "target_word": problem.target_word,
         "held_out": "runs" if len(problem.runs) > 1 else "blocks of poses",
+        "likely_mistakes": [
+            {
+                "what": one.what,
+                "rms_as_recorded_um": _um(one.rms_as_recorded),
+                "rms_undone_um": _um(one.rms_undone),
+            }
+            for one in found.mistakes
+        ],
         "undecided": [ONE_RUN] if len(problem.runs) == 1 else [],
     }
-    document["answer"] = _answer(document)
+    document["answer"] = (
+        mistakes_in_words(found.mistakes)
+        + " Nothing was changed, and no effect was looked for: correct the file first."
+        if found.mistakes
+        else (GROSS if found.final.rms > HOPELESS_TIMES * found.final.sigma else "") + _answer(document)
+    )
     # Where nothing is missing there is nothing to picture.
     document |= (
         picture_documents(found, missing[0]["effect"] if missing else None)
@@ -255,14 +288,46 @@ def explain_campaign(
 def explanation_of(
     campaign: Campaign, model: StoredModel, rate: float = RATE, first: Fit | None = None
 ) -> Explanation:
-    """Which physical effect a model lacks; ``first`` is its fit where that is known."""
-    problem = (
-        method_named(campaign.method).problem_of(campaign, as_model(model))
-        if first is None
-        else first.problem
-    )
+    """Which physical effect a model lacks, or what looks wrong in the file; ``first`` is its fit where that is known.
+
+    Raises DataError where the model cannot be fitted, with what looks wrong in the file where that can be told.
+    """
+
+    def problem_of(one: Campaign) -> ChainProblem:
+        found: ChainProblem = method_named(campaign.method).problem_of(one, as_model(model))
+        return found
+
+    try:
+        first = fit(problem_of(campaign)) if first is None else first
+    except DataError as error:
+        mistakes = find_mistakes(campaign, problem_of, None)
+        raise DataError(f"{error}. {mistakes_in_words(mistakes)}" if mistakes else str(error)) from error
+    mistakes = find_mistakes(campaign, problem_of, first) if is_gross(first) else ()
+    if mistakes:
+        comparison = replace(compare_fit(first, campaign.name, label(model)), verdict=SOMETHING_IS_MISSING)
+        return Explanation(comparison, (), (), (), (), (), (), first, mistakes)
     rng = np.random.default_rng(SEED)
-    return explain(campaign, problem, label(model), rate=rate, rng=rng, first=first)
+    found = explain(campaign, first.problem, label(model), rate=rate, rng=rng, first=first)
+    if found.final.rms > HOPELESS_TIMES * found.final.sigma:
+        # What was found leaves nearly all of it: none of that is an answer.
+        return replace(found, missing=(), suspect=(), moves=(), steps=())
+    return found
+
+
+def mistakes_in_words(found: Sequence[Mistake]) -> str:
+    """What looks wrong in the file, in one sentence."""
+    first = found[0]
+    ways = " or ".join(one.what for one in found)
+    before = (
+        f"residual {_length(first.rms_as_recorded)} as recorded"
+        if np.isfinite(first.rms_as_recorded)
+        else "as recorded the readings fit no machine of this file"
+    )
+    return f"It looks as if {ways}: {before}, residual {_length(first.rms_undone)} with that undone."
+
+
+def _length(mm: float) -> str:
+    return f"{mm:.2g} mm" if mm >= 0.1 else f"{MICROMETRE.to_display(mm):.2g} µm"
 
 
 def save_explanation(

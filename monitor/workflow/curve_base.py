@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from monitor.exceptions import CampaignError, EffectError, Fault
-from monitor.methods.curve import problem_of
+from monitor.methods.curve_problem import problem_of
 from monitor.records import CurveCampaign
 
 

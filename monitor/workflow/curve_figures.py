@@ -10,7 +10,8 @@ import numpy as np
 
 from monitor.discovery.curve_explain import CurveExplanation
 from monitor.effects.curve import SEQUENCE
-from monitor.methods.curve import CurveFit, CurveProblem, fit
+from monitor.methods.curve import CurveFit, fit
+from monitor.methods.curve_problem import CurveProblem
 from monitor.reporting.figure_style import save
 from monitor.reporting.figures_curve import Residuals, residuals_figure
 from monitor.reporting.figures_models import error_falling

@@ -10,11 +10,11 @@ import json
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from datetime import UTC, date, datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from monitor import __version__
 from monitor.exceptions import InputError
@@ -26,6 +26,7 @@ from monitor.store.catalogue import check_machine
 from monitor.uncertainty.engine import Engine, Here, in_order
 from monitor.uncertainty.processes import processes
 from monitor.workflow.campaigns import records
+from monitor.workflow.certificate_files import why_not
 from monitor.workflow.health_history import check_campaigns, makers
 from monitor.workflow.health_machine import Begun, Settings, begun, machine_health
 from monitor.workflow.health_refusals import refused_elsewhere
@@ -77,6 +78,10 @@ def report(
         if machine in (None, str(known["machine"]))
         and (measured_by is None or str(known["machine"]) in measured_by)
     ]
+    try:
+        (out or Path()).mkdir(parents=True, exist_ok=True)  # before minutes of computing
+    except OSError as error:
+        raise InputError(f"the report cannot be written to {out}: {why_not(out or Path(), error)}") from error
     now = (made_at or datetime.now(UTC)).replace(tzinfo=None, microsecond=0)
     with _engine(workers, len(chosen_machines)) as engine:
         rows = _found(db, chosen_machines, chosen, own, engine, progress)
@@ -161,12 +166,9 @@ def _write(
     parts = max(1, -(-len(numbers) // MACHINES_A_PART))
     files = [page]
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        part = page.with_name(page.name + ".part")
-        with part.open("w", encoding="utf-8") as stream:
+        with _becoming(page) as stream:
             for piece in health_html(fleet, _stored(db, numbers)):
-                stream.write(piece)
-        part.replace(page)
+                stream.write(piece.encode("utf-8"))
         # Of nearly the same length, so that no worker waits for another.
         ends = [len(numbers) * place // parts for place in range(parts + 1)]
         tasks = (
@@ -175,13 +177,26 @@ def _write(
         )
         for place, pdf in enumerate(in_order(engine, _pdf, tasks), start=1):
             path = out / (f"{stem}.pdf" if parts == 1 else f"{stem}-part-{place}-of-{parts}.pdf")
-            beside = path.with_name(path.name + ".part")
-            beside.write_bytes(pdf)
-            beside.replace(path)
+            with _becoming(path) as stream:
+                stream.write(pdf)
             files.append(path)
     except OSError as error:
-        raise InputError(f"the report cannot be written to {out}: {error.strerror or error}") from error
+        raise InputError(f"the report cannot be written to {out}: {why_not(out, error)}") from error
     return [str(path) for path in files]
+
+
+@contextmanager
+def _becoming(path: Path) -> Iterator[BinaryIO]:
+    """A file that gets its name when it is whole; of one that could not be written nothing stays."""
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("wb") as stream:
+            yield stream
+        part.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
 
 
 def _stored(db: Database, numbers: list[int]) -> Iterator[MachineHealth]:

@@ -19,7 +19,7 @@ from monitor.reporting.health import (
 from monitor.reporting.health_words import in_words
 from monitor.reporting.symbols import describe
 from monitor.statistics import Change as Found
-from monitor.store import Database
+from monitor.store import Database, campaign_notes
 from monitor.units import COLUMN_UNITS
 from monitor.workflow.health_history import Event, PastRun
 from monitor.workflow.health_series import DriftFound, Series, moment
@@ -158,6 +158,7 @@ def quality_of(
             "SELECT campaign, run, count(*) FROM v_probings WHERE campaign = ? GROUP BY ALL", [name]
         )
     }
+    noticed = [note for name in sorted({run.campaign for run in here}) for note in campaign_notes(db, name)]
     suspect = tuple(
         f"run {one['run']}, touch {one['sequence']}, ball {one['target']}: "
         f"{one['axis']} is off by {one['size_um']:.1f} µm"
@@ -173,6 +174,6 @@ def quality_of(
             (", ".join(one["parameters"]), one["why"]) for one in (evaluated or {}).get("refused", [])
         ),
         blind_spots=tuple((explained or {}).get("blind_spots", [])),
-        remarks=tuple(remarks),
+        remarks=(*noticed, *remarks),
         refused_imports=refused_imports,
     )

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from monitor.reporting.documents import from_document
 from monitor.reporting.health import PoseError, VolumetricMap
+from monitor.reporting.map_slices import Slice
 
 
 def map_told(found: Mapping[str, Any] | None) -> VolumetricMap | None:
@@ -24,6 +26,9 @@ def map_told(found: Mapping[str, Any] | None) -> VolumetricMap | None:
             PoseError(_place(one["at"]) or "no rotary axes", float(one["worst_um"]), float(one["rms_um"]))
             for one in found["by_pose"]
         ),
+        slices=tuple(from_document(Slice, one) for one in found["slices"]),
+        k=float(found["k"]),
+        p=float(found["p"]),
     )
 
 

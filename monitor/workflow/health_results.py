@@ -53,17 +53,18 @@ def found_in(db: Database, last: PastRun, method: str, model: StoredModel, span:
     ):
         uncertainty = None
     explanation = _stored(db, "explanation", span.before, method, **of_campaign)
-    # A version before 0.1 stored no pictures with it.
+    # Versions before 0.1 stored no pictures with them.
     if explanation is not None and "residual_map" not in explanation:
         explanation = None
+    mapped = _stored(db, "volumetric map", span.before, METHOD, **of_run)
+    if mapped is not None and "slices" not in mapped:
+        mapped = None
     history: tuple[Document, ...] | None = ()
     # With one version only there is no history.
     if model.parent is not None:
         steps = _stored(db, "model history", span.before, METHOD, **of_campaign)
         history = None if steps is None else tuple(steps["steps"])
-    return Results(
-        uncertainty, explanation, _stored(db, "volumetric map", span.before, METHOD, **of_run), history
-    )
+    return Results(uncertainty, explanation, mapped, history)
 
 
 def work_of(

@@ -9,7 +9,7 @@ import numpy as np
 from monitor.methods import method_named
 from monitor.methods.identification import Identification, RunIdentification
 from monitor.methods.problem import Solver, solve_problem
-from monitor.records import Array, Campaign
+from monitor.records import Array, Campaign, Machine
 from monitor.store import (
     Database,
     StoredIdentification,
@@ -20,14 +20,10 @@ from monitor.store import (
 )
 from monitor.units import MICROMETRE, Unit
 from monitor.workflow.campaign_parts import only_run
+from monitor.workflow.identification_notes import note
 from monitor.workflow.models import as_model, resolve
 
 Document = dict[str, Any]
-
-# Residuals so many times as large as stated: the statement of a probe is seldom wrong by a factor of three.
-TOO_LARGE = 3.0
-# And so small a part: no probe is twenty times better than its owner says.
-TOO_SMALL = 0.05
 
 
 def parameter_document(estimate: float, u: float, unit: Unit) -> Document:
@@ -45,7 +41,7 @@ def _parameters(
     }
 
 
-def _run_document(found: Identification, run: RunIdentification) -> Document:
+def _run_document(machine: Machine, found: Identification, run: RunIdentification) -> Document:
     return {
         "run": run.run,
         "parameters": _parameters(found.parameters, found.units, run.estimate, run.covariance),
@@ -55,26 +51,8 @@ def _run_document(found: Identification, run: RunIdentification) -> Document:
         "chi_square": run.chi_square,
         "degrees_of_freedom": run.degrees_of_freedom,
         "iterations": found.iterations,
-        "note": _note(run),
+        "note": note(machine, found, run),
     }
-
-
-def _note(run: RunIdentification) -> str:
-    """What has to be known before the standard uncertainties of a run are used; empty where nothing has."""
-    if run.degrees_of_freedom < 1:
-        return ""
-    times = float(np.sqrt(run.chi_square / run.degrees_of_freedom))
-    if times > TOO_LARGE:
-        return (
-            f"run {run.run}: the residuals are {times:.2g} times what the stated uncertainties leave, so u does not "
-            "hold; compare and explain say where the model fails and what is missing"
-        )
-    if times < TOO_SMALL:
-        return (
-            f"run {run.run}: the residuals are far smaller than the stated uncertainties leave ({times:.1g} of it): "
-            "check the units of the columns and the statement"
-        )
-    return ""
 
 
 def _stored(campaign: Campaign, found: Identification, model: str, version: int) -> StoredIdentification:
@@ -132,7 +110,7 @@ def identify(db: Database, campaign: str, model: str | None = None, run: int | N
         "model": found.model,
         "machine": loaded.machine.id,
         "method": found.method,
-        "runs": [_run_document(found, one) for one in found.runs],
+        "runs": [_run_document(loaded.machine, found, one) for one in found.runs],
         "added": _parameters(found.added, found.added_units, found.added_estimate, found.added_covariance),
         "added_refused": [
             {"parameters": list(refusal.parameters), "why": refusal.why} for refusal in found.added_refused

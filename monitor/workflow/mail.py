@@ -166,8 +166,11 @@ def send(settings: MailSettings, message: EmailMessage) -> Sequence[str]:
         raise InputError(f"the mail server {place} refused the message: {error.smtp_code} {said}") from error
     except smtplib.SMTPRecipientsRefused as error:
         raise InputError(f"the mail server {place} took none of {', '.join(error.recipients)}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"the password file {settings.password_file} is not UTF-8; save it so") from error
     except (smtplib.SMTPException, OSError) as error:
-        raise InputError(f"the mail server {place} could not be used: {error}") from error
+        why = getattr(error, "strerror", None) or error
+        raise InputError(f"the mail server {place} could not be used: {why}") from error
     if refused:
         raise InputError(f"the mail server {place} refused {', '.join(refused)}; the others have the message")
     return settings.recipients

@@ -16,8 +16,8 @@ from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods import METHODS
 from monitor.methods.base_effects import base_effects
-from monitor.methods.curve import NAME as CURVE
-from monitor.methods.curve import problem_of
+from monitor.methods.curve_problem import NAME as CURVE
+from monitor.methods.curve_problem import problem_of
 from monitor.methods.model import Model, chain_of
 from monitor.store import (
     Database,

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.methods import tracker
 from monitor.records import Array, Campaign
 from monitor.statistics import Homogeneity, Pooling, homogeneity, pool
 from monitor.store import (
@@ -28,6 +29,8 @@ from monitor.workflow.selections import group
 from monitor.workflow.session_drift import session_drift
 
 Document = dict[str, Any]
+
+OWN_FRAMES = "points seen by a tracker stand in another frame in every run"
 
 
 def _matrix(found: StoredIdentification, runs: list[int]) -> tuple[list[str], list[Any], Array]:
@@ -208,11 +211,13 @@ def _statistics(values: Array, groups: list[str], names: list[str]) -> tuple[Poo
 
 
 def _coordinates(campaign: Campaign, runs: list[int], groups: list[str]) -> Document:
-    found = coordinates(campaign, runs)
+    # What a tracker sees stands in a frame of its own in every run: there are no coordinates to put side by side.
+    outside = campaign.method == tracker.NAME
+    found = None if outside else coordinates(campaign, runs)
     if found is None:
         return {
             "n": 0,
-            "why": "the runs do not follow one plan",
+            "why": OWN_FRAMES if outside else "the runs do not follow one plan",
             "bartlett_p": [],
             "anova_p": [],
             "histograms": {},

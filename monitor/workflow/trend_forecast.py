@@ -49,7 +49,7 @@ def prediction(
 def backtested(series: Series, since: float) -> tuple[Document | None, str | None]:
     """How good forecasts of the piece since ``since`` were: every day foretold by the days before it."""
     piece = series.part(series.t >= since)
-    days = len(np.unique(piece.days))
+    days = piece.day_count
     if not len(piece.t) or np.ptp(piece.t) < SHORTEST_DAYS:
         return None, "no backtest: there is no drift whose forecasts could be looked at"
     if days < BACKTEST_DAYS:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,16 @@ class Series:
             self.hour[chosen], self.offset,
         )  # fmt: skip
 
+    @cached_property
+    def day_count(self) -> int:
+        """Number of different days; their numbers mostly come in order."""
+        rises = np.diff(self.days)
+        return (
+            len(np.unique(self.days))
+            if (rises < 0).any() or not len(self.days)
+            else 1 + int((rises > 0).sum())
+        )
+
     def weights(self) -> Array | None:
         """The uncertainties of the runs, None where a run has none (then all count alike)."""
         return weights_of(self)
@@ -100,7 +111,7 @@ def drift(series: Series, since: float) -> tuple[Document, Trend | None]:
         "slope_per_year": None, "u_slope": None, "slope_interval": None, "p_value": None, "robust_slope_per_year": None,
         "robust_interval": None, "monotone_p": None, "autocorrelation": None, "between_days": None, "within_days": None,
         "since": None if not len(piece.t) else date(float(piece.t[0]), series.offset),
-        "n": len(piece.t), "days": len(np.unique(piece.days)), "why": None,
+        "n": len(piece.t), "days": piece.day_count, "why": None,
     }  # fmt: skip
     span = float(np.ptp(piece.t)) if len(piece.t) else 0.0
     if span < SHORTEST_DAYS:
@@ -142,7 +153,7 @@ def conditions(
             continue
         own, values = series.part(chosen), recorded[chosen]
         channel = column_unit(name) or ONE
-        days = len(np.unique(own.days))
+        days = own.day_count
         try:
             fit = dependence(
                 own.values, own.t, {name: values}, drift=days >= 3, u=own.weights(), days=own.days, unit=unit,
@@ -191,7 +202,7 @@ def cycles(series: Series, since: float) -> tuple[list[Document], str | None]:
             f"{YEAR_COVERAGE_D:g} days of history"
         )
     try:
-        days = len(np.unique(piece.days))
+        days = piece.day_count
         fit = dependence(
             piece.values, piece.t, {}, cycles=wanted, drift=days >= 3, u=piece.weights(), days=piece.days
         )

@@ -12,11 +12,12 @@ from datetime import timedelta
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.effects import ChainEffect
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics import Trend, forecast_longest, predict, residual_correlation
+from monitor.statistics import Trend, backtest_longest, forecast_longest, predict, residual_correlation, trend
 from monitor.store import Database, MachineHistory
 from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
 from monitor.units import MICROMETRE
@@ -120,6 +121,42 @@ def _residuals(lines: Mapping[str, Trend], followed: Mapping[str, Followed], t: 
     return found
 
 
+def _backtest(
+    lines: Mapping[str, Trend],
+    followed: Mapping[str, Followed],
+    t: Array,
+    days: npt.NDArray[np.int64],
+    vectors: _Vectors,
+    rng: np.random.Generator,
+) -> tuple[Document | None, str | None]:
+    """Days since the last change foretold by those before them; a parameter that is held now was held then."""
+    names = list(lines)
+    values, u = np.full((len(t), len(names)), np.nan), np.full((len(t), len(names)), np.nan)
+    weighed = []
+    for column, name in enumerate(names):
+        piece = followed[name].series.part(followed[name].series.t >= followed[name].begins)
+        place = np.searchsorted(t, piece.t)
+        values[place, column], u[place, column] = piece.values, piece.u
+        weighed.append(piece.weights() is not None)
+
+    def fit(column: int, keep: npt.NDArray[np.bool_]) -> Trend:
+        one = followed[names[column]]
+        if one.line is None:
+            own = one.series.part(np.isin(one.series.t, t[keep]))
+            return _held(own, -np.inf)
+        own_u = u[keep, column] if weighed[column] else None
+        return trend(values[keep, column], t[keep], u=own_u, days=days[keep])
+
+    try:
+        found = backtest_longest(values, t, days, fit, vectors.sensitivity, vectors.at_zero, rng=rng)
+    except DataError as error:
+        return None, f"no backtest of the volumetric error: {error}"
+    return {
+        "made": found.made, "inside": found.covered, "share_inside": found.coverage, "level": found.level,
+        "bias_um": found.bias, "rms_um": found.rms,
+    }, None  # fmt: skip
+
+
 def volumetric_forecast(
     db: Database,
     history: MachineHistory,
@@ -142,7 +179,7 @@ def volumetric_forecast(
         "limit_um": limit, "latest_um": None, "crosses_limit_at": None, "crosses_limit_interval": None,
         "next_check": date(check, offset), "predicted_um": None, "predicted_interval_um": None,
         "in_tolerance_at_next_check": None, "recommended_interval_days": None, "held": [], "left_out": [],
-        "correlation_shrunk_by": None, "method": METHOD,
+        "correlation_shrunk_by": None, "method": METHOD, "backtest": None, "why_no_backtest": None,
     }  # fmt: skip
     if limit is None:
         why = (
@@ -168,14 +205,14 @@ def volumetric_forecast(
         for name in kept
         for pair in zip(followed[name].series.t, followed[name].series.days, strict=True)
     )
-    correlation, shrunk, _ = residual_correlation(
-        _residuals(kept, followed, t), np.array([day_of[at] for at in t])
-    )
+    days = np.array([day_of[at] for at in t], dtype=np.int64)
+    correlation, shrunk, _ = residual_correlation(_residuals(kept, followed, t), days)
     horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
     found = forecast_longest(
         list(kept.values()), correlation, vectors.sensitivity, vectors.at_zero, limit, now, [max(check, now)],
         rng=rng, reliability=reliability, horizon=horizon,
     )  # fmt: skip
+    tested, why_untested = _backtest(kept, followed, t, days, vectors, rng)
     low, high = (date(x, offset) if x < horizon else None for x in found.crossing.interval)
     return {
         **empty,
@@ -191,5 +228,7 @@ def volumetric_forecast(
         "left_out": list(vectors.left_out),
         "points": vectors.points,
         "correlation_shrunk_by": shrunk,
+        "backtest": tested,
+        "why_no_backtest": why_untested,
         "why": None,
     }

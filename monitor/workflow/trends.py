@@ -146,6 +146,8 @@ def _parameter(
         "unit": series.unit,
         **slope,
         "latest": float(steady.values[last].mean()),
+        "latest_u": _u_of_mean(steady, last),
+        "latest_runs": int(last.sum()),
         "latest_at": date(float(steady.t[-1]), series.offset),
         "changes": [] if found is None else [_change(one, series) for one in found.changes],
         "drifts": [] if found is None else [_change(one, series) for one in found.trends],
@@ -161,6 +163,13 @@ def _parameter(
         "why_no_backtest": why_untested,
         "control": charts.of(place),
     }, Followed(steady, begins, line)
+
+
+def _u_of_mean(series: Series, chosen: npt.NDArray[np.bool_]) -> float | None:
+    """Standard uncertainty of the mean of runs by their scatter, of a single run as stated; None where not stated."""
+    count = int(chosen.sum())
+    u = float(series.values[chosen].std(ddof=1) / np.sqrt(count)) if count > 1 else float(series.u[chosen][0])
+    return u if np.isfinite(u) else None
 
 
 def _next_check(history: MachineHistory, choice: Choice) -> float:

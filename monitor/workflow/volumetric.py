@@ -12,6 +12,8 @@ import numpy as np
 from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
 from monitor.records import Array, Campaign
+from monitor.reporting.documents import to_document
+from monitor.reporting.map_slices import slices_of
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
 from monitor.units import DEGREE, MICROMETRE
@@ -157,6 +159,59 @@ def _point(mapped: Mapped, place: int, k: float) -> Document:
     }
 
 
+@dataclass(frozen=True)
+class AtZero:
+    """The grid with the rotary axes at zero: the ``axes`` along X, Y and Z, ``readings_mm`` (n, 3) of these, error
+    ``vectors_um`` (n, 3) along X, Y and Z, and the standard uncertainties ``u_um`` (n,) of its lengths."""
+
+    axes: tuple[str, str, str]
+    readings_mm: Array
+    vectors_um: Array
+    u_um: Array
+
+
+def at_zero(mapped: Mapped) -> AtZero:
+    """The part of a map that can be drawn. Raises InputError for a machine without three linear axes that moved."""
+    error, chain = mapped.error, mapped.known.chain
+    # In the order of the machine's directions, as the components of the vectors are; a chain has its own.
+    linear = sorted(
+        (place for place, joint in enumerate(chain.joints) if not joint.turns),
+        key=lambda place: chain.joints[place].main,
+    )
+    if [chain.joints[place].main for place in linear] != [0, 1, 2]:
+        raise InputError(
+            f"the map is drawn for three linear axes along X, Y and Z; '{chain.topology}' has {len(linear)} linear axes"
+            f"{', not along these' if len(linear) == 3 else ''}"
+        )
+    flat = [name for name, (first, last) in mapped.ranges.items() if not last > first]
+    if flat:
+        raise InputError(
+            f"the map is drawn over a volume, but the campaign stood still along {' and '.join(flat)}: say the "
+            "strokes in [machine.axes] of its campaign.toml, or leave the map out"
+        )
+    each = mapped.points**3  # the first pose
+    signs = np.array([chain.joints[place].sign for place in linear])
+    first, second, third = (chain.joints[place].name for place in linear)
+    return AtZero(
+        (first, second, third),
+        error.positions[:each][:, linear] * signs,
+        error.vectors[:each] / MICROMETRE.factor,
+        error.u_lengths[:each] / MICROMETRE.factor,
+    )
+
+
+def _slices(mapped: Mapped, k: float) -> list[Document]:
+    """The middle of the map for the page of a health report; empty where there is nothing to draw."""
+    try:
+        grid_at = at_zero(mapped)
+    except InputError:
+        return []
+    return [
+        to_document(one)
+        for one in slices_of(grid_at.readings_mm, grid_at.vectors_um, k * grid_at.u_um, grid_at.axes)
+    ]
+
+
 def map_document(mapped: Mapped, p: float) -> Document:
     """A map as people see it, in display units."""
     error, chain = mapped.error, mapped.known.chain
@@ -199,6 +254,7 @@ def map_document(mapped: Mapped, p: float) -> Document:
             }
             for number, pose in enumerate(mapped.poses)
         ],
+        "slices": _slices(mapped, k),
     }
 
 
@@ -208,24 +264,18 @@ def map_figures(document: Document, mapped: Mapped, folder: Path) -> list[str]:
     from monitor.reporting.figures_volumetric import volumetric_slices
     from monitor.workflow.figures import make_folder
 
-    make_folder(folder)
-    error, chain = mapped.error, mapped.known.chain
-    linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
-    if len(linear) != 3:
-        raise InputError(f"the map is drawn for three linear axes; '{chain.topology}' has {len(linear)}")
-    each = mapped.points**3
-    signs = np.array([chain.joints[place].sign for place in linear])
-    readings = error.positions[:each][:, linear] * signs
+    drawn = at_zero(mapped)
     worst = document["worst"]
     figure = volumetric_slices(
-        readings,
-        error.vectors[:each] / MICROMETRE.factor,
-        error.u_lengths[:each] / MICROMETRE.factor * document["k"],
-        names=[chain.joints[place].name for place in linear],
+        drawn.readings_mm,
+        drawn.vectors_um,
+        drawn.u_um * document["k"],
+        names=drawn.axes,
         title=f"{document['campaign']}, run {document['run']}: at worst {worst['error_um']:.1f} µm "
         f"± {worst['expanded_um']:.1f} µm, RMS {document['rms']['error_um']:.1f} µm",
         note=f"Rotary axes at zero. Colour: length of the error; arrows: its part in the slice; numbers: expanded "
         f"uncertainty (k = {document['k']:.2f}, p = {document['p']:g}). "
         f"The title is about all {document['region']['rotary_poses']} rotary poses of the plan.",
     )
+    make_folder(folder)
     return [str(save(figure, folder / f"volumetric-error{ending}")) for ending in (".svg", ".png")]

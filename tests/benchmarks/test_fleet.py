@@ -20,6 +20,7 @@ import pytest
 from scipy import stats
 
 from monitor.store import Database, fleet_sums
+from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import cell_tests
 from monitor.workflow.trends import trends
 
@@ -56,12 +57,13 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
     n = {"m": machines, "n": machines * weeks}
     name = "'M' || lpad(CAST(i % $m AS VARCHAR), 5, '0')"
     db.execute(
-        f"INSERT INTO machine SELECT {name}, 'w C B X b Z Y (C1) t', TIMESTAMP '2021-01-04' FROM range($m) AS r(i)",
+        f"INSERT INTO registered_machine SELECT i + 1, {name}, 'w C B X b Z Y (C1) t', TIMESTAMP '2021-01-04' "
+        "FROM range($m) AS r(i)",
         {"m": machines},
     )
     db.execute(
-        f"INSERT INTO campaign SELECT i + 1, {name} || '-W' || (i // $m), {name}, 'samba', '{{}}', '{{}}', '{{}}', "
-        "'', '0', TIMESTAMP '2021-01-04' FROM range($n) AS r(i)",
+        f"INSERT INTO imported_campaign SELECT i + 1, {name} || '-W' || (i // $m), {name}, 'samba', '{{}}', '{{}}', "
+        "'{}', '', '0', TIMESTAMP '2021-01-04' FROM range($n) AS r(i)",
         n,
     )
     db.execute(
@@ -71,8 +73,8 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
         n,
     )
     db.execute(
-        f"INSERT INTO identification SELECT i + 1, i + 1, 'samba', 1, 'samba', {NAMES}, [], [], 4, '0', "
-        "TIMESTAMP '2021-01-04' FROM range($n) AS r(i)",
+        f"INSERT INTO identification SELECT i + 1, i + 1, 'samba', 1, 'samba', {NAMES}, {['µm'] * 15}, {[1e-3] * 15}, "
+        "4, '0', TIMESTAMP '2021-01-04' FROM range($n) AS r(i)",
         {"n": n["n"]},
     )
     db.execute(
@@ -82,6 +84,7 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
         "0.5e-3, 'µm', 1e-3 FROM range($n * 60) AS r(i)",
         {"n": n["n"]},
     )
+    gather_values(db)
 
 
 def test_a_small_copy_gives_the_numbers_of_the_bare_query(tmp_path: Path) -> None:

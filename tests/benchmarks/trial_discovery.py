@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import gzip
-import importlib.util
 import json
 import sys
 import time
@@ -30,6 +29,11 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from by_path import load
+from by_path import simulator as simulator_of
+
 from monitor.discovery import Explanation, Missing, explain, fit
 from monitor.effects.catalogue import catalogue, drivers_of
 from monitor.methods.samba import problem_of
@@ -39,19 +43,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PEAKS_UM = (2.0, 4.0, 8.0)
 VISIBLE_UM = 0.25
 
-
-def _helper() -> Any:
-    path = ROOT / "tests" / "discovery" / "virtual.py"
-    spec = importlib.util.spec_from_file_location("virtual_campaigns", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = sys.modules["virtual_campaigns"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-virtual_campaigns = _helper()
-simulator = virtual_campaigns.simulator()
+simulator = simulator_of()
+virtual_campaigns = load("virtual_campaigns", ROOT / "tests" / "discovery" / "virtual.py")
 
 
 @dataclass(frozen=True)

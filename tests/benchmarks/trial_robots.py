@@ -57,17 +57,15 @@ def hide(rng: np.random.Generator, count: int) -> tuple[robots.Hidden, list[str]
             joint = str(rng.choice(["J2", "J3"]))
             hidden = replace(hidden, compliance={joint: float(rng.uniform(1e-4, 4e-4))})
             names.append(f"E{OWN[joint]}{joint}:compliance@gravity")
-        elif kind == "harmonic":
+        elif kind == "harmonic" and joint not in hidden.harmonic:
             order = int(rng.integers(1, 3))
-            hidden = replace(
-                hidden, harmonic={joint: (order, rng.uniform(1e-4, 3e-4), rng.uniform(0.0, 6.3))}
-            )
+            one = {joint: (order, rng.uniform(1e-4, 3e-4), rng.uniform(0.0, 6.3))}
+            hidden = replace(hidden, harmonic={**hidden.harmonic, **one})
             names.append(f"{term}:harmonic{order}")
-        elif kind == "gear" and not hidden.harmonic:
+        elif kind == "gear" and joint not in hidden.harmonic:
             order = int(rng.integers(40, 200))
-            hidden = replace(
-                hidden, harmonic={joint: (order, rng.uniform(5e-5, 2e-4), rng.uniform(0.0, 6.3))}
-            )
+            one = {joint: (order, rng.uniform(5e-5, 2e-4), rng.uniform(0.0, 6.3))}
+            hidden = replace(hidden, harmonic={**hidden.harmonic, **one})
             names.append(f"{term}:harmonic{order}")
         elif kind == "lag":
             hidden = replace(hidden, lag={joint: float(rng.uniform(5e-5, 2e-4))})
@@ -81,11 +79,11 @@ def hide(rng: np.random.Generator, count: int) -> tuple[robots.Hidden, list[str]
     return hidden, names
 
 
-def trial(seed: int, count: int, poses: int, tally: Tally) -> None:
+def trial(seed: int, count: int, poses: int, tally: Tally, repeatability: float = 0.0) -> None:
     """One robot."""
     rng = np.random.default_rng([seed, count])
     hidden, names = hide(rng, count)
-    made = robots.track(rng, hidden, poses=poses, fixed_every=50)
+    made = robots.track(rng, hidden, poses=poses, fixed_every=50, repeatability_urad=repeatability)
     with tempfile.TemporaryDirectory() as folder:
         campaign = read_campaign(robots.write_tracked(Path(folder) / "robot", made))
     begun = time.process_time()
@@ -115,16 +113,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--poses", type=int, default=1000)
+    parser.add_argument("--repeatability", type=float, default=0.0, help="of every joint, in µrad")
+    parser.add_argument("--hidden", type=int, nargs="+", default=[0, 1, 2, 3], help="effects at once")
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
     options = parser.parse_args()
     print(
         "| hidden | robots | effects | named first | not ruled out | false findings | identify / s | explain / s |"
     )
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     notes: tuple[str, ...] = ()
-    for count in range(4):
+    for count in options.hidden:
         tally = Tally()
-        for seed in range(options.seeds):
-            trial(seed, count, options.poses, tally)
+        for seed in range(options.first, options.first + options.seeds):
+            trial(seed, count, options.poses, tally, options.repeatability)
+            print(
+                f"{count} hidden, seed {seed}: {tally.found} of {tally.hidden} named first, {tally.held} not ruled "
+                f"out, {tally.false} false so far; explain {tally.explain_s[-1]:.1f} s",
+                file=sys.stderr,
+                flush=True,
+            )
         notes += tally.missed
         print(
             f"| {count} | {tally.trials} | {tally.hidden} | {tally.found} | {tally.held} | {tally.false} | "

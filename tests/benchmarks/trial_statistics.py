@@ -9,6 +9,7 @@ import numpy as np
 
 from monitor.statistics import (
     anova,
+    backtest_longest,
     bartlett,
     kruskal_wallis,
     levene,
@@ -141,6 +142,40 @@ def day_alarms(rng: np.random.Generator) -> None:
     table("Changes called where only the days differ, nominal 5 %", head, rows)
 
 
+def day_steps(rng: np.random.Generator) -> None:
+    """Share of histories of a few days with any finding, by the height of a step between two days."""
+    rows = []
+    for days, runs, at in ((4, 5, 2), (5, 4, 3), (10, 4, 6)):
+        n, day = days * runs, np.repeat(np.arange(days), runs)
+        scanner = Scanner(np.arange(n, dtype=float), None, "constant", day)
+        for height in (2.0, 3.0, 5.0, 10.0, 20.0):
+            series = [rng.normal(size=n) + height * (day >= at) for _ in range(400)]
+            rows.append([f"{days} days of {runs}, step after {at}", height, *shares(scanner, series, rng)])
+    head = ["history", "height", "one parameter", "one of 13"]
+    table("A step between days that are alike otherwise, in standard deviations of a run", head, rows)
+
+
+def volumetric(rng: np.random.Generator) -> None:
+    """Held-out days of the longest of eight vectors of six drifting parameters in their 95 % interval."""
+    rows = []
+    for days, runs, component in ((12, 4, 1.0), (24, 3, 1.0), (60, 3, 1.0), (60, 3, 0.0)):
+        made = inside = 0
+        day = np.repeat(np.arange(days), runs)
+        t = 7.0 * day + np.tile(0.05 * np.arange(runs), days)
+        for _ in range(150):
+            mix = np.linalg.cholesky(0.5 * np.eye(6) + 0.5)
+            line = rng.normal(5.0, 3.0, size=6) + rng.normal(0.0, 0.02, size=6) * t[:, np.newaxis]
+            y = line + component * (rng.normal(size=(days, 6)) @ mix.T)[day] + rng.normal(size=(len(t), 6))
+            found = backtest_longest(
+                y, t, day, lambda column, keep, y=y, t=t, day=day: trend(y[keep, column], t[keep], days=day[keep]),
+                rng.normal(size=(8, 3, 6)), np.zeros((8, 3)), rng=rng, foretold=3, draws=1000,
+            )  # fmt: skip
+            made, inside = made + found.made, inside + found.covered
+        rows.append([days, runs, component, made, inside / made])
+    head = ["days", "runs", "day component", "forecasts", "inside"]
+    table("Forecasts of the volumetric error in their 95 % interval", head, rows)
+
+
 def changes(rng: np.random.Generator) -> None:
     """Share of histories with any finding, by the height of a step after three fifths of the runs."""
     rows = []
@@ -159,5 +194,15 @@ def changes(rng: np.random.Generator) -> None:
 
 
 if __name__ == "__main__":
-    for trial in (means, variances, drifts, monotone, false_alarms, day_alarms, changes):
+    for trial in (
+        means,
+        variances,
+        drifts,
+        monotone,
+        false_alarms,
+        day_alarms,
+        day_steps,
+        volumetric,
+        changes,
+    ):
         trial(np.random.default_rng(SEED))

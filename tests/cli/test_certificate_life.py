@@ -30,7 +30,7 @@ def test_withdrawn_is_no_longer_valid_and_says_why(typed: Any, issued: Any) -> N
     assert typed("certificate", "verify", issued.file("2026-0002"), db=issued.db).status == 0
     again = typed("certificate", "withdraw", "2026-0001", "--reason", "once more", db=issued.db)
     assert again.status == 2
-    assert "certificate 2026-0001 is withdrawn; it can become nothing else" in again.err
+    assert "certificate 2026-0001 is withdrawn; that is final" in again.err
 
 
 def test_17025_7_8_8_amending_issues_a_new_certificate_that_names_the_old(

@@ -16,7 +16,7 @@ from monitor.store import Database
     "sql",
     [
         "UPDATE probing SET sequence = sequence + 1000 WHERE run = 1",
-        "UPDATE campaign SET campaign = 'other' WHERE campaign = 'cold-cold'",
+        "UPDATE imported_campaign SET campaign = 'other' WHERE campaign = 'cold-cold'",
         "DELETE FROM audit WHERE entry = 2",
         "UPDATE audit SET actor = 'nobody' WHERE entry = 1",
         "UPDATE source_file SET content = 'x'::BLOB",

@@ -116,3 +116,15 @@ def test_every_verb_takes_a_version_of_a_model(typed: Any, db: Path, verb: str) 
     assert typed("model", "add", REVERSAL, "--to", "samba", "--as", "m", db=db).status == 0
     more = ["--method", "guf"] if verb == "uncertainty" else []
     assert typed(verb, "hidden-reversal-x", "--model", "m@1", *more, db=db).status == 0
+
+
+def test_adding_to_a_name_that_others_use_is_said(typed: Any, db: Path) -> None:
+    said = typed("model", "add", "EXX:poly2", "--to", "samba", db=db)
+    assert said.status == 0
+    assert "'samba' without a version means samba@2 from now on, for everybody and every campaign" in said.out
+    assert "samba@1 is what it was (--as NAME leaves samba alone)" in said.out
+    own = typed("model", "add", "EXX:poly3", "--to", "samba", "--as", "mine", db=db)
+    assert own.status == 0
+    assert "without a version" not in own.out
+    document = typed("model", "remove", "EXX:poly2", "--from", "samba", "--json", db=db).document
+    assert "samba@2 is what it was" in document["note_on_name"]

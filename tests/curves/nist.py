@@ -6,6 +6,7 @@ blank lines and headers.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,8 +66,12 @@ def _gauge(name: str, title: str) -> Series:
 
 
 def _mpc62() -> Series:
+    """One check standard and one probe: every value is the mean of six readings, whose scatter is printed with it."""
     found = [cells for cells in rows(CASES / "nist_MPC62.DAT", 50) if cells[0] == "51939"]
     columns = list(zip(*found, strict=True))
+    assert set(columns[8]) == {"2362"}
+    assert set(columns[12]) == {"5"}
+    pooled = math.sqrt(sum(float(s) ** 2 for s in columns[11]) / len(found))
     return Series(
         "mpc62",
         "check standard of resistivity, one probe",
@@ -74,11 +79,12 @@ def _mpc62() -> Series:
         {
             "resistivity": columns[10],
             "date": [f"1995-{m}-{d}T{h}:{s}" for m, d, h, s in zip(*columns[2:6], strict=True)],
+            "day": [f"{m}-{d}" for m, d in zip(*columns[2:4], strict=True)],
             "operator": columns[6],
             "humidity_percent": columns[7],
             "temperature_degC": columns[9],
         },
-        'groups = ["operator"]\n',
+        f'groups = ["day", "operator"]\nstandard_uncertainty = {pooled / math.sqrt(6.0):.5f}\n',
     )
 
 

@@ -12,10 +12,11 @@ from monitor.discovery.compare import EXPLAINED, SOMETHING_IS_MISSING
 from monitor.discovery.curve_compare import compare_curve
 from monitor.discovery.curve_explain import explain_curve
 from monitor.exceptions import CampaignError
-from monitor.methods.curve import fit, problem_of
+from monitor.methods.curve import fit
+from monitor.methods.curve_problem import problem_of
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign, Instrument
-from monitor.workflow.curves import explanation_document
+from monitor.workflow.curve_documents import explanation_document
 
 HOURS = np.arange(240.0)
 

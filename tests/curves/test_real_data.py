@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from monitor.methods.curve import fit, problem_of
+from monitor.methods.curve import fit
+from monitor.methods.curve_problem import problem_of
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign
@@ -91,6 +92,9 @@ def test_mlco2mon_yearly_then_half_yearly(told: dict[str, Any]) -> None:
 def test_enso_two_more_periods_certified_after_the_refit(told: dict[str, Any], curve: Any) -> None:
     certified = json.loads((STRD / "certified_enso.json").read_text())["ENSO"]["certified"]
     searched = [one["searched"]["value"] for one in told["enso"].explained["missing"]]
+    # Likely: 22 of 300 series of slow noise alone had two cycles as good.
+    assert not any(one["certain"] for one in told["enso"].explained["missing"])
+    assert all(0.03 < one["noise_alone_p"] < 0.15 for one in told["enso"].explained["missing"])
     assert searched == pytest.approx([44.311, 26.888], abs=1e-3)
     found = fit(problem_of(curve("enso"), Model("three", added=tuple(effects(told, "enso")))))
     # b4 and b7 are the periods, the others constant, cosines and sines in our order.
@@ -116,17 +120,25 @@ def test_lew_period_at_0_302_and_the_better_optimum(told: dict[str, Any], curve:
     assert found.effects[0].value is not None
     assert 1.0 / found.effects[0].value == pytest.approx(0.301807, abs=5e-7)
     assert found.deviation == pytest.approx(134.066, abs=5e-4)
+    # The outliers are those beyond three standard deviations of this fit.
+    beyond = np.flatnonzero(np.abs(found.residual) > 3.0 * found.deviation) + 1
+    assert beyond.tolist() == [2, 3, 6, 8, 11, 158]
 
 
 def test_lew_outliers_named(told: dict[str, Any]) -> None:
     named = {one["sequence"] for one in told["lew"].explained["suspect_data"]}
     assert {2, 3, 6, 8, 11, 158} <= named
+    assert "lie between rows 1 and 16: a stretch" in told["lew"].explained["answer"]
     # Beyond the first rows, where the beam moved out of step, the misprint alone.
     assert {row for row in named if row > 20} == {158}
 
 
-def test_mpc62_one_probe_has_nothing_to_tell(told: dict[str, Any]) -> None:
+def test_mpc62_has_one_probe_and_no_day_effect(told: dict[str, Any], script: Any) -> None:
     assert effects(told, "mpc62") == []
+    assert told["mpc62"].explained["verdict"] == "explained"
+    # Level 1 of the same page: 0.0614 with 125 degrees of freedom, six readings to a mean.
+    assert told["mpc62"].explained["stated_uncertainty"] == pytest.approx(0.06139 / 6**0.5, abs=5e-5)
+    assert "do not differ: F = 0.63, p = 0.76" in script.mpc62_note(told["mpc62"])
     # Standard deviation of the check standard, level 2 (e-Handbook 2.6.2): 0.0268 ohm cm.
     assert told["mpc62"].history[0]["residual_deviation"] == pytest.approx(0.0268, abs=5e-5)
 

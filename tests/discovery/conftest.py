@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -11,6 +9,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from by_path import load
 
 from monitor.discovery import Explanation, explain
 from monitor.methods.samba import problem_of
@@ -24,13 +23,8 @@ EXAMPLES = HERE.parents[1] / "examples"
 @pytest.fixture(scope="session")
 def virtual_campaigns() -> ModuleType:
     """The helper virtual.py beside this file."""
-    if "virtual_campaigns" not in sys.modules:
-        spec = importlib.util.spec_from_file_location("virtual_campaigns", HERE / "virtual.py")
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["virtual_campaigns"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return sys.modules["virtual_campaigns"]
+    found: ModuleType = load("virtual_campaigns", HERE / "virtual.py")
+    return found
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from by_path import simulator
 
 from monitor.discovery import fit
 from monitor.discovery.anomalies import bad_points, ball_moves, plan_places
@@ -63,7 +64,7 @@ def test_bad_points_are_found_with_axis_and_size_and_are_no_effect(virtual_campa
 
 
 def test_a_bad_point_does_not_hide_an_effect(virtual_campaigns, explained):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     campaign, _ = virtual_campaigns.virtual(
         4, [sim.Effect("EYX:poly2", peak_um=6.0)], bad_points=[(5, 20, (80.0, 0.0, 0.0))]
     )
@@ -85,7 +86,7 @@ def test_a_noisier_run_has_no_bad_points_for_that(virtual_campaigns, explained):
 
 
 def test_a_ball_that_moved_between_runs_is_a_step_of_that_ball_alone(virtual_campaigns, explained):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     loose = sim.Effect("ball:4:moved", coefficients=(0.004, -0.007, 0.003), at=(9, 1))
     answer = explained(virtual_campaigns.virtual(5, [loose])[0])
     (step,) = answer.steps
@@ -97,7 +98,7 @@ def test_a_ball_that_moved_between_runs_is_a_step_of_that_ball_alone(virtual_cam
 
 def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns, explained):
     """No recorded column follows it, and no bad points or moved balls are invented."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     sizes = np.random.default_rng(3).standard_normal(20)
     sizes *= 2e-7 / np.std(sizes, ddof=1)
     answer = explained(virtual_campaigns.virtual(3, [sim.Effect("EAX:poly1", coefficients=sizes)])[0])
@@ -113,7 +114,7 @@ def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns
 
 
 def test_what_a_recorded_column_follows_is_not_said_to_vary(virtual_campaigns, explained):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     campaign, _ = virtual_campaigns.virtual(3, [sim.Effect("EAX:poly1@x_axis_degC", peak_um=8.0)])
     (found,) = explained(campaign).missing
     assert found.effect == "EAX:poly1@x_axis_degC"

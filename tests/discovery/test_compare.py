@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_path import simulator
 from scipy import stats
 
 from monitor.discovery import compare, fit
@@ -34,7 +35,7 @@ def test_nist_load_cell_lack_of_fit_of_the_straight_line():
 
 @pytest.fixture(scope="module")
 def compared(virtual_campaigns):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     campaign, told = virtual_campaigns.virtual(5, [sim.Effect("EXX:reversal", peak_um=4.0)])
     found = fit(problem_of(campaign))
     return found, compare(found, "virtual", "samba"), told
@@ -117,7 +118,7 @@ def test_one_run_has_no_repeatability(virtual_campaigns):
 
 def test_what_varies_from_run_to_run_is_seen_against_the_stated_uncertainty(virtual_campaigns):
     """It hides in repeatability: the second yardstick says so."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     sizes = 3e-6 * np.random.default_rng(1).standard_normal(20) * 60
     campaign, _ = virtual_campaigns.virtual(3, [sim.Effect("EAX:poly1", coefficients=sizes / 400)])
     answer = compare(fit(problem_of(campaign)), "virtual", "samba")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import statsmodels.api as sm
+from by_path import simulator
 
 from monitor.discovery import fit
 from monitor.discovery.evidence import Pool, weigh
@@ -22,7 +23,7 @@ from monitor.methods.samba import problem_of
 @pytest.fixture(scope="module")
 def seen(virtual_campaigns):
     """A small campaign with two effects, and what the data see of four."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     effects = [
         sim.Effect("EXX:reversal", peak_um=4.0),
         sim.Effect("EBB:harmonic2", peak_um=4.0, direction=(1, 2)),
@@ -158,7 +159,7 @@ def test_the_error_of_a_version_is_that_of_the_scan(seen):
 
 def test_what_acts_in_one_run_only_is_no_prediction(virtual_campaigns):
     """A ball that moved in one run must not spoil the held-out error of the others."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     loose = sim.Effect("ball:2:moved", coefficients=(0.02, -0.01, 0.0), at=(3, 30))
     campaign, _ = virtual_campaigns.virtual(2, [loose])
     problem = problem_of(campaign)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from by_path import simulator
 
 from monitor.discovery import explain
 from monitor.effects.catalogue import catalogue, drivers_of
@@ -34,7 +35,7 @@ def names(found):
     ],
 )
 def test_a_hidden_effect_leads_or_stands_in_the_leading_group(virtual_campaigns, explained, effect, options):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     campaign, _ = virtual_campaigns.virtual(21, [sim.Effect(effect, peak_um=8.0, **options)])
     answer = explained(campaign)
     assert len(answer.missing) == 1
@@ -47,7 +48,7 @@ def test_a_hidden_effect_leads_or_stands_in_the_leading_group(virtual_campaigns,
 
 
 def test_three_effects_are_found_one_after_the_other_and_the_error_falls(virtual_campaigns, explained):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     hidden = [
         sim.Effect("EXX:reversal", peak_um=5.0),
         sim.Effect("EBB:harmonic2", peak_um=5.0, direction=(1.0, 1.0)),
@@ -66,7 +67,7 @@ def test_three_effects_are_found_one_after_the_other_and_the_error_falls(virtual
 
 
 def test_growth_of_the_artefact_is_not_told_as_that_of_two_axes(virtual_campaigns, explained):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     hidden = [
         sim.Effect("artefact:expansion@run_time", peak_um=6.0),
         sim.Effect("EXX:poly1@run_time", peak_um=6.0),
@@ -77,7 +78,7 @@ def test_growth_of_the_artefact_is_not_told_as_that_of_two_axes(virtual_campaign
 
 def test_the_plain_effect_leads_where_a_driver_hardly_varies(virtual_campaigns, explained):
     """Ambient less 20 °C varies by a tenth of itself: on few runs the two are the same, and both are told."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     plain = sim.Effect("EAX:poly1", peak_um=3.0)
     both = 0
     for seed in range(700, 706):
@@ -88,7 +89,7 @@ def test_the_plain_effect_leads_where_a_driver_hardly_varies(virtual_campaigns, 
 
 
 def test_a_pitch_that_nobody_knows_is_found_with_its_uncertainty(virtual_campaigns, explained):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     hidden = sim.Effect("EYY:cyclic13.7mm", peak_um=5.0, direction=(1.0, 2.0))
     answer = explained(virtual_campaigns.virtual(2, [hidden])[0])
     (found,) = answer.missing
@@ -112,7 +113,7 @@ def test_a_pitch_that_nobody_knows_is_found_with_its_uncertainty(virtual_campaig
     ],
 )
 def test_campaigns_of_other_kinds_with_and_without_an_effect(virtual_campaigns, explained, options):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     assert explained(virtual_campaigns.virtual(41, **options)[0]).missing == ()
     (found,) = explained(
         virtual_campaigns.virtual(41, [sim.Effect("EXX:reversal", peak_um=6.0)], **options)[0]
@@ -122,7 +123,7 @@ def test_campaigns_of_other_kinds_with_and_without_an_effect(virtual_campaigns, 
 
 
 def test_a_channel_with_empty_cells_is_refused_aloud(virtual_campaigns, explained):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     campaign, _ = virtual_campaigns.virtual(1, [sim.Effect("EXX:reversal", peak_um=5.0)])
     campaign.probings.channels["x_axis_degC"][5] = np.nan
     answer = explained(campaign)
@@ -133,7 +134,7 @@ def test_a_channel_with_empty_cells_is_refused_aloud(virtual_campaigns, explaine
 
 def test_an_error_of_a_tenth_of_a_millimetre_is_still_one_effect(virtual_campaigns, explained):
     """Far beyond what is likely, and where curvature matters: a scale that shrinks everything is no answer."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     (found,) = explained(virtual_campaigns.virtual(1, [sim.Effect("EXX:reversal", peak_um=100.0)])[0]).missing
     assert found.effect == "EXX:reversal"
     assert abs(found.amplitude) == pytest.approx(0.1, rel=3e-3)
@@ -141,7 +142,7 @@ def test_an_error_of_a_tenth_of_a_millimetre_is_still_one_effect(virtual_campaig
 
 @pytest.mark.parametrize("chosen", [(3, 5, 9, 12), (2,), (4, 5)])
 def test_runs_that_were_left_out_or_never_probed_do_not_matter(virtual_campaigns, explained, chosen):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     campaign, _ = virtual_campaigns.virtual(
         1, [sim.Effect("EXX:reversal", peak_um=5.0)], keep=lambda told: np.isin(told["run"], chosen)
     )
@@ -150,7 +151,7 @@ def test_runs_that_were_left_out_or_never_probed_do_not_matter(virtual_campaigns
 
 
 def test_an_added_effect_is_missing_no_more_and_a_removed_one_is_again(virtual_campaigns):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     campaign, _ = virtual_campaigns.virtual(2, [sim.Effect("EXX:reversal", peak_um=5.0)])
     rng = np.random.default_rng(1)
     grown = problem_of(campaign, Model("grown", added=("EXX:reversal",)))
@@ -186,7 +187,7 @@ def test_rates_over_forty_small_campaigns(virtual_campaigns, explained):
 
 def test_the_amplitude_lies_in_its_interval_as_often_as_stated(virtual_campaigns, explained):
     """40 campaigns of four runs: fewer than 33 inside their 95 % interval are a chance of 1e-3."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     inside = 0
     for seed in range(40):
         hidden = sim.Effect("EAX:poly1", peak_um=6.0)

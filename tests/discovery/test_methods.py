@@ -5,7 +5,6 @@ A few seeds; rates over many are in ``tests/benchmarks/trial_methods.py``.
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from by_path import load
 
 from monitor.methods import rotary_probing
 from monitor.methods.problem import solve_problem
@@ -21,20 +21,13 @@ TESTS = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(scope="module")
-def trial(virtual_campaigns: ModuleType) -> ModuleType:
+def trial(simulator: ModuleType) -> ModuleType:
     """The scenes of the trial, loaded by path."""
-    virtual_campaigns.simulator()
-    spec = importlib.util.spec_from_file_location("trial_methods", TESTS / "benchmarks/trial_methods.py")
-    assert spec is not None
-    assert spec.loader is not None
     before = list(sys.path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["trial_methods"] = module
     try:
-        spec.loader.exec_module(module)
+        return load("trial_methods", TESTS / "benchmarks" / "trial_methods.py")
     finally:
         sys.path[:] = before
-    return module
 
 
 def named(trial: ModuleType, effect: str):

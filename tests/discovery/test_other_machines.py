@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from by_path import simulator
 
 from monitor.methods.problem import solve_problem
 from monitor.methods.samba import problem_of
@@ -25,7 +26,7 @@ def test_nothing_is_told_where_nothing_is_hidden(virtual_campaigns, explained, m
 
 @pytest.mark.parametrize("machine", ["fork head", "one rotary table"])
 def test_two_hidden_effects_are_told(virtual_campaigns, explained, machine):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     hidden = ("EXX:reversal", "EZZ:poly2" if machine == "one rotary table" else "EYX:poly3")
     campaign, _ = virtual_campaigns.on_machine(machine, 5, [sim.Effect(name, peak_um=6.0) for name in hidden])
     found = groups(explained(campaign))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -23,21 +22,11 @@ from monitor.methods import tracker
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 
-SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
-
 
 @pytest.fixture(scope="module")
-def robots() -> ModuleType:
-    """The simulator of tracked robots, loaded by path."""
-    if "simulator" not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return importlib.import_module("simulator.robot_campaign")
+def robots(simulator: ModuleType) -> ModuleType:
+    """The simulator of tracked robots."""
+    return importlib.import_module(f"{simulator.__name__}.robot_campaign")
 
 
 def explained(robots: ModuleType, folder: Path, seed: int, hidden: Any, **options: Any) -> Explanation:

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from by_path import simulator
 
 
 @pytest.fixture(scope="module")
 def campaign_with(virtual_campaigns):
     """A campaign of a plan with poses added, all four balls at each."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
 
     def build(plan, seed, effect, poses=(), noise_um=1.0):
         rng = np.random.default_rng(seed)
@@ -35,7 +36,7 @@ def names(found):
 
 def test_poses_tell_the_table_from_the_pivot(virtual_campaigns, explained, campaign_with):
     """In the cold-cold plan C turns three times as far as B: run-out of C and of B coincide, until they part."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     plan, hidden = sim.cold_cold_plan(), sim.Effect("EXC:harmonic2", peak_um=8.0, direction=(1.0, -0.7))
     (found,) = explained(campaign_with(plan, 3, hidden)).missing
     assert {"EXC:harmonic2", "EXB:harmonic3"} <= names(found)
@@ -51,7 +52,7 @@ def test_poses_tell_the_table_from_the_pivot(virtual_campaigns, explained, campa
 def test_poses_tell_harmonics_of_the_spindle_apart_where_quarters_do_not(
     virtual_campaigns, explained, campaign_with
 ):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     plan, hidden = sim.five_days_plan(), sim.Effect("EXC1:harmonic1", peak_um=8.0, direction=(1.0, -0.7))
     (found,) = explained(campaign_with(plan, 3, hidden)).missing
     assert {"EXC1:harmonic1", "EXC1:harmonic3"} <= names(found)
@@ -66,7 +67,7 @@ def test_poses_tell_harmonics_of_the_spindle_apart_where_quarters_do_not(
 
 def test_nothing_is_offered_where_no_pose_can(virtual_campaigns, explained, campaign_with):
     """Run-out of a table in X and in Y differ by what its location error takes up, at any pose."""
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     hidden = sim.Effect("EXB:harmonic1", peak_um=8.0, direction=(1.0, -0.7))
     (found,) = explained(campaign_with(sim.five_days_plan(), 3, hidden)).missing
     assert {"EXB:harmonic1", "EZB:harmonic1"} <= names(found)
@@ -75,7 +76,7 @@ def test_nothing_is_offered_where_no_pose_can(virtual_campaigns, explained, camp
 
 
 def test_nothing_is_offered_where_there_is_nothing_to_separate(virtual_campaigns, explained, campaign_with):
-    sim = virtual_campaigns.simulator()
+    sim = simulator()
     (found,) = explained(campaign_with(sim.five_days_plan(), 3, sim.Effect("EXX:poly2", peak_um=8.0))).missing
     assert found.rivals == ()
     assert found.separation.poses == ()

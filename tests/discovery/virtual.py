@@ -1,32 +1,14 @@
-"""Virtual campaigns as records, from the independent simulator, without files. Loaded by path: tests/ is no package."""
+"""Virtual campaigns as records, from the independent simulator, without files. Loaded by path (``by_path``)."""
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from by_path import simulator
 
 from monitor.records import Artefact, AxisSettings, Ball, Campaign, Machine, Probe, Probings, Run, ScaleBar
-
-SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
-
-
-def simulator() -> ModuleType:
-    """The package tests/simulator."""
-    if "simulator" not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return sys.modules["simulator"]
 
 
 def as_campaign(

@@ -6,8 +6,6 @@ import dataclasses
 import importlib
 import importlib.util
 import re
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -22,22 +20,13 @@ from monitor.machine import Chain, chain_of_axes, parse_topology
 from monitor.methods.base_effects import base_effects
 from monitor.records import ChainAxis
 
-SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
 DRIVERS = ("warmup", "run_time", "ambient_degC")
 
 
 @pytest.fixture(scope="module")
-def robots() -> ModuleType:
-    """The simulator of tracked robots, loaded by path."""
-    if "simulator" not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return importlib.import_module("simulator.robot_campaign")
+def robots(simulator: ModuleType) -> ModuleType:
+    """The simulator of tracked robots."""
+    return importlib.import_module(f"{simulator.__name__}.robot_campaign")
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import itertools
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -28,22 +27,6 @@ from monitor.records import (
     Run,
     ScaleBar,
 )
-
-SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
-
-
-@pytest.fixture(scope="session")
-def simulator() -> ModuleType:
-    """The package tests/simulator."""
-    if "simulator" not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return sys.modules["simulator"]
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from by_path import load
 
 from monitor.exceptions import DataError
 from monitor.machine import parse_topology
@@ -20,13 +21,7 @@ from monitor.methods.problem import solve_problem
 from monitor.methods.rotary_base import rotary_base
 from monitor.methods.rotary_patterns import PARAMETERS, SYMBOLS, Touches, closed_forms
 
-_spec = importlib.util.spec_from_file_location(
-    "rotary_campaigns", Path(__file__).with_name("rotary_campaigns.py")
-)
-assert _spec is not None
-assert _spec.loader is not None
-campaigns = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(campaigns)
+campaigns = load("rotary_campaigns", Path(__file__).with_name("rotary_campaigns.py"))
 PAPER, TRUTH, location, touched = campaigns.PAPER, campaigns.TRUTH, campaigns.location, campaigns.touched
 
 

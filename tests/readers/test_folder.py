@@ -80,11 +80,24 @@ def test_format_1_all_faults_are_listed_together_by_file_and_line(small, spoil, 
 def test_format_1_first_twenty_in_full(small):
     path = small / "probings.csv"
     header, *rows = path.read_text().splitlines()
-    spoilt = [",".join([*row.split(",")[:4], "x", "y", "z", *row.split(",")[7:]]) for row in rows]
+    spoilt = [
+        ",".join([*row.split(",")[:4], f"x{k}", f"y{k}", f"z{k}", *row.split(",")[7:]])
+        for k, row in enumerate(rows)
+    ]
     path.write_text("\n".join([header, *spoilt]) + "\n")
     with pytest.raises(
         CampaignError, match=r"30 faults\.\n(  probings\.csv, line .*\n){20}  \.\.\. and 10 more\.$"
     ):
+        read_campaign(small)
+
+
+def test_the_same_words_on_many_lines_are_told_once(small):
+    path = small / "probings.csv"
+    header, *rows = path.read_text().splitlines()
+    spoilt = [",".join([*row.split(",")[:4], "n/a", *row.split(",")[5:]]) for row in rows]
+    path.write_text("\n".join([header, *spoilt]) + "\n")
+    told = r"10 faults\.\n  probings\.csv, line 2, column x_mm: 'n/a' .* \(and 9 more like it, to line 11\)$"
+    with pytest.raises(CampaignError, match=told):
         read_campaign(small)
 
 

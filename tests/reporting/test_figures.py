@@ -10,18 +10,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError, InputError
-from monitor.reporting.figure_style import BLUE, INK, ORANGE, png, save, svg
-from monitor.reporting.figures_correlation import correlation_map
+from monitor.reporting.figure_style import png, save, svg
 from monitor.reporting.figures_drivers import predicted_against_measured, residual_against_driver
 from monitor.reporting.figures_models import error_falling, ranked_effects
-from monitor.reporting.figures_parameters import parameter_intervals, parameters_by_run
+from monitor.reporting.figures_parameters import parameters_by_run
 from monitor.reporting.figures_residuals import residual_bars, residual_vectors
-
-
-def intervals() -> Figure:
-    return parameter_intervals(
-        ["EA0B", "EX0C"], ["µrad", "µm"], [1.0, 2.0], [0.5, 0.3], title="T", tolerances=[np.nan, 3.0]
-    )
+from monitor.reporting.palette import BLUE, INK, ORANGE
 
 
 def by_run() -> Figure:
@@ -73,11 +67,7 @@ def ranked() -> Figure:
     )
 
 
-def correlations() -> Figure:
-    return correlation_map(["A", "B"], [[1.0, -0.4], [-0.4, 1.0]], title="T")
-
-
-FIGURES = [intervals, by_run, bars, vectors, driver, predicted, falling, ranked, correlations]
+FIGURES = [by_run, bars, vectors, driver, predicted, falling, ranked]
 
 
 @pytest.mark.parametrize("draw", FIGURES)
@@ -156,15 +146,15 @@ def test_vectors_share_one_scale_in_all_views() -> None:
 
 
 def test_save_writes_what_the_ending_says(tmp_path: Path) -> None:
-    assert save(intervals(), tmp_path / "a.svg").read_bytes() == svg(intervals())
-    assert save(intervals(), tmp_path / "a.png").read_bytes() == png(intervals())
+    assert save(by_run(), tmp_path / "a.svg").read_bytes() == svg(by_run())
+    assert save(by_run(), tmp_path / "a.png").read_bytes() == png(by_run())
     with pytest.raises(InputError, match=r"a figure is saved as \.svg or \.png, not as 'a\.jpg'"):
-        save(intervals(), tmp_path / "a.jpg")
+        save(by_run(), tmp_path / "a.jpg")
 
 
 def test_wrong_shapes_are_refused_in_words() -> None:
-    with pytest.raises(DataError, match=r"estimate must have shape \(1,\), but has \(2,\)"):
-        parameter_intervals(["A"], ["µm"], [1.0, 2.0], [1.0])
+    with pytest.raises(DataError, match=r"estimate must have shape \(1, 1\), but has \(2, 1\)"):
+        parameters_by_run([1], [1], ["A"], ["µm"], [[1.0], [2.0]], [[1.0]], title="T", interval="U")
     with pytest.raises(DataError, match=r"the RMS by run must have shape \(2,\), but has \(1,\)"):
         residual_bars({"run": (["1", "2"], [1.0])})
     with pytest.raises(DataError, match="groups is empty"):
@@ -179,5 +169,3 @@ def test_wrong_shapes_are_refused_in_words() -> None:
         error_falling(["a", "b"], [1.0], [1.0], noise_um=1.0, title="T")
     with pytest.raises(DataError, match="1 effects need as many values and groups"):
         ranked_effects(["a"], [1.0, 2.0], [1], title="T", value_name="v")
-    with pytest.raises(DataError, match=r"2 names need a correlation matrix of shape \(2, 2\)"):
-        correlation_map(["A", "B"], [[1.0]], title="T")

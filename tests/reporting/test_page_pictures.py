@@ -107,9 +107,13 @@ def faults_of(pdf: bytes, folder: Path) -> list[str]:
             ):
                 faults.append(f"page {number}: '{word.text}' is off the page's text area")
             elif re.search(r"\w", word.text) and word.right - word.left > 1.5:  # not a subscript
-                # All of a word's width shows ink: what is clipped has none where its letters should be.
-                columns = part(word.left, word.top, word.right, word.bottom).any(axis=0)
-                if columns.mean() < 0.5 or not columns[-max(3, len(columns) // 4) :].any():
+                # All of a word's length shows ink: what is clipped has none where its letters should be. One that reads
+                # upwards ends at its top.
+                high, wide = word.bottom - word.top, word.right - word.left
+                turned = high > 1.5 * wide if len(word.text) > 1 else wide > 1.4 * high
+                shown = part(word.left, word.top, word.right, word.bottom).any(axis=1 if turned else 0)
+                along = shown[::-1] if turned else shown
+                if along.mean() < 0.5 or not along[-max(3, len(along) // 4) :].any():
                     faults.append(f"page {number}: '{word.text}' is not to be seen")
         for at, word in enumerate(words):
             for other in words[at + 1 :]:

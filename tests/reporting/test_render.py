@@ -5,16 +5,16 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
 import pypdf
 import pytest
-from fontTools.ttLib import TTFont
 from jinja2 import UndefinedError
 
 from monitor.exceptions import InputError
@@ -22,12 +22,12 @@ from monitor.reporting.certificate import CertificateRecord, Person
 from monitor.reporting.documents import to_document
 from monitor.reporting.numbers import written_correlation
 from monitor.reporting.render import UnprintableError, certificate_html, certificate_pdf, html_of, pdf_of
-from monitor.reporting.resources import font_bytes, report_folder
+from monitor.reporting.resources import report_folder
 from monitor.reporting.results import RefusedParameters
 
 Make = Callable[..., CertificateRecord]
 #: A4 and the side margins of the style sheet, in points.
-WIDTH, HEIGHT, MARGIN = 210 / 25.4 * 72, 297 / 25.4 * 72, 17 / 25.4 * 72
+WIDTH, HEIGHT, MARGIN, EDGE = (length / 25.4 * 72 for length in (210, 297, 17, 6))
 LONG_NAME = "Precision Engineering and Calibration Services of Nowhere Ltd"
 
 
@@ -40,29 +40,18 @@ def pages_of(pdf: bytes) -> list[str]:
     return [" ".join(page.extract_text().split()) for page in pypdf.PdfReader(io.BytesIO(pdf)).pages]
 
 
-def spans_of(pdf: bytes) -> list[tuple[float, float, float, str]]:
-    """Left end, right end and height of every drawn text, from its position and the advances of our fonts."""
-    fonts = {
-        weight: TTFont(io.BytesIO(font_bytes(f"DejaVuSans{weight}.ttf")), lazy=True)
-        for weight in ("", "-Bold")
-    }
-    letters = {weight: (font.getBestCmap(), font["hmtx"].metrics) for weight, font in fonts.items()}
-    spans = []
-
-    def seen(text: str, cm: list[float], tm: list[float], font: dict[str, str] | None, size: float) -> None:
-        if not text.strip() or font is None:
-            return
-        cmap, advances = letters["-Bold" if font["/BaseFont"].endswith("Bold") else ""]
-        place = np.array([tm[4], tm[5], 1.0]) @ np.array(
-            [[cm[0], cm[1], 0], [cm[2], cm[3], 0], [cm[4], cm[5], 1]]
+def spans_of(pdf: bytes) -> list[tuple[float, float, float, float, str]]:
+    """Left, right, upper and lower end of every word, as poppler places it; pypdf does not follow drawings."""
+    if shutil.which("pdftotext") is None:
+        pytest.skip("poppler (Debian: poppler-utils) says where words stand")
+    told = subprocess.run(["pdftotext", "-bbox", "-", "-"], input=pdf, check=True, capture_output=True).stdout
+    return [
+        (float(left), float(right), float(top), float(bottom), word)
+        for left, top, right, bottom, word in re.findall(
+            r'<word xMin="([-0-9.]+)" yMin="([-0-9.]+)" xMax="([-0-9.]+)" yMax="([-0-9.]+)">(.*?)</word>',
+            told.decode("utf-8"),
         )
-        scale = abs(size * tm[0] * cm[0])
-        width = sum(advances[cmap[ord(letter)]][0] for letter in text.strip("\n")) / 2048 * scale
-        spans.append((float(place[0]), float(place[0]) + width, float(place[1]), text))
-
-    for page in pypdf.PdfReader(io.BytesIO(pdf)).pages:
-        page.extract_text(visitor_text=seen)
-    return spans
+    ]
 
 
 def assert_inside_the_margins(pdf: bytes) -> None:
@@ -71,7 +60,9 @@ def assert_inside_the_margins(pdf: bytes) -> None:
     outside = [
         span
         for span in spans
-        if span[0] < MARGIN - 1 or span[1] > WIDTH - MARGIN + 1 or not 20 < span[2] < HEIGHT - 20
+        if span[0] < MARGIN - 1
+        or span[1] > WIDTH - MARGIN + 1
+        or not EDGE < span[2] < span[3] < HEIGHT - EDGE
     ]
     assert outside == []
 

@@ -30,7 +30,7 @@ def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """PKCS#12 and PEM of a made-up laboratory, and the PEM of another one."""
     folder = tmp_path_factory.mktemp("keys")
     found = {}
-    for name in ("lab", "other"):
+    for name, days in (("lab", (-1, 30)), ("other", (-1, 30)), ("ended", (-60, -1)), ("begins", (1, 30))):
         key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
         subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, f"Made-up Laboratory {name}")])
         now = datetime.now(UTC)
@@ -40,8 +40,8 @@ def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             .issuer_name(subject)
             .public_key(key.public_key())
             .serial_number(7)
-            .not_valid_before(now - timedelta(days=1))
-            .not_valid_after(now + timedelta(days=30))
+            .not_valid_before(now + timedelta(days=days[0]))
+            .not_valid_after(now + timedelta(days=days[1]))
             .add_extension(x509.KeyUsage(True, True, *[False] * 7), critical=True)
             .sign(key, hashes.SHA256())
         )
@@ -124,5 +124,15 @@ def test_keys_that_do_not_open_are_refused(plain: bytes, keys: dict[str, Path], 
         sign(plain, FileKey(keys["other.pem"]))
     with pytest.raises(InputError, match="cannot be read: No such file"):
         sign(plain, FileKey(tmp_path / "none.p12"))
-    with pytest.raises(InputError, match="cannot be read as certificates"):
+    with pytest.raises(InputError, match=r"none\.pem cannot be read: No such file"):
         check_signature(sign(plain, FileKey(keys["lab"], "words")), tmp_path / "none.pem")
+
+
+@pytest.mark.parametrize("name", ["ended", "begins"])
+def test_a_certificate_that_is_not_valid_today_does_not_sign(
+    plain: bytes, keys: dict[str, Path], name: str
+) -> None:
+    with pytest.raises(
+        InputError, match=rf"Laboratory {name} is valid from .* not today .*; sign with one that is"
+    ):
+        sign(plain, FileKey(keys[name], "words"))

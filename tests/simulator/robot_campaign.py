@@ -94,10 +94,12 @@ def track(
     fixed_every: int = 0,
     reflectors: Sequence[str] = ("R1", "R2", "R3"),
     ranges: Mapping[str, tuple[float, float]] | None = None,
+    repeatability_urad: float = 0.0,
 ) -> Tracked:
     """Simulate one run of random poses; with ``fixed_every`` the fixed reflectors are seen each so many poses.
 
-    ``ranges`` narrows the range of joints, in degrees.
+    ``ranges`` narrows the range of joints, in degrees; ``repeatability_urad`` is the standard deviation of the angle at
+    which every joint comes to rest, the same for all reflectors of a pose.
     """
     hidden = hidden or Hidden()
     location = errors_of_robot(rng) if location is None else location
@@ -109,7 +111,7 @@ def track(
     for joint in JOINTS:
         name = str(joint["name"])
         q = float(joint["sign"]) * readings[name]
-        turn = np.zeros(poses)
+        turn = rng.normal(0.0, 1e-6 * repeatability_urad, poses) if repeatability_urad else np.zeros(poses)
         turn += hidden.compliance.get(name, 0.0) * arms[name]
         if name in hidden.harmonic:
             order, amplitude, phase = hidden.harmonic[name]

@@ -73,7 +73,7 @@ def test_amended_one_names_its_successor_and_keeps_its_document(db: Database, ca
         b"old",
     )
     assert list(list_certificates(db)["state"]) == ["amended", "issued"]
-    with pytest.raises(InputError, match="C-1 is amended; it can become nothing else, not withdrawn"):
+    with pytest.raises(InputError, match="C-1 is amended; that is final, nothing can be changed"):
         mark_certificate(db, "C-1", "withdrawn", "again")
 
 

@@ -107,7 +107,11 @@ def test_nothing_is_fetched_from_the_network(db: Database) -> None:
 
 
 def _insert_machine(db: Database, name: str) -> None:
-    db.execute("INSERT INTO machine VALUES (?, 'w X b Y t', '2026-01-01')", [name])
+    db.execute(
+        "INSERT INTO registered_machine SELECT count(*) + 1, ?, 'w X b Y t', TIMESTAMP '2026-01-01' "
+        "FROM registered_machine",
+        [name],
+    )
 
 
 def _fail_inside(db: Database) -> None:
@@ -121,10 +125,10 @@ def _fail_inside(db: Database) -> None:
 def test_transaction_keeps_nothing_of_a_failure_nor_of_what_joined_it(db: Database) -> None:
     with pytest.raises(RuntimeError, match="pulled the plug"):
         _fail_inside(db)
-    assert db.rows("SELECT machine FROM machine") == []
+    assert db.rows("SELECT machine FROM registered_machine") == []
     with db.transaction():
         _insert_machine(db, "third")
-    assert db.rows("SELECT machine FROM machine") == [("third",)]
+    assert db.rows("SELECT machine FROM registered_machine") == [("third",)]
 
 
 def test_read_only_refuses_changes(path: Path) -> None:

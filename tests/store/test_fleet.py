@@ -19,6 +19,7 @@ from monitor.records import Campaign
 from monitor.statistics import anova, bartlett, pool, trend
 from monitor.statistics.sufficient import GroupSums, cells_from_sums, drift_from_sums
 from monitor.store import Database, FleetSums, fleet_sums, machine_history
+from monitor.store.identified_values import gather_values
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd"
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -33,17 +34,19 @@ def keep(
     factor: float = 1.0,
 ):
     """A campaign of so many days with these values of one parameter, a run a value, and its identification."""
-    if not db.rows("SELECT 1 FROM machine WHERE machine = ?", [machine]):
+    if not db.rows("SELECT 1 FROM registered_machine WHERE machine = ?", [machine]):
         db.execute(
-            "INSERT INTO machine VALUES (?, 'w C B X b Z Y (C1) t', TIMESTAMP '2026-01-01')", [machine]
+            "INSERT INTO registered_machine SELECT count(*) + 1, ?, 'w C B X b Z Y (C1) t', TIMESTAMP '2026-01-01' "
+            "FROM registered_machine",
+            [machine],
         )
-    number = db.next_number("campaign", "campaign_id")
+    number = db.next_number("imported_campaign", "campaign_id")
     known = db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [name])
     if known:
         number = known[0][0]
     else:
         db.execute(
-            "INSERT INTO campaign VALUES (?, ?, ?, 'samba', '{\"tolerances\": {}}', '{}', '{}', '', '', "
+            "INSERT INTO imported_campaign VALUES (?, ?, ?, 'samba', '{\"tolerances\": {}}', '{}', '{}', '', '', "
             "TIMESTAMP '2026-01-01')",
             [number, name, machine],
         )
@@ -66,6 +69,7 @@ def keep(
         f"INSERT INTO parameter_value SELECT {own}, run, '{parameter}', value, 1.0, '1', {factor} FROM incoming",
         frame,
     )
+    gather_values(db)
     return own
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_path import load
 
 from monitor.exceptions import InputError
 from monitor.methods import rotary_probing
@@ -20,22 +21,10 @@ TESTS = Path(__file__).resolve().parents[1]
 SPACING = (20.0, 50.0)
 
 
-def _module(name: str, path: Path, **options: object):
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, path, **options)
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[name] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return sys.modules[name]
-
-
 @pytest.fixture(scope="module")
-def tools():
-    where = TESTS / "simulator"
-    _module("simulator", where / "__init__.py", submodule_search_locations=[str(where)])
+def tools(simulator):
     rp = importlib.import_module("simulator.rotary_probing")
-    campaigns = _module("rotary_campaigns", TESTS / "methods" / "rotary_campaigns.py")
+    campaigns = load("rotary_campaigns", TESTS / "methods" / "rotary_campaigns.py")
     return rp, campaigns, sys.modules["simulator.chain"].read_topology(campaigns.PAPER)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_path import load
 
 from monitor.exceptions import DataError
 from monitor.methods import rotary_probing
@@ -27,23 +28,11 @@ from monitor.uncertainty.expansion import expansion_of
 TESTS = Path(__file__).resolve().parents[1]
 
 
-def _module(name: str, path: Path, **options: object):
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, path, **options)
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[name] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return sys.modules[name]
-
-
 @pytest.fixture(scope="module")
-def problem():
+def problem(simulator):
     """Three runs of a small plan on faces and a sphere, with 1 µm of noise, on a machine with large errors."""
-    where = TESTS / "simulator"
-    _module("simulator", where / "__init__.py", submodule_search_locations=[str(where)])
     rp = importlib.import_module("simulator.rotary_probing")
-    campaigns = _module("rotary_campaigns", TESTS / "methods" / "rotary_campaigns.py")
+    campaigns = load("rotary_campaigns", TESTS / "methods" / "rotary_campaigns.py")
     rng = np.random.default_rng(5)
     features = [*rp.block(along=(-30.0, 30.0)), *rp.sphere("K1", (80.0, -120.0, 90.0))]
     plan = rp.every_pose(features, [{"A": a, "C": c} for a in (0.0, -90.0) for c in (0.0, 120.0, 240.0)])

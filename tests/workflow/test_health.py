@@ -359,6 +359,11 @@ def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_wi
     assert again.map == told
     page = text_of(found["files"][1])[1]
     assert "Volumetric error, run 16" in page
+    # And drawn: the words of its scale stand in the picture.
+    assert [one.across for one in told.slices] == ["Z", "Y", "X"]
+    assert [to_document(one) for one in told.slices] == document["slices"]
+    assert "length of the error / µm" in page
+    assert "Rotary axes at zero, three slices through the middle" in page
     assert again.model is not None
     assert again.model.runs == (
         "16 of 20 runs of campaign-B-stepped, 2026-03-02 to 2026-03-05; the others began after the week"

@@ -8,6 +8,7 @@ import json
 import sys
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -78,22 +79,9 @@ TOPOLOGY = "w C B X b Z Y (C1) t"
 SHARED = {"EA0B": 12e-6, "EC0B": -8e-6, "EX0C": 6e-3, "EA0C": -15e-6, "EB0C": 9e-6}
 
 
-def _simulator():
-    where = ROOT / "tests/simulator"
-    if "simulator" not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            "simulator", where / "__init__.py", submodule_search_locations=[str(where)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-    return sys.modules["simulator"], importlib.import_module("simulator.rotary_probing")
-
-
-def both_methods(folder: Path, rotary: dict[str, float]) -> Database:
+def both_methods(simulator: ModuleType, folder: Path, rotary: dict[str, float]) -> Database:
     """One machine calibrated by SAMBA with the shared errors, and a week later by rotary-probing with ``rotary``."""
-    simulator, rp = _simulator()
+    rp = importlib.import_module("simulator.rotary_probing")
     rng = np.random.default_rng(7)
     plan = simulator.five_days_plan()
     machine = simulator.SimulatedMachine(TOPOLOGY, terms=SHARED)
@@ -118,8 +106,8 @@ def both_methods(folder: Path, rotary: dict[str, float]) -> Database:
     return own
 
 
-def test_two_methods_share_one_trend_and_agree(tmp_path):
-    with both_methods(tmp_path, SHARED) as own:
+def test_two_methods_share_one_trend_and_agree(simulator, tmp_path):
+    with both_methods(simulator, tmp_path, SHARED) as own:
         found = trends(own, "M").document
     assert found["methods"] == ["samba", "rotary-probing"]
     (pair,) = found["agreement"]
@@ -130,8 +118,8 @@ def test_two_methods_share_one_trend_and_agree(tmp_path):
     assert "method rotary-probing" in conditions
 
 
-def test_two_methods_that_disagree_are_told_apart(tmp_path):
-    with both_methods(tmp_path, SHARED | {"EA0B": 40e-6}) as own:
+def test_two_methods_that_disagree_are_told_apart(simulator, tmp_path):
+    with both_methods(simulator, tmp_path, SHARED | {"EA0B": 40e-6}) as own:
         (pair,) = trends(own, "M").document["agreement"]
     assert pair["disagree"] == ["EA0B"]
     assert pair["parameters"]["EA0B"]["difference"] == pytest.approx(28.0, abs=6.0)

@@ -14,6 +14,7 @@ from scipy import optimize
 
 from monitor.cli import main
 from monitor.store import Database
+from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.campaigns import import_folders
 from monitor.workflow.identification import identify
@@ -45,13 +46,13 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "GROUP BY ALL ORDER BY 1"
         )
         description = json.loads(topology_of)
-        first = db.next_number("campaign", "campaign_id")
+        first = db.next_number("imported_campaign", "campaign_id")
         heads = pd.DataFrame(
             {"number": np.arange(first, first + WEEKS), "description": json.dumps(description)}
         )
         db.insert(
-            f"INSERT INTO campaign SELECT number, 'past-' || number, '{machine}', 'samba', description, '{{}}', "
-            "'{}', '', '', TIMESTAMP '2024-01-01' FROM incoming",
+            f"INSERT INTO imported_campaign SELECT number, 'past-' || number, '{machine}', 'samba', description, "
+            "'{}', '{}', '', '', TIMESTAMP '2024-01-01' FROM incoming",
             heads,
         )
         week = np.repeat(np.arange(WEEKS), RUNS)
@@ -66,8 +67,9 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
         )
         names = [row[0] for row in found]
         db.insert(
-            f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {names}::VARCHAR[], [], [], "
-            f"{RUNS}, '', TIMESTAMP '2024-01-01' FROM incoming",
+            f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {names}::VARCHAR[], "
+            f"{[row[1] for row in found]}, {[FACTOR[row[1]] for row in found]}, {RUNS}, '', "
+            "TIMESTAMP '2024-01-01' FROM incoming",
             heads,
         )
         for name, unit, mean, u in found:
@@ -77,6 +79,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 f"{FACTOR[unit]} FROM incoming",
                 frame.assign(value=past * FACTOR[unit]),
             )
+        gather_values(db)
     return place
 
 
@@ -117,6 +120,10 @@ def test_the_date_is_that_of_the_exact_chain_at_the_extrapolated_parameters(db: 
     )
     assert 0.0 < ahead["in_tolerance_at_next_check"] <= 1.0
     assert ahead["predicted_interval_um"][0] < ahead["predicted_um"] < ahead["predicted_interval_um"][1]
+    tested = ahead["backtest"]
+    assert tested["made"] == 8
+    assert tested["inside"] >= 6
+    assert abs(tested["bias_um"]) <= tested["rms_um"] < 15.0
 
 
 def test_a_limit_already_passed_is_crossed_now_and_a_far_one_never(db: Database) -> None:
@@ -141,6 +148,7 @@ def test_the_command_prints_the_forecast_the_next_check_and_the_backtest(path: P
     said = capsys.readouterr().out
     assert "limit 216 µm; reaches its limit on 20" in said
     assert "at the next check, " in said
+    assert " of 8 past days, each foretold by the days before it, lay in the interval (" in said
     assert "later values (" in said
     assert main(["--db", str(path), "trend", "HU40-T", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

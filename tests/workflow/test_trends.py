@@ -14,7 +14,8 @@ import pytest
 from monitor.cli import main
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
-from monitor.store import Database, import_campaign, load_analysis, record_event
+from monitor.store import Database, import_campaign, load_analysis, machine_history, record_event
+from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import fleet
 from monitor.workflow.runs_statistics import stats
 from monitor.workflow.selections import select, side_by_side
@@ -36,8 +37,12 @@ def add_machine(
 ):
     """Weekly campaigns of four runs: ``values`` name to (weeks, runs) in µm."""
     weeks, runs = next(iter(values.values())).shape
-    db.execute("INSERT INTO machine VALUES (?, 'w C B X b Z Y (C1) t', TIMESTAMP '2024-01-01')", [machine])
-    first = db.next_number("campaign", "campaign_id")
+    db.execute(
+        "INSERT INTO registered_machine SELECT count(*) + 1, ?, 'w C B X b Z Y (C1) t', TIMESTAMP '2024-01-01' "
+        "FROM registered_machine",
+        [machine],
+    )
+    first = db.next_number("imported_campaign", "campaign_id")
     description = json.dumps({"id": machine, "tolerances": dict.fromkeys(values, limit)})
     number = np.repeat(np.arange(first, first + weeks), runs)
     run = np.tile(np.arange(1, runs + 1), weeks)
@@ -47,7 +52,7 @@ def add_machine(
     frame["ambient"] = np.full(len(number), 20.0) if ambient is None else ambient.ravel()
     heads = pd.DataFrame({"number": np.arange(first, first + weeks)})
     db.insert(
-        f"INSERT INTO campaign SELECT number, '{machine}-' || (number - {first}), '{machine}', 'samba', "
+        f"INSERT INTO imported_campaign SELECT number, '{machine}-' || (number - {first}), '{machine}', 'samba', "
         f"'{description}', "
         "'{}', '{}', '', '', TIMESTAMP '2024-01-01' FROM incoming",
         heads,
@@ -57,8 +62,8 @@ def add_machine(
         frame,
     )
     db.insert(
-        f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {list(values)}::VARCHAR[], [], [], "
-        f"{runs}, '', TIMESTAMP '2024-01-01' FROM incoming",
+        f"INSERT INTO identification SELECT number, number, 'samba', 1, 'samba', {list(values)}::VARCHAR[], "
+        f"{['µm'] * len(values)}, {[1e-3] * len(values)}, {runs}, '', TIMESTAMP '2024-01-01' FROM incoming",
         heads,
     )
     for name, matrix in values.items():
@@ -67,6 +72,7 @@ def add_machine(
             f"INSERT INTO parameter_value SELECT number, run, '{name}', value, 0.5e-3, 'µm', 1e-3 FROM incoming",
             own,
         )
+    gather_values(db)
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +126,15 @@ def test_a_change_is_found_at_its_date_and_not_fitted_as_a_trend(made: Database)
     assert abs(found["slope_per_year"]) < 4 * found["u_slope"]
     assert found["control"]["shewhart"]["state"] == "alarm"
     assert found["control"]["cusum"]["state"] == "alarm"
+
+
+def test_the_latest_mean_has_its_uncertainty_and_its_runs(made: Database) -> None:
+    found = trends(made, "M").document["parameters"]["EX0B"]
+    history = machine_history(made, "M")
+    values = history.values[-4:, history.parameters.index("EX0B")]
+    assert found["latest_runs"] == 4
+    assert found["latest"] == pytest.approx(values.mean())
+    assert found["latest_u"] == pytest.approx(values.std(ddof=1) / np.sqrt(len(values)))
 
 
 def test_a_quiet_parameter_raises_nothing_and_a_dependence_has_its_unit(made: Database) -> None:

@@ -14,7 +14,7 @@ from monitor.workflow import models
 from monitor.workflow.campaigns import import_folders
 from monitor.workflow.known_errors import _of_shared
 from monitor.workflow.simulation import simulate
-from monitor.workflow.volumetric import volumetric_map
+from monitor.workflow.volumetric import at_zero, volumetric_map
 
 
 @pytest.fixture(scope="module")
@@ -83,3 +83,29 @@ def test_strokes_of_the_machine_file_bound_the_map(database):
     for name, ends in found["region"]["readings_mm"].items():
         readings = mapped.evaluated.campaign.probings.readings[name]
         assert ends == [readings.min(), readings.max()]
+
+
+def test_what_is_drawn_has_axes_and_vectors_in_the_order_of_the_directions_whatever_the_chain(database):
+    # The chain is w C B X b Z Y (C1) t: its axes come in the order X, Z, Y.
+    document, mapped = volumetric_map(database, "hidden", 20)
+    drawn = at_zero(mapped)
+    assert drawn.axes == ("X", "Y", "Z")
+    joints = [joint.name for joint in mapped.known.chain.joints]
+    assert joints.index("Z") < joints.index("Y")
+    for column, axis in enumerate(drawn.axes):
+        place = joints.index(axis)
+        sign = mapped.known.chain.joints[place].sign
+        np.testing.assert_array_equal(
+            drawn.readings_mm[:, column], sign * mapped.error.positions[:343, place]
+        )
+    assert [one["across"] for one in document["slices"]] == ["Z", "Y", "X"]
+    first = document["slices"][0]
+    corner = int(
+        np.flatnonzero(
+            (drawn.readings_mm[:, 0] == first["first_mm"][0])
+            & (drawn.readings_mm[:, 1] == first["second_mm"][0])
+            & (abs(drawn.readings_mm[:, 2] - first["at_mm"]) < 1e-6)
+        )[0]
+    )
+    assert first["first_um"][0][0] == pytest.approx(drawn.vectors_um[corner, 0], abs=1e-4)
+    assert first["second_um"][0][0] == pytest.approx(drawn.vectors_um[corner, 1], abs=1e-4)

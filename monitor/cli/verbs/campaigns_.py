@@ -25,4 +25,6 @@ def run(options: Namespace) -> int:
         shown = ("campaign", "machine", "method", "runs", "days", "first_run_at", "last_run_at")
         rows = [{**one, **{key: str(one[key])[:10] for key in shown[-2:]}} for one in found["campaigns"]]
         output.listing(rows, "no campaign yet; type `monitor import FOLDER`", shown)
+        for one in found["withdrawn"]:
+            output.say(f"withdrawn on {one['withdrawn_at'][:10]}: {one['campaign']} ({one['reason']})")
     return 0

@@ -20,7 +20,9 @@ def options(parser: ArgumentParser) -> None:
     verbs = parser.add_subparsers(dest="what", metavar="issue|show|verify|amend|withdraw", required=True)
     issued = verbs.add_parser("issue", **told("a certificate for one run", EXAMPLE))
     issued.add_argument("campaign", metavar="CAMPAIGN")
-    issued.add_argument("--run", type=int, required=True, metavar="N", dest="number_of_run")
+    issued.add_argument(
+        "--run", type=int, metavar="N", dest="number_of_run", help="needed where the campaign has several"
+    )
     add_issuing(issued)
     issued.add_argument("--draft", action="store_true", help="a draft, to be looked at")
     issued.add_argument(

@@ -14,6 +14,8 @@ from monitor.workflow.comparison import compare
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
 NOTHING_CHECKS_UM = 0.005
+# A robot has a thousand indexations; more than these are no table to read.
+MOST_PARTS = 20
 EXAMPLE = "monitor compare hidden-reversal-x --figures figures"
 
 
@@ -44,9 +46,17 @@ def run(options: Namespace) -> int:
             [name, *(_checked(part[which]) for which in ("rms_um", "largest_um")), str(part["n"])]
             for name, part in parts.items()
         ]
+        left_out = (
+            len(rows) - MOST_PARTS if len(rows) > MOST_PARTS and kind in ("target", "indexation") else 0
+        )
+        if left_out:
+            worst = sorted(parts, key=lambda name: -float(parts[name]["rms_um"]))[:MOST_PARTS]
+            rows = [row for row in rows if row[0] in worst]
         what = "touches" if found["target_word"] == "ball" else "readings"
         if rows:
             output.table("", [f"by {kind}", "RMS / µm", "largest / µm", what], rows)
+        if left_out:
+            output.say(f"the worst {MOST_PARTS} of {len(parts)}; --json has all")
     for file in found.get("figures", []):
         output.say(file)
     return 0

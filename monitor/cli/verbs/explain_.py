@@ -40,9 +40,15 @@ def run(options: Namespace) -> int:
             # Where the model fails as it is; the fit of the explanation has the missing effects already.
             as_it_is = fitted(db, options.campaign, options.model)[2]
             found["figures"] = comparison_figures(found, as_it_is, options.figures)
-            found["figures"] += explanation_figures(found, explanation, options.figures)
+            more = explanation_figures(found, explanation, options.figures)
+            # The residual over the workspace belongs to both.
+            found["figures"] = list(dict.fromkeys([*found["figures"], *more]))
     if options.json:
         output.document(found)
+        return 0
+    if found["likely_mistakes"]:
+        output.say(found["answer"])
+        summary(found)
         return 0
     summary(found)
     output.say()

@@ -26,4 +26,6 @@ def run(options: Namespace) -> int:
     else:
         for one in found["imported"]:
             output.say(one["message"])
+            for note in one["notes"]:
+                output.say(f"note: {note}")
     return 0

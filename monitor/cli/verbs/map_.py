@@ -57,7 +57,8 @@ def run(options: Namespace) -> int:
     )
     output.say(
         f"{found['campaign']}, run {found['run']}, model {found['model']}: volumetric error at {region['points']} "
-        f"points, {strokes} ({region['from']}), at {region['rotary_poses']} rotary poses"
+        f"points, {strokes} ({region['from']}), at {region['rotary_poses']} rotary "
+        f"pose{'s' if region['rotary_poses'] != 1 else ''}"
     )
     rows = [
         [name, output.rounded(part["error_um"], part["expanded_um"]), output.two_digits(part['u_um']),

@@ -95,7 +95,20 @@ def _add(options: Namespace) -> int:
             if options.campaign is not None:
                 raise
             document["history"] = []
-    return _told(document, options.json)
+    return _told(_with_default(document, options.as_), options.json)
+
+
+def _with_default(document: models.Document, as_: str | None) -> models.Document:
+    """Without --as the name itself has another meaning from now on: said, since others use it too."""
+    name, version = document["name"], document["version"]
+    changed = version > 1 and as_ in (None, name)
+    document["note_on_name"] = (
+        f"'{name}' without a version means {document['model']} from now on, for everybody and every campaign; "
+        f"{name}@{version - 1} is what it was (--as NAME leaves {name} alone)"
+        if changed
+        else None
+    )
+    return document
 
 
 def _remove(options: Namespace) -> int:
@@ -103,7 +116,7 @@ def _remove(options: Namespace) -> int:
         made = models.remove(db, options.effect, options.from_, options.as_)
         document = models.show(db, f"{made.name}@{made.version}")
     document["history"] = []
-    return _told(document, options.json)
+    return _told(_with_default(document, options.as_), options.json)
 
 
 def _told(document: models.Document, as_json: bool) -> int:
@@ -113,6 +126,8 @@ def _told(document: models.Document, as_json: bool) -> int:
     output.say(
         f"model {document['model']} now has: {', '.join(document['effects']) or 'the base effects alone'}"
     )
+    if document["note_on_name"]:
+        output.say(document["note_on_name"])
     if document["history"]:
         _steps(document["history"][-2:])
         for one in document["history"][-1]["no_number"]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.exceptions import InputError
 from monitor.workflow.health import report
 from monitor.workflow.health_machine import Settings
 from monitor.workflow.mail import mail_report, read_mail_settings
@@ -59,7 +60,11 @@ def run(options: Namespace) -> int:
         found = report(
             db, options.week, options.machine, options.out, settings=settings, workers=options.workers
         )
-    found["mailed_to"] = [] if options.mail is None else mail_report(options.mail, found)
+    found["mailed_to"], unsent = [], None
+    try:
+        found["mailed_to"] = [] if options.mail is None else mail_report(options.mail, found)
+    except InputError as error:
+        unsent = error  # the report is there all the same, and is told before what went wrong
     if options.json:
         output.document(found)
     else:
@@ -85,4 +90,6 @@ def run(options: Namespace) -> int:
             output.say(file)
         for address in found["mailed_to"]:
             output.say(f"sent to {address}")
+    if unsent is not None:
+        raise InputError(f"the report was written, but not sent: {unsent}") from unsent
     return 1 if options.fail_on_alarm and found["alarms"] else 0

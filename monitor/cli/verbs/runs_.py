@@ -25,4 +25,6 @@ def run(options: Namespace) -> int:
         output.document(found)
     else:
         output.listing(found["runs"], "no run")
+        for note in found["notes"]:
+            output.say(f"note: {note}")
     return 0

@@ -101,6 +101,14 @@ def _three(value: float) -> str:
     return f"{float(f'{value:.3g}'):.10g}"
 
 
+def _latest(one: dict[str, Any]) -> tuple[str, str, str]:
+    """The mean of the last day with its standard uncertainty and the number of its runs."""
+    value, u = one["latest"], one["latest_u"]
+    if not u:
+        return _three(value), "-", str(one["latest_runs"])
+    return output.rounded(value, u), output.two_digits(u), str(one["latest_runs"])
+
+
 def _tables(found: dict[str, Any]) -> None:
     for note in found["notes"]:
         output.say(f"note: {note}")
@@ -126,7 +134,7 @@ def _tables(found: dict[str, Any]) -> None:
         ]
         rows.append(
             [
-                name, one["unit"], _three(one["latest"]),
+                name, one["unit"], *_latest(one),
                 "-" if slope is None else output.rounded(slope, one["u_slope"]),
                 "-" if slope is None else output.two_digits(one['u_slope']), output.probability(one["p_value"]),
                 "-" if one["robust_slope_per_year"] is None else _three(one["robust_slope_per_year"]),
@@ -136,8 +144,8 @@ def _tables(found: dict[str, Any]) -> None:
                 "-" if charts["why"] else ", ".join(alarms) or "in control",
             ]
         )  # fmt: skip
-    names = ["parameter", "unit", "latest", "slope", "u", "p", "Theil-Sen", "limit", "crosses", "in tolerance next",
-             "charts"]  # fmt: skip
+    names = ["parameter", "unit", "latest", "u", "n", "slope", "u", "p", "Theil-Sen", "limit", "crosses",
+             "in tolerance next", "charts"]  # fmt: skip
     # A column that has nothing for any parameter is left out; the sentences below say why.
     told = [place for place in range(len(names)) if any(row[place] != "-" for row in rows)]
     output.table(
@@ -199,6 +207,12 @@ def _forecasts(found: dict[str, Any]) -> None:
             f"{output.probability(ahead['in_tolerance_at_next_check'])}; check within "
             f"{ahead['recommended_interval_days']:.0f} days"
         )
+        tested = ahead["backtest"]
+        if tested is not None:
+            output.say(
+                f"  {tested['inside']} of {tested['made']} past days, each foretold by the days before it, lay in the "
+                f"interval ({_three(tested['rms_um'])} µm off, root mean square)"
+            )
     elif ahead is not None and ahead["limit_um"] is not None:
         output.say(ahead["why"])
     intervals = {

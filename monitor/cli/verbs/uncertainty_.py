@@ -98,10 +98,10 @@ def run(options: Namespace) -> int:
                 f"allow {mcm['k_q']:.2f}, so its intervals are on the safe side"
             )
     if "lack_of_fit_causes" in found:
-        first = found["lack_of_fit_causes"][0]
+        causes = ", ".join(one["effect"] for one in found["lack_of_fit_causes"][:3])
         output.say(
-            f"the model does not explain all: what {first['effect']} (or another cause) does to the parameters is a "
-            f"line of the budget; `monitor explain {found['campaign']}` looks for the cause"
+            f"the model does not explain all: what effects such as {causes} would do to the parameters, none of them "
+            f"confirmed, is a line of the budget; `monitor explain {found['campaign']}` tests which one is missing"
         )
     for refusal in found["refused"]:
         output.say(f"no number: {refusal['why']}")

@@ -1,0 +1,32 @@
+"""Withdraw a campaign that should not have been imported: it no longer counts, and its name is free again."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from monitor.cli import output
+from monitor.cli.database import opened
+from monitor.cli.parser import common
+from monitor.workflow.withdrawals import withdraw
+
+EXAMPLE = 'monitor withdraw five-days --reason "balls 3 and 5 were exchanged in the file"'
+
+
+def options(parser: ArgumentParser) -> None:
+    common(parser)
+    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument("--reason", required=True, metavar="TEXT", help="why, in words; it is kept")
+
+
+def run(options: Namespace) -> int:
+    with opened(options) as db:
+        found = withdraw(db, options.campaign, options.reason)
+    if options.json:
+        output.document(found)
+        return 0
+    output.say(found["message"])
+    for number in found["certificates"]:
+        output.say(
+            f"certificate {number} rests on it: `monitor certificate amend {number}` or `withdraw {number}`"
+        )
+    return 0

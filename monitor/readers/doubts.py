@@ -1,0 +1,220 @@
+"""What looks like a mistake in a campaign folder, but may be none: told in a sentence, never a reason to refuse.
+
+A unit wrong by a thousand often still fits: the method finds the scale, or the model has room for it. Here the data are
+held against what is known without a fit: the declared places of balls and modules, the strokes that calibrations
+have, and the angles at which people index. What a fit has to see is told by `identify` and `explain`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Array, Campaign
+from monitor.units import DEGREE, MICROMETRE
+
+#: No calibration moves its axes by less: the smallest artefacts (a ball plate for a micro-machine) have 10 mm.
+SHORTEST_TRAVEL = 5.0
+#: A full turn in radians, with room for the last printed digit.
+FULL_TURN = 6.3
+#: People index at multiples of 5 degrees; radians of three decimals come back to them within 0.03 degrees.
+INDEX_DEG, INDEX_TOLERANCE_DEG = 5.0, 0.03
+#: Declared places are set up by hand: a few millimetres on 100 mm are usual.
+DISTANCE_TOLERANCE = 0.05
+#: Pairs beyond the tolerance from which on it is no single ball that was moved.
+TELLING_SHARE = 0.2
+#: What columns were taken for each other: metres or micrometres for millimetres, inches, a shifted decimal point.
+FACTORS = (
+    (1e3, "in metres"),
+    (1e-3, "in µm"),
+    (25.4, "in inches"),
+    (10.0, "ten times too small"),
+    (0.1, "ten times too large"),
+)
+#: Standard uncertainties of length standards: a millionth of the length is good, a thousandth is no calibration.
+LARGEST_SHARE = 1e-3
+#: Standard uncertainties of probes and trackers in mm: 0.01 µm is finer than any, 1 mm coarser than any.
+PROBE_RANGE = (1e-5, 1.0)
+#: Diameters of calibrated balls in mm.
+BALL_RANGE = (0.1, 300.0)
+
+
+def doubts(campaign: Campaign) -> tuple[str, ...]:
+    """Sentences on what to look at, each with the numbers that it rests on; empty for most campaigns."""
+    return tuple(
+        sentence
+        for found in (_short_runs, _travel, _angles, _places, _statements)
+        for sentence in found(campaign)
+    )
+
+
+def _short_runs(campaign: Campaign) -> Iterator[str]:
+    runs, counts = np.unique(campaign.probings.run, return_counts=True)
+    if len(runs) < 2:
+        return
+    values, times = np.unique(counts, return_counts=True)
+    # The commonest number, of two equally common ones the larger: a plan may grow, a file is only cut off.
+    usual = int(values[np.lexsort((values, times))[-1]])
+    for run, count in zip(runs.tolist(), counts.tolist(), strict=True):
+        if count < usual:
+            others = int(np.sum(counts == usual))
+            yield (
+                f"run {run} has {count} probings, {others} other{'s have' if others > 1 else ' has'} {usual}: if it "
+                "was broken off, its file may lack rows"
+            )
+
+
+def _spans(columns: dict[str, Array]) -> dict[str, float]:
+    return {name: float(np.ptp(values)) for name, values in columns.items() if len(values)}
+
+
+def _travel(campaign: Campaign) -> Iterator[str]:
+    """Columns in metres: nothing moves by more than a few millimetres."""
+    machine, probings = campaign.machine, campaign.probings
+    groups = (
+        {
+            f"{axis.lower()}_mm": values
+            for axis, values in probings.readings.items()
+            if machine.is_linear(axis)
+        },
+        {name: values for name, values in probings.channels.items() if name.startswith("tracker_")},
+    )
+    for columns in groups:
+        spans = _spans(columns)
+        largest = max(spans.values(), default=0.0)
+        if 0.0 < largest < SHORTEST_TRAVEL:
+            yield (
+                f"{_and(spans)} span {largest:.3g} mm at most: is the unit mm? Readings in metres look like this"
+            )
+
+
+def _angles(campaign: Campaign) -> Iterator[str]:
+    """Radians in columns of degrees."""
+    turning = {
+        axis: np.unique(values / DEGREE.factor)
+        for axis, values in campaign.probings.readings.items()
+        if not campaign.machine.is_linear(axis)
+    }
+    moving = {axis: values for axis, values in turning.items() if len(values) > 1}
+    largest = {axis: float(np.abs(values).max()) for axis, values in moving.items()}
+    if len(moving) > 2 and max(largest.values()) <= FULL_TURN:
+        columns = _and([f"{axis.lower()}_deg" for axis in moving])
+        yield f"{columns} never exceed {max(largest.values()):.3g}: is the unit degree? Radians look like this"
+        return
+    for axis, values in moving.items():
+        used = values[np.abs(values) > 1e-9]
+        as_degrees = used / DEGREE.factor
+        off_index = np.abs(as_degrees - INDEX_DEG * np.round(as_degrees / INDEX_DEG))
+        off_grid = np.abs(used - np.round(used, 2))
+        if largest[axis] <= FULL_TURN and np.all(off_index < INDEX_TOLERANCE_DEG) and np.any(off_grid > 1e-4):
+            shown = used[int(np.argmax(np.abs(used)))]
+            yield (
+                f"{axis.lower()}_deg never exceeds {largest[axis]:.4g}, and taken as radians its values are round "
+                f"angles ({shown:.6g} rad are {shown / DEGREE.factor:.0f}°): is the unit degree?"
+            )
+
+
+def _places(campaign: Campaign) -> Iterator[str]:
+    """Distances between balls, or modules, at one pose against the declared ones: no rotary axis has a part in them."""
+    what, place = _declared(campaign)
+    if not place or not all(axis in campaign.probings.readings for axis in "XYZ"):
+        return
+    steps, nominal = _pairs(campaign, place)
+    if not len(nominal):
+        return
+    off = _share_off(steps, nominal, np.ones(3))
+    if off <= TELLING_SHARE:
+        return
+    ratio = float(np.median(np.linalg.norm(steps, axis=1) / nominal))
+    head = (
+        f"the distances between {what} that were probed are {ratio:.3g} times the declared ones (median of "
+        f"{len(nominal)})"
+    )
+    for factor, unit in FACTORS:
+        for axes in ("XYZ", "X", "Y", "Z"):
+            scale = np.where([axis in axes for axis in "XYZ"], factor, 1.0)
+            if _share_off(steps, nominal, scale) <= TELLING_SHARE / 2:
+                columns = _and([f"{axis.lower()}_mm" for axis in axes])
+                yield (
+                    f"{head}: it looks as if {columns} {'were' if len(axes) > 1 else 'was'} {unit}"
+                    + (", or the declared places in another unit than mm" if len(axes) > 1 else "")
+                )
+                return
+    yield (
+        f"{head}; {off:.0%} of them differ by more than {DISTANCE_TOLERANCE:.0%}: check the declared places, the "
+        "names of the targets and the units"
+    )
+
+
+def _declared(campaign: Campaign) -> tuple[str, dict[str, Array]]:
+    """What stands at declared places, and where (3,) mm, up to a rigid motion; nothing for other methods."""
+    if campaign.method == "samba":
+        return "balls", {ball.id: np.array(ball.nominal) for ball in campaign.artefact.balls}
+    piece = campaign.artefact.l_shape
+    if campaign.method == "l-shape" and piece is not None:
+        return "modules", {module.id: np.array([*module.centre, 0.0]) for module in piece.modules}
+    return "", {}
+
+
+def _pairs(campaign: Campaign, place: dict[str, Array]) -> tuple[Array, Array]:
+    """Steps (n, 3) of X, Y, Z between targets probed at one pose of one run, and their declared distances (n,)."""
+    probings = campaign.probings
+    rows = np.flatnonzero(probings.run == probings.run[0])
+    fixed = [
+        values[rows] for axis, values in probings.readings.items() if not campaign.machine.is_linear(axis)
+    ]
+    fixed += [probings.channels[name][rows] for name in ("placement",) if name in probings.channels]
+    pose: npt.NDArray[np.int64] = np.zeros(len(rows), dtype=np.int64)
+    if fixed:
+        _, pose = np.unique(np.column_stack(fixed), axis=0, return_inverse=True)
+    pose = pose.reshape(-1)
+    known = np.array([name in place for name in probings.target[rows].tolist()])
+    read = np.column_stack([probings.readings[axis][rows] for axis in "XYZ"])
+    at = np.array([place.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
+    first, second = np.triu_indices(len(rows), 1)
+    kept = known[first] & known[second] & (pose[first] == pose[second])
+    first, second = first[kept], second[kept]
+    nominal = np.linalg.norm(at[first] - at[second], axis=1)
+    apart = nominal > 0.0
+    return (read[first] - read[second])[apart], nominal[apart]
+
+
+def _share_off(steps: Array, nominal: Array, scale: Array) -> float:
+    """Share of the distances that differ from the declared ones by more than the tolerance."""
+    return float(np.mean(np.abs(np.linalg.norm(steps * scale, axis=1) / nominal - 1.0) > DISTANCE_TOLERANCE))
+
+
+def _statements(campaign: Campaign) -> Iterator[str]:
+    """Numbers of campaign.toml that no probe, ball or length standard has."""
+    u = campaign.probe.standard_uncertainty
+    if not PROBE_RANGE[0] <= u <= PROBE_RANGE[1]:
+        yield (
+            f"the probe's standard uncertainty is {MICROMETRE.to_display(u):g} µm: is standard_uncertainty_um in µm?"
+        )
+    balls = {ball.id: ball for ball in campaign.artefact.balls}
+    for ball in balls.values():
+        if not BALL_RANGE[0] <= ball.diameter <= BALL_RANGE[1]:
+            yield f"ball {ball.id} has a diameter of {ball.diameter:g} mm: is diameter_mm in mm?"
+    bar = campaign.artefact.scale_bar
+    if bar is None:
+        return
+    if bar.standard_uncertainty > LARGEST_SHARE * bar.length:
+        yield (
+            f"the scale bar's standard uncertainty is {bar.standard_uncertainty:g} mm, more than a thousandth of its "
+            f"length of {bar.length:g} mm: are both in mm?"
+        )
+    if all(name in balls for name in bar.balls):
+        one, other = (np.array(balls[name].nominal) for name in bar.balls)
+        apart = float(np.linalg.norm(one - other))
+        if abs(apart - bar.length) > DISTANCE_TOLERANCE * bar.length:
+            yield (
+                f"the scale bar is {bar.length:g} mm long, but its balls {' and '.join(bar.balls)} are declared "
+                f"{apart:g} mm apart: check length_mm and nominal_mm"
+            )
+
+
+def _and(names: Iterator[str] | list[str] | dict[str, float]) -> str:
+    listed = list(names)
+    return listed[0] if len(listed) == 1 else f"{', '.join(listed[:-1])} and {listed[-1]}"

@@ -1,0 +1,111 @@
+"""The values of an identification in one row, found by its number: what the history of one machine is read from.
+
+``parameter_value`` holds the same numbers a row each, for people and for sums over the fleet; there the rows of one
+machine lie scattered over the weeks, and DuckDB looks through whole blocks of 122 880 rows for a few of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Array
+from monitor.store.connection import Database
+from monitor.store.results import StoredIdentification
+
+# Of rows that were written by SQL into ``parameter_value`` alone; the same statement is in migration 0007.
+_GATHER = """
+INSERT INTO identified_values
+SELECT identification_id, list_filter(runs, lambda run, i: (i - 1) % n = 0), value, u
+FROM (
+    SELECT identification_id, any_value(len(parameters)) AS n, list(run ORDER BY run, place) AS runs,
+           list(value ORDER BY run, place) AS value, list(u ORDER BY run, place) AS u
+    FROM (
+        SELECT v.*, parameters, list_position(parameters, parameter) AS place
+        FROM parameter_value AS v JOIN identification USING (identification_id)
+        WHERE identification_id >= ? AND identification_id < ?
+    )
+    GROUP BY identification_id
+)
+ORDER BY identification_id
+"""
+
+
+@dataclass(frozen=True)
+class IdentifiedValues:
+    """Of identification ``number``: ``runs`` (r,), ``value`` and ``u`` (r, p) in mm, rad or 1, NaN where refused."""
+
+    number: int
+    runs: npt.NDArray[np.int64]
+    value: Array
+    u: Array
+
+
+def insert_values(db: Database, number: int, identification: StoredIdentification) -> None:
+    """Write the row of an identification, inside the transaction that writes it."""
+    value, u = _matrices(identification)
+    db.execute(
+        "INSERT INTO identified_values VALUES (?, ?::BIGINT[], ?::DOUBLE[], ?::DOUBLE[])",
+        [number, [run.run for run in identification.runs], _list(value), _list(u)],
+    )
+
+
+def values_of(db: Database, numbers: Sequence[int]) -> Mapping[int, IdentifiedValues]:
+    """The values of identifications by their number; one that has none is left out."""
+    marks = ", ".join("?" * len(numbers))
+    found = {}
+    for number, runs, value, u in db.rows(
+        f"SELECT identification_id, runs, value, u FROM identified_values WHERE identification_id IN ({marks})",
+        list(numbers),
+    ):
+        # DuckDB gives None where a list holds NULL; numpy makes NaN of it.
+        shape = (len(runs), -1)
+        found[number] = IdentifiedValues(
+            number,
+            np.array(runs, dtype=np.int64),
+            np.array(value, dtype=np.float64).reshape(shape),
+            np.array(u, dtype=np.float64).reshape(shape),
+        )
+    return found
+
+
+def agrees(db: Database, number: int, identification: StoredIdentification) -> bool:
+    """Whether the row of an identification is what its runs say."""
+    found = values_of(db, [number]).get(number)
+    if found is None:
+        return False
+    value, u = _matrices(identification)
+    runs = np.array([run.run for run in identification.runs], dtype=np.int64)
+    a, b = np.argsort(found.runs), np.argsort(runs)
+    return (
+        np.array_equal(found.runs[a], runs[b])
+        and np.array_equal(found.value[a], value[b], equal_nan=True)
+        and np.array_equal(found.u[a], u[b], equal_nan=True)
+    )
+
+
+def gather_values(db: Database, portion: int = 50_000) -> None:
+    """Write the rows that are missing after ``parameter_value`` was filled by SQL, as large test data are.
+
+    ``portion`` identifications at a time, so that memory does not grow with their number.
+    """
+    ((first,), (end,)) = (
+        db.rows("SELECT coalesce(max(identification_id), 0) + 1 FROM identified_values")[0],
+        db.rows("SELECT coalesce(max(identification_id), 0) + 1 FROM identification")[0],
+    )
+    for start in range(first, end, portion):
+        db.execute(_GATHER, [start, min(start + portion, end)])
+
+
+def _matrices(identification: StoredIdentification) -> tuple[Array, Array]:
+    return (
+        np.array([run.estimate for run in identification.runs]),
+        np.array([np.sqrt(np.diag(run.covariance)) for run in identification.runs]),
+    )
+
+
+def _list(matrix: Array) -> list[float | None]:
+    return [None if np.isnan(value) else float(value) for value in matrix.ravel()]

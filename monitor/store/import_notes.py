@@ -1,0 +1,109 @@
+"""What was noticed at an import: sentences kept with the campaign, and runs that came in before.
+
+Readings of a run that equal those of another in every digit are a copy, never chance; counted as independent they
+would make every uncertainty too small. The hash of a run's readings tells them without reading the readings again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from itertools import groupby
+
+import numpy as np
+
+from monitor.records import Probings
+from monitor.store import audit, probings
+from monitor.store.connection import Database
+from monitor.store.record_json import machine_record
+from monitor.units import CONDITION_SUFFIXES
+
+#: Fewer probings than these may agree by chance: a controller that prints whole micrometres and a machine that
+#: repeats to 0.3 µm print the same coordinate again with a probability near 0.9; twelve times it happens in 0.3.
+#: With two or three coordinates a probing, or a finer print, it does not.
+FEWEST_PROBINGS = 12
+
+
+def run_fingerprints(found: Probings) -> dict[int, str]:
+    """The hash of targets and readings by run, of every run with ``FEWEST_PROBINGS`` or more.
+
+    Times and recorded conditions (temperatures) are left out: who copies a run may give it others.
+    """
+    measured = {**found.readings} | {
+        name: values
+        for name, values in found.channels.items()
+        if name.rpartition("_")[2] not in CONDITION_SUFFIXES
+    }
+    order = np.argsort(found.run, kind="stable")
+    runs, starts = np.unique(found.run[order], return_index=True)
+    prints = {}
+    for run, rows in zip(runs.tolist(), np.split(order, starts[1:]), strict=True):
+        if len(rows) < FEWEST_PROBINGS:
+            continue
+        own = hashlib.sha256("\0".join(found.target[rows].tolist()).encode())
+        for name in sorted(measured):
+            own.update(name.encode() + b"\0" + np.asarray(measured[name][rows], dtype="<f8").tobytes())
+        prints[int(run)] = own.hexdigest()
+    return prints
+
+
+def keep_fingerprints(db: Database, campaign_id: int, prints: dict[int, str]) -> None:
+    """Add the hashes of a campaign's runs, and those of campaigns that came in before there were any."""
+    _insert(db, campaign_id, prints)
+    older = db.rows(
+        "SELECT campaign_id, machine_description FROM campaign WHERE method <> 'curve' AND campaign_id <> ? "
+        "AND campaign_id NOT IN (SELECT campaign_id FROM run_fingerprint) ORDER BY campaign_id",
+        [campaign_id],
+    )
+    for number, machine in older:
+        record = probings.as_record(probings.select(db, number), machine_record(machine))
+        _insert(db, number, run_fingerprints(record))
+
+
+def _insert(db: Database, campaign_id: int, prints: dict[int, str]) -> None:
+    # A campaign whose runs are all short leaves a row, too, so that it is not looked at again with every import.
+    rows = prints or {0: ""}
+    db.execute(
+        "INSERT INTO run_fingerprint SELECT ?, unnest(?::BIGINT[]), unnest(?::VARCHAR[])",
+        [campaign_id, list(rows), list(rows.values())],
+    )
+
+
+def keep_notes(db: Database, campaign_id: int, notes: Sequence[str]) -> None:
+    """Add what was noticed, with its entry in the audit; nothing where there is nothing."""
+    if not notes:
+        return
+    for position, note in enumerate(notes, start=1):
+        db.execute("INSERT INTO import_note VALUES (?, ?, ?)", [campaign_id, position, note])
+    audit.record(db, "note", "import notes", str(campaign_id), notes_content(db, campaign_id))
+
+
+def notes_content(db: Database, campaign_id: int) -> str:
+    """The hash of the notes of a campaign."""
+    return audit.digest(
+        *db.rows("SELECT * FROM import_note WHERE campaign_id = ? ORDER BY position", [campaign_id])
+    )
+
+
+def campaign_notes(db: Database, campaign: str) -> tuple[str, ...]:
+    """What is to be known of a campaign's data: the notes of its import, and runs that equal others' in every digit."""
+    notes = [
+        str(note)
+        for (note,) in db.rows(
+            "SELECT note FROM v_import_notes WHERE campaign = ? ORDER BY position", [campaign]
+        )
+    ]
+    repeated = db.rows(
+        "SELECT same_as_campaign, same_as_machine, machine, run, same_as_run FROM v_repeated_runs "
+        "WHERE campaign = ? ORDER BY same_as_campaign, run, same_as_run",
+        [campaign],
+    )
+    for (other, its_machine, machine), rows in groupby(repeated, key=lambda row: row[:3]):
+        pairs = [(run, same) for *_, run, same in rows]
+        shown = ", ".join(f"{run} (there {same})" for run, same in pairs[:5]) + ", ..." * (len(pairs) > 5)
+        of = "" if machine == its_machine else f" of machine {its_machine}"
+        notes.append(
+            f"{len(pairs)} run{'s' * (len(pairs) > 1)} of {campaign} equal those of campaign {other}{of} in every "
+            f"reading, which two measurements never do: run {shown}; withdraw the copy (monitor withdraw)"
+        )
+    return tuple(notes)

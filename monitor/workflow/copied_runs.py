@@ -1,0 +1,73 @@
+"""Runs of one folder that are copies of each other: refused, since counted as independent they halve every u.
+
+Readings without noise are the exception: whoever simulates them exactly gets equal runs by right. They are known by
+residuals at the rounding of the file, which no machine leaves.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+
+import numpy as np
+
+from monitor.exceptions import CampaignError, Fault, MonitorError
+from monitor.methods import method_named
+from monitor.records import Campaign
+from monitor.store import Database, run_fingerprints
+from monitor.units import MICROMETRE
+from monitor.workflow.campaign_parts import only_run
+from monitor.workflow.models import as_model, resolve
+
+#: Residuals below 10 nm are what a simulation rounds; no machine and probe together repeat to that.
+EXACT_RMS = 1e-5
+
+
+def check_copies(db: Database, campaign: Campaign) -> tuple[str, ...]:
+    """A note where runs are equal because nothing in them is noise; empty where no run is like another.
+
+    Raises CampaignError naming the runs where measured ones are copies.
+    """
+    alike = defaultdict(list)
+    for run, fingerprint in run_fingerprints(campaign.probings).items():
+        alike[fingerprint].append(run)
+    copies = [runs for runs in alike.values() if len(runs) > 1]
+    if not copies:
+        return ()
+    rms = _rms(db, campaign, copies[0][0])
+    if rms < EXACT_RMS:
+        named = "; ".join(_and(runs) for runs in copies)
+        return (
+            f"runs {named} are equal in every reading, and their residuals ({rms * 1e6:.2g} nm) are no measurement's: "
+            "simulated without noise they count as runs, but their scatter means nothing",
+        )
+    raise CampaignError(
+        campaign.name,
+        [
+            Fault(
+                "probings.csv",
+                None,
+                "run",
+                f"runs {_and(runs)} are equal in every reading of their {np.sum(campaign.probings.run == runs[0])} "
+                "probings, which two measurements never are: give each run its own readings, or remove the copies "
+                "here and from runs.csv",
+            )
+            for runs in copies
+        ],
+    )
+
+
+def _rms(db: Database, campaign: Campaign, run: int) -> float:
+    """Root mean square of the residuals of a run in mm; infinite where it cannot be identified."""
+    try:
+        model = as_model(resolve(db, None, campaign.method))
+        one = only_run(campaign, run)
+        # Who simulates without noise may state none either, and nothing can be weighed by it.
+        one = replace(one, probe=replace(one.probe, standard_uncertainty=MICROMETRE.to_internal(1.0)))
+        return float(method_named(campaign.method).identify(one, model).runs[0].rms)
+    except MonitorError:
+        return float("inf")
+
+
+def _and(runs: list[int]) -> str:
+    return f"{', '.join(str(run) for run in runs[:-1])} and {runs[-1]}"

@@ -1,0 +1,142 @@
+"""Mistakes of units and lengths that still can be read are told; no example raises a false alarm."""
+
+from __future__ import annotations
+
+import csv
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from monitor.readers import doubts, read_campaign
+from monitor.records import Campaign
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+Change = Callable[[float], float]
+
+
+def of(folder: Path) -> tuple[str, ...]:
+    campaign = read_campaign(folder)
+    assert isinstance(campaign, Campaign)
+    return doubts(campaign)
+
+
+@pytest.fixture
+def altered(tmp_path: Path) -> Callable[..., Path]:
+    """An example with the columns of ``probings.csv`` changed by functions, and text of ``campaign.toml`` replaced."""
+
+    def alter(example: str, columns: dict[str, Change] | None = None, *texts: tuple[str, str]) -> Path:
+        folder = tmp_path / example
+        shutil.copytree(EXAMPLES / example, folder)
+        with (folder / "probings.csv").open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        for row in rows:
+            for name, change in (columns or {}).items():
+                row[name] = f"{change(float(row[name])):.9f}"
+        with (folder / "probings.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+        toml = (folder / "campaign.toml").read_text(encoding="utf-8")
+        for old, new in texts:
+            assert old in toml
+            toml = toml.replace(old, new)
+        (folder / "campaign.toml").write_text(toml, encoding="utf-8")
+        return folder
+
+    return alter
+
+
+@pytest.mark.parametrize(
+    "example", sorted(path.parent.name for path in EXAMPLES.glob("*/probings.csv")), ids=str
+)
+def test_no_example_raises_a_doubt(example: str) -> None:
+    assert of(EXAMPLES / example) == ()
+
+
+def metres(value: float) -> float:
+    return value / 1000.0
+
+
+def test_all_linear_columns_in_metres(altered: Callable[..., Path]) -> None:
+    spans, distances = of(altered("cold-cold", dict.fromkeys(("x_mm", "y_mm", "z_mm"), metres)))
+    assert "x_mm, z_mm and y_mm span" in spans or "x_mm, y_mm and z_mm span" in spans
+    assert "is the unit mm? Readings in metres look like this" in spans
+    assert "0.001 times the declared ones" in distances
+    assert "as if x_mm, y_mm and z_mm were in metres" in distances
+
+
+def test_one_column_in_metres(altered: Callable[..., Path]) -> None:
+    (told,) = of(altered("five-days", {"y_mm": metres}))
+    assert "it looks as if y_mm was in metres" in told
+
+
+def test_readings_in_inches(altered: Callable[..., Path]) -> None:
+    (told,) = of(altered("five-days", dict.fromkeys(("x_mm", "y_mm", "z_mm"), lambda mm: mm / 25.4)))
+    assert "were in inches" in told
+
+
+def test_an_artefact_in_metres(altered: Callable[..., Path]) -> None:
+    told = of(
+        altered(
+            "five-days", None,
+            ("[118.0, 6.0, 178.8]", "[0.118, 0.006, 0.1788]"),
+            ("[-4.0, 121.0, 153.4]", "[-0.004, 0.121, 0.1534]"),
+            ("[-117.0, -8.0, 102.6]", "[-0.117, -0.008, 0.1026]"),
+            ("[9.0, -119.0, 77.2]", "[0.009, -0.119, 0.0772]"),
+            ("[-150.0, 152.494615, 60.0]", "[-0.15, 0.152494615, 0.06]"),
+            ("[-150.0, -152.494615, 60.0]", "[-0.15, -0.152494615, 0.06]"),
+        )
+    )  # fmt: skip
+    assert "or the declared places in another unit than mm" in told[0]
+    assert "but its balls S1 and S2 are declared 0.304989 mm apart" in told[1]
+
+
+def test_statements_of_another_unit(altered: Callable[..., Path]) -> None:
+    probe, ball, bar = of(
+        altered(
+            "five-days", None,
+            ("standard_uncertainty_um = 1.0", "standard_uncertainty_um = 0.001"),
+            ("6.0, 178.8]\ndiameter_mm = 19.05", "6.0, 178.8]\ndiameter_mm = 19050"),
+            ("standard_uncertainty_mm = 0.0012", "standard_uncertainty_mm = 1.2"),
+        )
+    )  # fmt: skip
+    assert "is 0.001 µm: is standard_uncertainty_um in µm?" in probe
+    assert "ball 1 has a diameter of 19050 mm" in ball
+    assert "is 1.2 mm, more than a thousandth" in bar
+
+
+@pytest.mark.parametrize(
+    ("example", "column"), [("cold-cold", "b_deg"), ("five-days", "c_deg"), ("tilting-table", "a_deg")]
+)
+def test_radians_in_one_column(altered: Callable[..., Path], example: str, column: str) -> None:
+    (told,) = of(altered(example, {column: math.radians}))
+    assert f"{column} never exceeds" in told
+    assert "is the unit degree?" in told
+
+
+def test_radians_of_a_robot(altered: Callable[..., Path]) -> None:
+    joints = dict.fromkeys([f"j{k}_deg" for k in range(1, 7)], math.radians)
+    (told,) = of(altered("tracked-robot", joints))
+    assert "j1_deg, j2_deg, j3_deg, j4_deg, j5_deg and j6_deg never exceed" in told
+
+
+def test_a_tracker_in_metres(altered: Callable[..., Path]) -> None:
+    (told,) = of(altered("tracked-robot", dict.fromkeys([f"tracker_{k}_mm" for k in "xyz"], metres)))
+    assert "tracker_x_mm, tracker_y_mm and tracker_z_mm span" in told
+
+
+def test_modules_in_another_place(altered: Callable[..., Path]) -> None:
+    told = of(altered("l-shape", dict.fromkeys(("x_mm", "y_mm", "z_mm"), metres)))
+    assert "the distances between modules that were probed are 0.001 times" in told[-1]
+
+
+def test_a_run_that_was_broken_off(tmp_path: Path) -> None:
+    folder = tmp_path / "broken"
+    shutil.copytree(EXAMPLES / "five-days", folder)
+    lines = (folder / "probings.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    (folder / "probings.csv").write_text("".join(lines[:-10]), encoding="utf-8")
+    (told,) = of(folder)
+    assert told.startswith("run 20 has 52 probings, 19 others have 62")

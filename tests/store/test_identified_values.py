@@ -1,0 +1,60 @@
+"""The row of an identification's values: written beside parameter_value, and made anew from it by migration and SQL."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from monitor.records import Campaign
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    import_campaign,
+    save_identification,
+    verify_audit,
+)
+from monitor.store.identified_values import gather_values, values_of
+from monitor.store.migrations import available
+
+
+@pytest.fixture
+def filled(
+    db: Database,
+    make_campaign: Callable[..., Campaign],
+    make_identification: Callable[..., StoredIdentification],
+) -> Database:
+    one = make_campaign("one")
+    import_campaign(db, one)
+    save_identification(db, make_identification(one))
+    return db
+
+
+def test_the_row_holds_what_parameter_value_holds(filled: Database) -> None:
+    found = values_of(filled, [1])[1]
+    ((names,),) = filled.rows("SELECT parameters FROM identification WHERE identification_id = 1")
+    rows = filled.rows("SELECT run, parameter, value, u FROM parameter_value WHERE identification_id = 1")
+    assert found.value.shape == found.u.shape == (len(found.runs), len(names))
+    assert len(rows) == found.value.size
+    runs = found.runs.tolist()
+    for run, name, value, u in rows:
+        place = runs.index(run), names.index(name)
+        expected = [np.nan if x is None else x for x in (value, u)]
+        assert np.array_equal([found.value[place], found.u[place]], expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("way", ["sql", "migration"])
+def test_made_anew_from_the_rows_it_is_the_same(filled: Database, way: str) -> None:
+    filled.execute("DELETE FROM identified_values")
+    if way == "sql":
+        gather_values(filled, portion=1)
+    else:
+        statement = next(one.sql for one in available() if one.name == "0007_history.sql")
+        filled.execute(statement[statement.index("INSERT INTO identified_values") :])
+    assert verify_audit(filled).ok
+
+
+def test_the_history_of_a_machine_is_found_by_indices(db: Database) -> None:
+    names = {name for (name,) in db.rows("SELECT index_name FROM duckdb_indexes()")}
+    assert {"campaign_of_machine", "run_of_campaign", "identification_of_campaign"} <= names

@@ -1,0 +1,233 @@
+"""A withdrawn campaign counts nowhere, nothing of it is deleted, and its name is free again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from monitor.exceptions import CampaignError, InputError, NotFoundError
+from monitor.records import Campaign
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    campaign_notes,
+    export_tables,
+    import_campaign,
+    latest_documents,
+    list_campaigns,
+    list_machines,
+    list_withdrawn,
+    load_campaign,
+    load_certificate,
+    machine_history,
+    mark_certificate,
+    record_event,
+    restore,
+    save_analysis,
+    save_certificate,
+    save_identification,
+    take_backup,
+    verify_audit,
+    withdraw_campaign,
+)
+
+
+@pytest.fixture
+def filled(
+    db: Database,
+    make_campaign: Callable[..., Campaign],
+    make_identification: Callable[..., StoredIdentification],
+) -> Database:
+    """A machine with the campaigns ``one`` and ``two``, both identified, one of them certified."""
+    for name in ("one", "two"):
+        campaign = make_campaign(name)
+        import_campaign(db, campaign, notes=[f"something about {name}"])
+        save_identification(db, make_identification(campaign))
+        save_analysis(db, "uncertainty", {"of": name}, method="guf", campaign=name)
+    save_certificate(db, "C-1", "issued", "one", [1], {"a": 1}, b"pdf")
+    return db
+
+
+def test_a_withdrawn_campaign_counts_nowhere(
+    filled: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    machine = make_campaign("one").machine.id
+    done = withdraw_campaign(filled, "one", " wrong file ")
+    assert (done.campaign, done.machine, done.reason, done.certificates) == (
+        "one", machine, "wrong file", ("C-1",),
+    )  # fmt: skip
+    assert list(list_campaigns(filled)["campaign"]) == ["two"]
+    assert set(machine_history(filled, machine).campaign) == {"two"}
+    assert latest_documents(filled, "uncertainty", ["one", "two"]) == {"two": {"of": "two"}}
+    for view in ("v_runs", "v_probings", "v_parameters", "v_residuals", "v_identifications", "v_analyses",
+                 "v_tolerances", "v_import_notes"):  # fmt: skip
+        assert {name for (name,) in filled.rows(f"SELECT DISTINCT campaign FROM {view}")} == {"two"}, view
+    assert int(list_machines(filled)["campaigns"][0]) == 1
+    with pytest.raises(
+        NotFoundError, match=r"there is no campaign 'one'; it was withdrawn on .* \(wrong file\)"
+    ):
+        load_campaign(filled, "one")
+    assert list(list_withdrawn(filled)["reason"]) == ["wrong file"]
+
+
+def test_nothing_of_it_is_deleted_and_the_audit_knows(filled: Database) -> None:
+    tables = ("imported_campaign", "source_file", "run", "probing", "identification", "parameter_value", "analysis",
+              "import_note", "run_fingerprint")  # fmt: skip
+    before = [filled.rows(f"SELECT count(*) FROM {name}") for name in tables]
+    withdraw_campaign(filled, "one", "wrong file")
+    assert [filled.rows(f"SELECT count(*) FROM {name}") for name in tables] == before
+    assert verify_audit(filled).faults == ()
+    last = filled.rows("SELECT action, subject, key FROM audit ORDER BY entry DESC LIMIT 1")
+    assert last == [("withdraw", "withdrawn campaign", "1")]
+
+
+@pytest.mark.parametrize(
+    ("sql", "fault"),
+    [
+        ("UPDATE withdrawn_campaign SET reason = 'none'", "withdrawn campaign 1 was altered"),
+        ("DELETE FROM withdrawn_campaign", "withdrawn campaign 1 is in the audit, but no longer"),
+        ("DELETE FROM probing WHERE campaign_id = 1", "campaign one was altered"),
+        ("DELETE FROM probing WHERE campaign_id = 3", r"campaign one \(import 2 of that name\) was altered"),
+        ("DELETE FROM import_note WHERE campaign_id = 1", "import notes 1 is in the audit, but no longer"),
+    ],
+)
+def test_verification_sees_what_is_altered_about_it(
+    filled: Database, make_campaign: Callable[..., Campaign], sql: str, fault: str
+) -> None:
+    withdraw_campaign(filled, "one", "wrong file")
+    import_campaign(filled, make_campaign("one", location="hall 4"))
+    assert verify_audit(filled).faults == ()
+    filled.execute(sql)
+    faults = "; ".join(verify_audit(filled).faults)
+    with pytest.raises(AssertionError, match=fault):
+        raise AssertionError(faults)
+
+
+def test_its_name_is_free_for_the_corrected_folder(
+    filled: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    corrected = make_campaign("one", location="hall 4", files=(("campaign.toml", b"format = 2\n"),))
+    with pytest.raises(CampaignError, match=r"differs from the file.*monitor withdraw one --reason"):
+        import_campaign(filled, corrected)
+    withdraw_campaign(filled, "one", "wrong hall")
+    assert import_campaign(filled, corrected).state == "imported"
+    assert load_campaign(filled, "one").machine.location == "hall 4"
+    assert filled.rows("SELECT campaign_id FROM campaign WHERE campaign = 'one'") == [(3,)]
+    assert verify_audit(filled).faults == ()
+    # The latest may be withdrawn as well, and its number is not used again.
+    withdraw_campaign(filled, "one", "once more")
+    import_campaign(filled, corrected)
+    assert filled.rows("SELECT campaign_id FROM campaign WHERE campaign = 'one'") == [(4,)]
+    assert verify_audit(filled).faults == ()
+
+
+def test_a_wrong_topology_goes_with_the_last_campaign_of_the_machine(
+    filled: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    other = make_campaign("three", topology="w C A b X Y Z (C1) t")
+    withdraw_campaign(filled, "one", "wrong topology")
+    with pytest.raises(CampaignError, match="the axes of a machine do not change"):
+        import_campaign(filled, other)
+    withdraw_campaign(filled, "two", "wrong topology")
+    assert list(list_machines(filled)["machine"]) == []
+    import_campaign(filled, other)
+    assert list(list_machines(filled)["topology"]) == ["w C A b X Y Z (C1) t"]
+    assert verify_audit(filled).faults == ()
+
+
+def test_a_machine_with_an_event_stays(filled: Database, make_campaign: Callable[..., Campaign]) -> None:
+    machine = make_campaign("one").machine.id
+    record_event(filled, machine, datetime(2026, 1, 1, tzinfo=UTC), "crash", "x")
+    for name in ("one", "two"):
+        withdraw_campaign(filled, name, "wrong")
+    assert list(list_machines(filled)["machine"]) == [machine]
+    assert len(machine_history(filled, machine).run) == 0
+
+
+def test_its_certificates_stay_and_can_be_withdrawn(filled: Database) -> None:
+    withdraw_campaign(filled, "one", "wrong file")
+    found = load_certificate(filled, "C-1")
+    assert (found.state, found.campaign, found.campaign_withdrawn) == ("issued", "one", "wrong file")
+    assert filled.rows("SELECT campaign_withdrawn_at IS NOT NULL FROM v_certificates") == [(True,)]
+    mark_certificate(filled, "C-1", "withdrawn", "its campaign was wrong")
+    assert load_certificate(filled, "C-1").state == "withdrawn"
+    assert verify_audit(filled).faults == ()
+
+
+def test_a_reason_is_needed_and_a_campaign_that_is_there(filled: Database) -> None:
+    with pytest.raises(InputError, match="say why campaign one is withdrawn"):
+        withdraw_campaign(filled, "one", "  ")
+    with pytest.raises(NotFoundError, match="there is no campaign 'three'; there are one, two"):
+        withdraw_campaign(filled, "three", "wrong")
+    assert list(list_withdrawn(filled)["campaign"]) == []
+
+
+def test_backup_and_export_hold_the_withdrawn_too(
+    filled: Database, make_campaign: Callable[..., Campaign], tmp_path: Path
+) -> None:
+    withdraw_campaign(filled, "one", "wrong file")
+    import_campaign(filled, make_campaign("one", location="hall 4"))
+    take_backup(filled, tmp_path / "copy.duckdb")
+    restore(tmp_path / "copy.duckdb", tmp_path / "back.duckdb")
+    with Database(tmp_path / "back.duckdb") as back:
+        assert verify_audit(back).faults == ()
+        assert list(list_campaigns(back)["campaign"]) == ["two", "one"]
+        assert list(list_withdrawn(back)["campaign"]) == ["one"]
+    written = {path.name for path in export_tables(filled, tmp_path / "tables")}
+    assert {
+        "imported_campaign.csv",
+        "campaign.csv",
+        "withdrawn_campaign.csv",
+        "v_withdrawn_campaigns.csv",
+    } <= written
+    assert len((tmp_path / "tables" / "imported_campaign.csv").read_text(encoding="utf-8").splitlines()) == 4
+
+
+def long_campaign(make: Callable[..., Campaign], name: str, machine: str = "M") -> Campaign:
+    """Two runs of 15 touches with readings of their own."""
+    small = make(name, machine_id=machine)
+    probings = small.probings.rows([0, 1, 2] * 5 + [3, 4, 5] * 5)
+    steps = {axis: values + 1e-3 * (1 + k) for k, (axis, values) in enumerate(probings.readings.items())}
+    return replace(small, probings=replace(probings, readings=steps))
+
+
+def test_runs_that_came_in_before_are_named_until_one_of_both_is_withdrawn(
+    db: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    import_campaign(db, long_campaign(make_campaign, "one"))
+    import_campaign(db, long_campaign(make_campaign, "two", machine="N"))
+    assert campaign_notes(db, "one") == ()
+    (note,) = campaign_notes(db, "two")
+    assert note == (
+        "2 runs of two equal those of campaign one of machine M in every reading, which two measurements never do: "
+        "run 1 (there 1), 2 (there 2); withdraw the copy (monitor withdraw)"
+    )
+    withdraw_campaign(db, "one", "a copy")
+    assert campaign_notes(db, "two") == ()
+
+
+def test_a_temperature_of_its_own_makes_no_other_measurement(
+    db: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    import_campaign(db, long_campaign(make_campaign, "one"))
+    other = long_campaign(make_campaign, "two")
+    warmer = {name: values + 0.1 for name, values in other.probings.channels.items()}
+    import_campaign(db, replace(other, probings=replace(other.probings, channels=warmer)))
+    assert len(campaign_notes(db, "two")) == 1
+    third = long_campaign(make_campaign, "three")
+    moved = {axis: values + 1e-6 for axis, values in third.probings.readings.items()}
+    import_campaign(db, replace(third, probings=replace(third.probings, readings=moved)))
+    assert campaign_notes(db, "three") == ()
+
+
+def test_campaigns_from_before_the_hashes_are_compared_too(
+    db: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    import_campaign(db, long_campaign(make_campaign, "one"))
+    db.execute("DELETE FROM run_fingerprint")
+    import_campaign(db, long_campaign(make_campaign, "two"))
+    assert len(campaign_notes(db, "two")) == 1
