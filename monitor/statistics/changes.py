@@ -215,7 +215,7 @@ def find_changes(
     may share a component. ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
     holds for whatever dependence among them; inside a piece every step that is found splits it again at the
     same level. It holds for runs whose neighbours correlate by up to 0.7 and for day components up to
-    twice the scatter of a run: whatever of these a series does not refute is allowed for (see ``scan``), so for
+    the scatter of a run: whatever of these a series does not refute is allowed for (see ``scan``), so for
     independent runs the rate is below it. Measured rates and power: docs/trials-statistics.md. Pieces of fewer
     than 6 runs are not searched. Raises ``DataError`` for times that fall, unknown names in ``u``, trials that
     cannot reach the level, or non-finite values.

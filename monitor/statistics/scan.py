@@ -26,8 +26,8 @@ GRID = np.arange(0.0, 0.91, 0.1)
 #: Beyond this correlation no level is claimed: some dozens of such runs have no constant mean to change from.
 HIGHEST = 0.7
 #: Day components of which the likelihood is computed, in standard deviations of a run. Beyond the last no level is
-#: claimed: the larger the component allowed for, the larger a step must be that a handful of days still shows.
-DAY_GRID = (0.5, 1.0, 2.0)
+#: claimed: four days of which the last differs would then say nothing, however much it differs.
+DAY_GRID = (0.5, 1.0)
 #: A correlation is refuted where the logarithm of its likelihood is so far below the highest: one-sided 97.7 % for
 #: a normal estimate. Chosen by measured rates (docs/trials-statistics.md): 1 leaves 6 % false alarms of 20 runs.
 REFUTED = 2.0

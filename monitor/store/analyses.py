@@ -6,7 +6,7 @@ Nothing is replaced: the latest of its kind is what ``load_analysis`` gives.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, TypedDict, Unpack
@@ -88,14 +88,14 @@ def save_analysis(
     return number
 
 
-def latest_documents(db: Database, kind: str, campaigns: Sequence[str]) -> dict[str, Mapping[str, Any]]:
-    """The document of the latest result of a kind of each campaign that has one, in one query for all."""
+def latest_documents(db: Database, kind: str, machine: str) -> dict[str, Mapping[str, Any]]:
+    """The document of the latest result of a kind of each campaign of a machine that has one, in one query for all."""
     return {
         campaign: json.loads(document)
         for campaign, document in db.rows(
             "SELECT c.campaign, arg_max(a.document, a.analysis_id) FROM analysis AS a JOIN campaign AS c "
-            "USING (campaign_id) WHERE a.kind = ? AND list_contains(?, c.campaign) GROUP BY ALL ORDER BY ALL",
-            [kind, list(campaigns)],
+            "USING (campaign_id) WHERE a.kind = ? AND c.machine = ? GROUP BY ALL ORDER BY ALL",
+            [kind, machine],
         )
     }
 

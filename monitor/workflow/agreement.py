@@ -32,9 +32,10 @@ class Moment:
 Evaluated = Mapping[str, Mapping[str, float]]
 
 
-def evaluated(db: Database, campaigns: Sequence[str]) -> Evaluated:
-    """Standard uncertainties, in display units, of the latest `monitor uncertainty` of each campaign that has one."""
-    found = latest_documents(db, "uncertainty", campaigns)
+def evaluated(db: Database, machine: str) -> Evaluated:
+    """Standard uncertainties, in display units, of the latest `monitor uncertainty` of a machine's campaigns that have
+    one."""
+    found = latest_documents(db, "uncertainty", machine)
     return {campaign: document["guf"]["u"] for campaign, document in found.items()}
 
 

@@ -212,7 +212,7 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
                 Moment(at.timestamp(), one["kind"], one["description"])
                 for at, one in zip(moments, known, strict=True)
             ],
-            evaluated(db, list(dict.fromkeys(history.campaign.tolist()))),
+            evaluated(db, machine),
         ),
         "events": known,
         "notes": same_hours(history),

@@ -57,4 +57,4 @@ def test_made_anew_from_the_rows_it_is_the_same(filled: Database, way: str) -> N
 
 def test_the_history_of_a_machine_is_found_by_indices(db: Database) -> None:
     names = {name for (name,) in db.rows("SELECT index_name FROM duckdb_indexes()")}
-    assert {"campaign_of_machine", "run_of_campaign", "identification_of_campaign"} <= names
+    assert {"imported_campaign_of_machine", "run_of_campaign", "identification_of_campaign"} <= names

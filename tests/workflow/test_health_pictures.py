@@ -118,14 +118,15 @@ def test_where_nothing_is_missing_the_page_says_so_and_draws_nothing(fleet: Data
     html = Path(made["files"][0]).read_text(encoding="utf-8")
     own = html[html.index(">M-nothing-hidden</h1>") :].partition("</section>")[0]
     assert "No picture: the model explains these measurements." in own
-    assert "<svg class" not in own
-    assert html.count('<svg class="plot"') == 3 * len(HIDDEN)
+    # The map of the volumetric error is on every page.
+    assert own.count('<svg class="plot"') == 1
+    assert html.count('<svg class="plot"') == 3 * len(HIDDEN) + len(HIDDEN) + 1
 
 
 def test_the_same_pictures_stand_in_html_and_pdf_and_are_small(fleet: Database, made: dict) -> None:
     html = Path(made["files"][0]).read_text(encoding="utf-8")
     pictures = re.findall(r'<svg class="plot".*?</svg>', html, re.S)
-    assert all(len(one) < 25_000 for one in pictures)
+    assert all(len(one) < 30_000 for one in pictures)
     for one in pictures:
         ElementTree.fromstring(one)
     pages = [" ".join(page.extract_text().split()) for page in pypdf.PdfReader(made["files"][1]).pages]
