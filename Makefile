@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: real-data help setup demo test check format bench trials wheel clean distclean
+.PHONY: real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -45,6 +45,10 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 
 wheel: setup  ## build the wheel and run the tests against it, away from the checkout
 	@$(RUN) tests/setup/installed_wheel.py $(ARGS)
+
+# What a wheel can lack shows in these: files of the package, migrations, texts and fonts, the command.
+wheel-parts: setup
+	@$(RUN) tests/setup/installed_wheel.py tests/cli tests/readers tests/store tests/reporting tests/test_wheel.py $(ARGS)
 
 clean:  ## remove what the others left, except the virtual environment
 	@rm -rf demo-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
