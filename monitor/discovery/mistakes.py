@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -140,24 +141,24 @@ def _systematic(campaign: Campaign) -> Iterator[tuple[str, Callable[[Campaign], 
     for group in (linear, turning):
         for one, other in combinations(group, 2):
             columns = f"the columns {_column(one, one in linear)} and {_column(other, other in linear)}"
-            yield f"{columns} were exchanged", _exchange_readings(one, other)
+            yield f"{columns} were exchanged", _exchange("readings", [(one, other)])
     for axis in turning:
         yield (
             f"the sign of {axis} were the other way round (`sign` of {axis} in campaign.toml)",
-            _scale_readings((axis,), -1.0),
+            _scale("readings", (axis,), -1.0),
         )
     for axis in linear:
-        yield f"the sign of {axis} were the other way round", _scale_readings((axis,), -1.0)
+        yield f"the sign of {axis} were the other way round", _scale("readings", (axis,), -1.0)
     measured = [name for name in probings.channels if name.startswith(("tracker_", "plane_", "paraboloid_"))]
     for one, other in combinations(measured, 2):
-        yield f"the columns {one} and {other} were exchanged", _exchange_channels([(one, other)])
+        yield f"the columns {one} and {other} were exchanged", _exchange("channels", [(one, other)])
     spots = [("plane_u_um", "plane_v_um"), ("paraboloid_u_um", "paraboloid_v_um")]
     if all(name in measured for pair in spots for name in pair):
-        yield "u and v of the sensor were exchanged in both pairs of columns", _exchange_channels(spots)
+        yield "u and v of the sensor were exchanged in both pairs of columns", _exchange("channels", spots)
         across = [("plane_u_um", "paraboloid_u_um"), ("plane_v_um", "paraboloid_v_um")]
-        yield "the columns of plane and paraboloid were exchanged", _exchange_channels(across)
+        yield "the columns of plane and paraboloid were exchanged", _exchange("channels", across)
     for name in measured:
-        yield f"the sign of {name} were the other way round", _scale_channels((name,), -1.0)
+        yield f"the sign of {name} were the other way round", _scale("channels", (name,), -1.0)
     for axes, unit, factor in (
         (linear, "in metres", 1e3),
         (linear, "in inches", 25.4),
@@ -165,9 +166,9 @@ def _systematic(campaign: Campaign) -> Iterator[tuple[str, Callable[[Campaign], 
     ):
         for some in [*([tuple(axes)] if len(axes) > 1 else []), *((axis,) for axis in axes)]:
             columns = ", ".join(_column(axis, axis in linear) for axis in some)
-            yield f"{columns} {'was' if len(some) == 1 else 'were'} {unit}", _scale_readings(some, factor)
+            yield f"{columns} {'was' if len(some) == 1 else 'were'} {unit}", _scale("readings", some, factor)
     if measured and measured[0].startswith("tracker_"):
-        yield f"{', '.join(measured)} were in metres", _scale_channels(tuple(measured), 1e3)
+        yield f"{', '.join(measured)} were in metres", _scale("channels", tuple(measured), 1e3)
     names = [str(name) for name in np.unique(probings.target)]
     if len(names) <= MOST_TARGETS:
         for one, other in combinations(names, 2):
@@ -196,43 +197,31 @@ def _word(campaign: Campaign) -> str:
     return {"tracker": "reflector", "l-shape": "module", "samba": "ball"}.get(campaign.method, "target")
 
 
-def _exchange_readings(one: str, other: str) -> Callable[[Campaign], Campaign]:
+def _exchange(
+    numbers: Literal["readings", "channels"], pairs: Sequence[tuple[str, str]]
+) -> Callable[[Campaign], Campaign]:
+    """Exchanges pairs of columns."""
+
     def undo(campaign: Campaign) -> Campaign:
-        found = dict(campaign.probings.readings)
-        found[one], found[other] = found[other], found[one]
-        return replace(campaign, probings=replace(campaign.probings, readings=found))
-
-    return undo
-
-
-def _scale_readings(axes: Sequence[str], factor: float) -> Callable[[Campaign], Campaign]:
-    def undo(campaign: Campaign) -> Campaign:
-        found = {
-            axis: values * (factor if axis in axes else 1.0)
-            for axis, values in campaign.probings.readings.items()
-        }
-        return replace(campaign, probings=replace(campaign.probings, readings=found))
-
-    return undo
-
-
-def _exchange_channels(pairs: Sequence[tuple[str, str]]) -> Callable[[Campaign], Campaign]:
-    def undo(campaign: Campaign) -> Campaign:
-        found = dict(campaign.probings.channels)
+        found = dict(getattr(campaign.probings, numbers))
         for one, other in pairs:
             found[one], found[other] = found[other], found[one]
-        return replace(campaign, probings=replace(campaign.probings, channels=found))
+        changed: dict[str, Any] = {numbers: found}
+        return replace(campaign, probings=replace(campaign.probings, **changed))
 
     return undo
 
 
-def _scale_channels(names: Sequence[str], factor: float) -> Callable[[Campaign], Campaign]:
+def _scale(
+    numbers: Literal["readings", "channels"], names: Sequence[str], factor: float
+) -> Callable[[Campaign], Campaign]:
+    """Multiplies some columns."""
+
     def undo(campaign: Campaign) -> Campaign:
-        found = {
-            name: values * (factor if name in names else 1.0)
-            for name, values in campaign.probings.channels.items()
-        }
-        return replace(campaign, probings=replace(campaign.probings, channels=found))
+        given = getattr(campaign.probings, numbers)
+        found = {name: values * (factor if name in names else 1.0) for name, values in given.items()}
+        changed: dict[str, Any] = {numbers: found}
+        return replace(campaign, probings=replace(campaign.probings, **changed))
 
     return undo
 

@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from by_path import simulator
 from scipy.spatial.transform import Rotation
 
-SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "tracked-robot"
 NOISE = 20.0
 
 
 def robots() -> ModuleType:
     """The simulator of tracked robots, loaded by path."""
-    if "simulator" not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+    simulator()
     return importlib.import_module("simulator.robot_campaign")
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from by_path import simulator
 
 from monitor.discovery import Explanation, explain, fit
 from monitor.discovery.poses import poses_of_rows, widening
@@ -23,20 +22,11 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.workflow.identification_notes import note
 
-SIMULATOR = Path(__file__).resolve().parents[1] / "simulator"
-
 
 @pytest.fixture(scope="module")
 def robots() -> ModuleType:
     """The simulator of tracked robots, loaded by path."""
-    if "simulator" not in sys.modules:
-        spec = importlib.util.spec_from_file_location(
-            "simulator", SIMULATOR / "__init__.py", submodule_search_locations=[str(SIMULATOR)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules["simulator"] = module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+    simulator()
     return importlib.import_module("simulator.robot_campaign")
 
 
