@@ -170,7 +170,8 @@ def _scanned(
         found = gear_variants(now, visible, [one.candidate for one in result.findings], rate)
         new = [one for one in found if one.effect.text not in known]
         if not new or len(gears) > MOST_GEARS:
-            return with_tables(now, visible, result, scanned)
+            visible, result = with_tables(now, visible, result, scanned)
+            return visible, stands_out(visible, result)
         gears += new
         visible = replace(visible, candidates=(*visible.candidates, *see(now, new).candidates))
 
