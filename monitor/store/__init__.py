@@ -7,6 +7,7 @@ its unit. Only this room imports duckdb.
 
 from monitor.store.analyses import (
     StoredAnalysis,
+    check_analysis,
     latest_documents,
     list_analyses,
     load_analysis,
@@ -67,6 +68,7 @@ __all__ = [
     "Verification",
     "Withdrawal",
     "campaign_notes",
+    "check_analysis",
     "clear_refusals",
     "curve_names",
     "described_machines",

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from monitor.discovery import Fit
 from monitor.records import Array
 from monitor.reporting.volumetric_result import Length, Place, VolumetricResult
 from monitor.units import DEGREE, MICROMETRE
-from monitor.workflow.uncertainty import Evaluated
+from monitor.workflow.evaluations import Evaluation
 from monitor.workflow.volumetric import Mapped, at_zero, map_of
 
 
-def volumetric_result(found: Evaluated, state: str) -> VolumetricResult:
-    """The map of an evaluated run in display units. Raises InputError where not three linear axes moved."""
-    mapped = map_of(found)
+def volumetric_result(found: Evaluation, fit: Fit, state: str) -> VolumetricResult:
+    """The map of an evaluated run in display units. Raises InputError where not three linear axes moved.
+
+    ``fit`` is the evaluated model fitted to the campaign.
+    """
+    mapped = map_of(found, fit)
     drawn = at_zero(mapped)
-    error, p = mapped.error, found.framework.p
+    error, p = mapped.error, found.p
     k = error.factor(p)
     worst = error.worst
     return VolumetricResult(

@@ -18,8 +18,10 @@ from monitor.reporting.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.render import certificate_pdf
 from monitor.reporting.signing import Key, sign
 from monitor.reporting.texts import ENGLISH, texts_of
+from monitor.reporting.volumetric_result import VolumetricResult
 from monitor.store import (
     Database,
+    StoredModel,
     list_certificates,
     load_campaign,
     load_certificate,
@@ -28,11 +30,10 @@ from monitor.store import (
 )
 from monitor.workflow.certificate_checks import summary
 from monitor.workflow.certificate_files import font_hashes, keep_issued, path_of, prepared, publish
-from monitor.workflow.certificate_map import volumetric_result
 from monitor.workflow.certificate_results import StoredMonteCarlo, results_of, stored_monte_carlo
 from monitor.workflow.conformity import statement_of
-from monitor.workflow.models import label
-from monitor.workflow.uncertainty import Evaluated, evaluate
+from monitor.workflow.evaluations import Evaluation, evaluation_of, stored_evaluation
+from monitor.workflow.models import as_model, label, resolve
 
 Document = dict[str, Any]
 
@@ -95,7 +96,10 @@ def issue(
     replaced = None
     if wanted.replaces is not None:
         replaced = _replaced(db, wanted.replaces, wanted.reason, wanted.draft, loaded)
-    found = evaluate(db, campaign, run, model=wanted.model, method="guf", linear_axes=wanted.linear_axes)
+    model = resolve(db, wanted.model, loaded.method)
+    found = stored_evaluation(db, loaded, run, model, wanted.linear_axes)
+    if found is None:
+        found = _evaluated(db, loaded, run, model, wanted.linear_axes)
     chosen = number or next_number(db, day.year)
     path = path_of(out, chosen)
     keep_issued(db, path)
@@ -123,6 +127,20 @@ def issue(
         raise
     publish(part, path, chosen)
     return {**summary(db, chosen), "file": str(path)}
+
+
+def _evaluated(
+    db: Database, campaign: Campaign, run: int, model: StoredModel, linear_axes: LinearAxes | None
+) -> Evaluation:
+    """The evaluation of a run that has none in the database."""
+    # Solver and compiler take a second to load, for which a stored result need not wait.
+    from monitor.workflow.uncertainty import evaluate
+    from monitor.workflow.uncertainty_documents import document
+
+    done = evaluate(
+        db, campaign.name, run, model=f"{model.name}@{model.version}", method="guf", linear_axes=linear_axes
+    )
+    return evaluation_of(document(done), campaign, model)
 
 
 def _run_of(campaign: Campaign, run: int | None) -> int:
@@ -159,7 +177,7 @@ def _check_day(campaign: Campaign, run: int, day: date) -> None:
 
 def _record(
     stated: LaboratoryFile,
-    found: Evaluated,
+    found: Evaluation,
     monte_carlo: StoredMonteCarlo | None,
     wanted: Wishes,
     *,
@@ -176,16 +194,26 @@ def _record(
         number=number,
         issued_on=issued_on,
         model=label(found.model),
-        volumetric=[volumetric_result(found, result.state)] if wanted.with_map else [],
+        volumetric=[_map(found, result.state)] if wanted.with_map else [],
     )
     if wanted.conformity is not None:
         statement = statement_of(
-            result, wanted.conformity, texts, campaign=found.campaign.name, dof=found.framework.dof
+            result, wanted.conformity, texts, campaign=found.campaign.name, dof=found.dof
         )
         record = dataclasses.replace(record, conformity=statement)
     if wanted.draft and record.title:
         record = dataclasses.replace(record, title=texts("record.draft", title=record.title))
     return record
+
+
+def _map(found: Evaluation, state: str) -> VolumetricResult:
+    # Loaded here: a certificate without a map needs no model fitted.
+    from monitor.discovery import fit
+    from monitor.methods import method_named
+    from monitor.workflow.certificate_map import volumetric_result
+
+    problem = method_named(found.campaign.method).problem_of(found.campaign, as_model(found.model))
+    return volumetric_result(found, fit(problem), state)
 
 
 def _replaced(db: Database, number: str, reason: str, draft: bool, campaign: Campaign) -> Replaced:
@@ -206,7 +234,7 @@ def _replaced(db: Database, number: str, reason: str, draft: bool, campaign: Cam
     return Replaced(number, issued_on, reason.strip(), old.pdf_sha256)
 
 
-def _inputs(found: Evaluated, monte_carlo: StoredMonteCarlo | None) -> Document:
+def _inputs(found: Evaluation, monte_carlo: StoredMonteCarlo | None) -> Document:
     """What the results were computed from: kept with the certificate and inside its PDF."""
     return {
         "campaign": found.campaign.name,
@@ -216,7 +244,9 @@ def _inputs(found: Evaluated, monte_carlo: StoredMonteCarlo | None) -> Document:
         "model_effects": list(found.model.effects),
         # The GUM framework draws no random numbers; the Monte Carlo that it was compared with does.
         "seed": None if monte_carlo is None else monte_carlo.seed,
-        "stored_result": None if monte_carlo is None else monte_carlo.number,
+        # Numbers in v_analyses; None for an evaluation that was made for the certificate.
+        "stored_result": found.number,
+        "stored_monte_carlo": None if monte_carlo is None else monte_carlo.number,
         "software": f"machine-health-monitor {__version__}",
     }
 
