@@ -25,6 +25,7 @@ from monitor.store.catalogue import (
 )
 from monitor.store.certificates import (
     StoredCertificate,
+    certificate_numbers,
     find_certificate,
     list_certificates,
     load_certificate,
@@ -68,6 +69,7 @@ __all__ = [
     "Verification",
     "Withdrawal",
     "campaign_notes",
+    "certificate_numbers",
     "check_analysis",
     "clear_refusals",
     "curve_names",

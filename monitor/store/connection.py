@@ -16,13 +16,15 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import duckdb
-import pandas as pd
 
 from monitor.exceptions import StoreError
 from monitor.store import migrations
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Parameters = Sequence[Any] | Mapping[str, Any]
 
@@ -91,10 +93,15 @@ class Database:
             columns: dict[str, Any] = self._connection.execute(sql, parameters).fetchnumpy()
             return columns
 
-    def insert(self, sql: str, incoming: pd.DataFrame, parameters: Parameters = ()) -> None:
-        """Run an INSERT that selects from ``incoming``: 50 times as quick as row by row."""
+    def insert(
+        self, sql: str, incoming: Mapping[str, Any] | pd.DataFrame, parameters: Parameters = ()
+    ) -> None:
+        """Run an INSERT that selects from ``incoming``, columns by name: 50 times as quick as row by row."""
+        # Takes a fifth of a second to load: what only reads does not wait for it.
+        import pandas as pd
+
         with self._lock, _stopped_by_ctrl_c():
-            self._connection.register("incoming", incoming)
+            self._connection.register("incoming", pd.DataFrame(incoming))
             try:
                 self._connection.execute(sql, parameters)
             finally:

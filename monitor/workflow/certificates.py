@@ -22,7 +22,7 @@ from monitor.reporting.volumetric_result import VolumetricResult
 from monitor.store import (
     Database,
     StoredModel,
-    list_certificates,
+    certificate_numbers,
     load_campaign,
     load_certificate,
     mark_certificate,
@@ -63,7 +63,7 @@ class Wishes:
 
 def next_number(db: Database, year: int) -> str:
     """The next free number of a year: ``2026-0001``."""
-    taken = [str(number) for number in list_certificates(db)["number"]]
+    taken = certificate_numbers(db)
     last = max((int(n[5:]) for n in taken if n.startswith(f"{year}-") and n[5:].isdigit()), default=0)
     return f"{year}-{last + 1:04d}"
 
