@@ -20,14 +20,21 @@ from typing import Any
 
 from fontTools.ttLib import TTFont
 from jinja2 import Environment, FunctionLoader, StrictUndefined, select_autoescape
-from weasyprint import HTML, Attachment
-from weasyprint.text.fonts import FontConfiguration
-from weasyprint.urls import FatalURLFetchingError, URLFetcher, URLFetcherResponse
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate import CertificateRecord
 from monitor.reporting.certificate_data import Attached, certificate_files
 from monitor.reporting.certificate_page import certificate_context
+from monitor.reporting.certificate_tables import LETTERS_PT
+from monitor.reporting.layout_engine import (
+    HTML,
+    Attachment,
+    FatalURLFetchingError,
+    FontConfiguration,
+    URLFetcher,
+    URLFetcherResponse,
+)
+from monitor.reporting.letter_widths import in_mm
 from monitor.reporting.resources import FONT_FILES, font_bytes, report_text
 
 PDF_VARIANT = "pdf/a-3u"
@@ -155,6 +162,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.tests["wider_than"] = lambda words, mm: in_mm(words, LETTERS_PT) > mm
     environment.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
     return environment
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -90,7 +90,7 @@ def draw_lines(
     z = rng.standard_normal((3, count, len(lines))) @ root.T
     u = rng.uniform(size=count)
     dof = np.array([line.dof for line in lines])
-    heavy = np.sqrt(dof / stats.chi2.isf(u[:, np.newaxis], dof))
+    heavy = np.sqrt(dof / scipy.stats.chi2.isf(u[:, np.newaxis], dof))
     roots = np.array([np.linalg.cholesky(line.covariance + 1e-30 * np.eye(2)) for line in lines])
     level = z[0] * roots[:, 0, 0]
     slope = z[0] * roots[:, 1, 0] + z[1] * roots[:, 1, 1]

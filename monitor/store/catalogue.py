@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from monitor.exceptions import NotFoundError
 from monitor.records import Machine
 from monitor.store.connection import Database
 from monitor.store.record_json import machine_record
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def list_campaigns(db: Database) -> pd.DataFrame:

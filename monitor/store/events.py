@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from monitor.exceptions import InputError
 from monitor.store import audit
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database, utc_now
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def record_event(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> int:

@@ -1,7 +1,7 @@
-"""The values of an identification in one row, found by its number: what the history of one machine is read from.
+"""The values of an identification in one row, a list a parameter: what histories and the fleet's sums are read from.
 
-``parameter_value`` holds the same numbers a row each, for people and for sums over the fleet; there the rows of one
-machine lie scattered over the weeks, and DuckDB looks through whole blocks of 122 880 rows for a few of them.
+``parameter_value`` holds the same numbers a row each, for people; there the rows of one machine lie scattered over the
+weeks, and DuckDB looks through whole blocks of 122 880 rows for a few of them.
 """
 
 from __future__ import annotations
@@ -16,20 +16,18 @@ from monitor.records import Array
 from monitor.store.connection import Database
 from monitor.store.results import StoredIdentification
 
-# Of rows that were written by SQL into ``parameter_value`` alone; the same statement is in migration 0007.
+# Of rows that were written by SQL into ``parameter_value`` alone.
 _GATHER = """
 INSERT INTO identified_values
-SELECT identification_id, list_filter(runs, lambda run, i: (i - 1) % n = 0), value, u
+SELECT identification_id, first(runs), list(value ORDER BY place), list(u ORDER BY place)
 FROM (
-    SELECT identification_id, any_value(len(parameters)) AS n, list(run ORDER BY run, place) AS runs,
-           list(value ORDER BY run, place) AS value, list(u ORDER BY run, place) AS u
-    FROM (
-        SELECT v.*, parameters, list_position(parameters, parameter) AS place
-        FROM parameter_value AS v JOIN identification USING (identification_id)
-        WHERE identification_id >= ? AND identification_id < ?
-    )
-    GROUP BY identification_id
+    SELECT identification_id, list_position(any_value(parameters), parameter) AS place,
+           list(run ORDER BY run) AS runs, list(value ORDER BY run) AS value, list(u ORDER BY run) AS u
+    FROM parameter_value JOIN identification USING (identification_id)
+    WHERE identification_id >= ? AND identification_id < ?
+    GROUP BY identification_id, parameter
 )
+GROUP BY identification_id
 ORDER BY identification_id
 """
 
@@ -48,8 +46,8 @@ def insert_values(db: Database, number: int, identification: StoredIdentificatio
     """Write the row of an identification, inside the transaction that writes it."""
     value, u = _matrices(identification)
     db.execute(
-        "INSERT INTO identified_values VALUES (?, ?::BIGINT[], ?::DOUBLE[], ?::DOUBLE[])",
-        [number, [run.run for run in identification.runs], _list(value), _list(u)],
+        "INSERT INTO identified_values VALUES (?, ?::BIGINT[], ?::DOUBLE[][], ?::DOUBLE[][])",
+        [number, [run.run for run in identification.runs], _lists(value), _lists(u)],
     )
 
 
@@ -62,12 +60,12 @@ def values_of(db: Database, numbers: Sequence[int]) -> Mapping[int, IdentifiedVa
         list(numbers),
     ):
         # DuckDB gives None where a list holds NULL; numpy makes NaN of it.
-        shape = (len(runs), -1)
+        shape = (len(value), len(runs))
         found[number] = IdentifiedValues(
             number,
             np.array(runs, dtype=np.int64),
-            np.array(value, dtype=np.float64).reshape(shape),
-            np.array(u, dtype=np.float64).reshape(shape),
+            np.array(value, dtype=np.float64).reshape(shape).T,
+            np.array(u, dtype=np.float64).reshape(shape).T,
         )
     return found
 
@@ -107,5 +105,5 @@ def _matrices(identification: StoredIdentification) -> tuple[Array, Array]:
     )
 
 
-def _list(matrix: Array) -> list[float | None]:
-    return [None if np.isnan(value) else float(value) for value in matrix.ravel()]
+def _lists(matrix: Array) -> list[list[float | None]]:
+    return [[None if np.isnan(value) else float(value) for value in column] for column in matrix.T]
