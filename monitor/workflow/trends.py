@@ -19,7 +19,7 @@ from monitor.store import (
     machine_history,
     save_analysis,
 )
-from monitor.workflow.agreement import Moment, agreement, evaluated
+from monitor.workflow.agreement import Moment, agreement
 from monitor.workflow.change_search import search_changes
 from monitor.workflow.identification import identify
 from monitor.workflow.models import resolve
@@ -124,6 +124,7 @@ def _change(one: Change, series: Series) -> Document:
 def _parameter(
     series: Series, history: MachineHistory, own: npt.NDArray[np.bool_], events: list[float], check: float,
     choice: Choice, charts: Charts, place: int, searched: Mapping[str, tuple[History | None, str | None]],
+    several: bool,
 ) -> tuple[Document, Followed]:  # fmt: skip
     steady = steady_runs(series, history.warm_up[own])
     found, why = searched[series.name]
@@ -131,8 +132,9 @@ def _parameter(
     slope, line = drift(steady, begins)
     channels = {name: values[own] for name, values in history.conditions.items()}
     # The method is a condition like any other: 1 for the runs of each but the first.
-    for method in list(dict.fromkeys(history.method[own].tolist()))[1:]:
-        channels[f"method {method}"] = (history.method[own] == method).astype(np.float64)
+    if several:
+        for method in list(dict.fromkeys(history.method[own].tolist()))[1:]:
+            channels[f"method {method}"] = (history.method[own] == method).astype(np.float64)
     coefficients, why_conditions = conditions(series, channels, begins)
     waves, why_cycles = cycles(steady, begins)
     warmth, why_warm = warming(
@@ -182,7 +184,9 @@ def _next_check(history: MachineHistory, choice: Choice) -> float:
             )
         return at
     seconds = history.seconds
-    starts = np.sort([seconds[history.campaign == name].min() for name in set(history.campaign.tolist())])
+    # Runs are in the order of time: the first of a campaign that is met is its earliest.
+    first = np.unique(history.campaign, return_index=True)[1]
+    starts = np.sort(seconds[first])
     apart = np.diff(starts) / SECONDS_PER_DAY
     return float(last + (np.median(apart) if len(apart) else NEXT_CHECK_D))
 
@@ -207,12 +211,12 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         "campaigns": list(dict.fromkeys(history.campaign.tolist())),
         "methods": list(dict.fromkeys(history.method.tolist())),
         "agreement": agreement(
+            db,
             history,
             [
                 Moment(at.timestamp(), one["kind"], one["description"])
                 for at, one in zip(moments, known, strict=True)
             ],
-            evaluated(db, machine),
         ),
         "events": known,
         "notes": same_hours(history),
@@ -236,7 +240,9 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         seed=SEED,
     )
     judged = {
-        one.name: _parameter(one, history, own, events, check, choice, charts, place, searched)
+        one.name: _parameter(
+            one, history, own, events, check, choice, charts, place, searched, len(head["methods"]) > 1
+        )
         for place, (one, own) in enumerate(series)
         if len(one.t)
     }

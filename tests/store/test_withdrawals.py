@@ -62,7 +62,8 @@ def test_a_withdrawn_campaign_counts_nowhere(
     )  # fmt: skip
     assert list(list_campaigns(filled)["campaign"]) == ["two"]
     assert set(machine_history(filled, machine).campaign) == {"two"}
-    assert latest_documents(filled, "uncertainty", machine) == {"two": {"of": "two"}}
+    campaigns = machine_history(filled, machine).campaigns
+    assert latest_documents(filled, "uncertainty", campaigns) == {"two": {"of": "two"}}
     for view in ("v_runs", "v_probings", "v_parameters", "v_residuals", "v_identifications", "v_analyses",
                  "v_tolerances", "v_import_notes"):  # fmt: skip
         assert {name for (name,) in filled.rows(f"SELECT DISTINCT campaign FROM {view}")} == {"two"}, view
