@@ -39,9 +39,9 @@ def may_be_longest(
     """Places (c,) of the vectors of a grid that can be the longest, whatever the parameters.
 
     The k vectors ``offset`` (k, 3) + ``sensitivity`` (k, 3, p) parameters stand on a grid of ``shape``, whose first
-    axis counts the poses and whose others have equal steps; ``length`` is one that counts as long. Where they run straight along an axis, one between two
-    others is a mean of these with weights that add up to one, and a mean is no longer than the longest of what it is
-    the mean of: the ends remain.
+    axis counts the poses and whose others have equal steps; ``length`` is one that counts as long. Where they run
+    straight along an axis, one between two others is a mean of these with weights that add up to one, and a mean is no
+    longer than the longest of what it is the mean of: the ends remain.
     """
     largest = np.abs(sensitivity).max(axis=(0, 1))
     columns = (sensitivity / np.where(largest > 0.0, largest, 1.0), offset[:, :, np.newaxis] / length)
@@ -49,5 +49,7 @@ def may_be_longest(
     places = np.arange(len(offset)).reshape(shape)
     for axis, count in enumerate(shape):
         if axis and count > 2 and float(np.abs(np.diff(grid, 2, axis=axis)).max()) < STRAIGHT:
-            grid, places = (np.take(one, [0, count - 1], axis=axis) for one in (grid, places))
+            ends = np.array([0, count - 1])
+            grid = np.asarray(np.take(grid, ends, axis=axis), dtype=np.float64)
+            places = np.asarray(np.take(places, ends, axis=axis), dtype=np.intp)
     return places.ravel()

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 
 import numpy as np
-from scipy import optimize, special, stats
+import scipy
+from scipy import special
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -75,7 +76,7 @@ def reference_nodes(n: float, dof: float) -> tuple[Array, Array, Array]:
         return np.zeros(1), np.ones(1), np.ones(1)
     z, wz = np.polynomial.hermite_e.hermegauss(NODES)
     x, wx = np.polynomial.legendre.leggauss(NODES)
-    ratio = np.sqrt(stats.chi2.ppf(0.5 * (x + 1.0), dof) / dof)
+    ratio = np.sqrt(2.0 * special.gammaincinv(0.5 * dof, 0.5 * (x + 1.0)) / dof)
     shift = (-(z[:, np.newaxis] / np.sqrt(n)) / ratio).ravel()
     scatter = np.repeat((1.0 / ratio)[np.newaxis, :], NODES, axis=0).ravel()
     weight = np.outer(wz / wz.sum(), wx / wx.sum()).ravel()
@@ -116,4 +117,4 @@ def _limit(
     def excess(limit: float) -> float:
         return float(np.log(run_length(chart, limit, n, dof) / arl))
 
-    return float(optimize.brentq(excess, 0.2, top, xtol=1e-4))
+    return float(scipy.optimize.brentq(excess, 0.2, top, xtol=1e-4))

@@ -108,8 +108,8 @@ def trend(
     scale bar, moves no slope and is better left out); their common scale is estimated. ``days`` (n,) labels
     whose runs share a day component, and which count at the mean time of the day; None: every run is its own day.
     At least three days. Without ``robust`` what rests on the slopes of all pairs of days is left out (NaN, None):
-    a forecast has no use for it. Raises ``DataError`` for fewer, for times that are all alike, non-finite values, or ``u``
-    not above zero.
+    a forecast has no use for it. Raises ``DataError`` for fewer, for times that are all alike, non-finite values, or
+    ``u`` not above zero.
     Neglected: serial correlation between days, except in ``monotone``.
     Measured false alarms at 5 %: 1 to 6 % for 3 to 40 days (1 to 2 % with few days and no day component).
     """

@@ -9,15 +9,16 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, TypedDict, Unpack
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from monitor import __version__
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number, check_machine
 from monitor.store.connection import Database, utc_now
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from monitor.exceptions import NotFoundError
 from monitor.records import Machine
 from monitor.store.connection import Database
 from monitor.store.record_json import machine_record
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def list_campaigns(db: Database) -> pd.DataFrame:
@@ -87,8 +90,8 @@ def check_machine(db: Database, machine: str) -> None:
 def _counting(db: Database, numbers: list[int]) -> set[int]:
     """Which of these campaigns the view ``campaign`` has: what it leaves out is left out here.
 
-    Through the view DuckDB looks at every campaign of the fleet for those of one machine (30 ms of 2.6 million): it takes
-    the index only where a table is asked by itself, and the campaigns of one machine are few.
+    Through the view DuckDB looks at every campaign of the fleet for those of one machine (30 ms of 2.6 million): it
+    takes the index only where a table is asked by itself, and the campaigns of one machine are few.
     """
     if not numbers:
         return set()

@@ -11,15 +11,16 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Literal
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, Literal
 
 from monitor import __version__
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 State = Literal["draft", "issued", "amended", "withdrawn"]
 

@@ -16,13 +16,15 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import duckdb
-import pandas as pd
 
 from monitor.exceptions import StoreError
 from monitor.store import migrations
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Parameters = Sequence[Any] | Mapping[str, Any]
 
@@ -91,14 +93,25 @@ class Database:
             columns: dict[str, Any] = self._connection.execute(sql, parameters).fetchnumpy()
             return columns
 
-    def insert(self, sql: str, incoming: pd.DataFrame, parameters: Parameters = ()) -> None:
-        """Run an INSERT that selects from ``incoming``: 50 times as quick as row by row."""
+    def insert(
+        self, sql: str, incoming: pd.DataFrame | Mapping[str, Any], parameters: Parameters = ()
+    ) -> None:
+        """Run an INSERT that selects from the table or columns ``incoming``: 50 times as quick as row by row."""
+        # Loaded here: what only reads starts without it, a third of a second sooner.
+        import pandas as pd
+
         with self._lock, _stopped_by_ctrl_c():
-            self._connection.register("incoming", incoming)
+            self._connection.register("incoming", pd.DataFrame(incoming, copy=False))
             try:
                 self._connection.execute(sql, parameters)
             finally:
                 self._connection.unregister("incoming")
+
+    @contextmanager
+    def connected(self) -> Iterator[duckdb.DuckDBPyConnection]:
+        """DuckDB's own connection, for this block; no other thread uses the database meanwhile."""
+        with self._lock, _stopped_by_ctrl_c():
+            yield self._connection
 
     def next_number(self, table: str, column: str) -> int:
         """One more than the largest number in use; call it inside the transaction that uses it."""

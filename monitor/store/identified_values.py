@@ -14,24 +14,8 @@ import numpy.typing as npt
 
 from monitor.records import Array
 from monitor.store.connection import Database
+from monitor.store.gathering import PORTION, gather
 from monitor.store.results import StoredIdentification
-
-# Of rows that were written by SQL into ``parameter_value`` alone; the same statement is in migration 0007.
-_GATHER = """
-INSERT INTO identified_values
-SELECT identification_id, list_filter(runs, lambda run, i: (i - 1) % n = 0), value, u
-FROM (
-    SELECT identification_id, any_value(len(parameters)) AS n, list(run ORDER BY run, place) AS runs,
-           list(value ORDER BY run, place) AS value, list(u ORDER BY run, place) AS u
-    FROM (
-        SELECT v.*, parameters, list_position(parameters, parameter) AS place
-        FROM parameter_value AS v JOIN identification USING (identification_id)
-        WHERE identification_id >= ? AND identification_id < ?
-    )
-    GROUP BY identification_id
-)
-ORDER BY identification_id
-"""
 
 
 @dataclass(frozen=True)
@@ -87,17 +71,10 @@ def agrees(db: Database, number: int, identification: StoredIdentification) -> b
     )
 
 
-def gather_values(db: Database, portion: int = 50_000) -> None:
-    """Write the rows that are missing after ``parameter_value`` was filled by SQL, as large test data are.
-
-    ``portion`` identifications at a time, so that memory does not grow with their number.
-    """
-    ((first,), (end,)) = (
-        db.rows("SELECT coalesce(max(identification_id), 0) + 1 FROM identified_values")[0],
-        db.rows("SELECT coalesce(max(identification_id), 0) + 1 FROM identification")[0],
-    )
-    for start in range(first, end, portion):
-        db.execute(_GATHER, [start, min(start + portion, end)])
+def gather_values(db: Database, portion: int = PORTION) -> None:
+    """Write the rows that are missing after ``parameter_value`` was filled by SQL, as large test data are."""
+    with db.connected() as connection:
+        gather(connection, portion)
 
 
 def _matrices(identification: StoredIdentification) -> tuple[Array, Array]:

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from monitor.effects import ChainEffect
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics import (
@@ -27,12 +26,9 @@ from monitor.statistics import (
     trend,
 )
 from monitor.store import Database, MachineHistory
-from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
 from monitor.units import MICROMETRE
-from monitor.workflow.comparison import fitted
 from monitor.workflow.trend_forecast import HORIZON_YEARS
 from monitor.workflow.trend_parameter import DAYS_PER_YEAR, Series, date
-from monitor.workflow.volumetric import POINTS, poses_of, ranges_of
 
 Document = dict[str, Any]
 
@@ -86,6 +82,12 @@ def _vectors(
     db: Database, history: MachineHistory, model: str | None, levels: Mapping[str, float]
 ) -> _Vectors:
     """The error vectors over the strokes of the latest campaign's machine about ``levels``, name to display value."""
+    # Loaded here: pages without a limit of the volumetric error start without the methods and all that they need.
+    from monitor.effects import ChainEffect
+    from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
+    from monitor.workflow.comparison import fitted
+    from monitor.workflow.volumetric import POINTS, poses_of, ranges_of
+
     campaign, _, found = fitted(db, str(history.campaign[-1]), model)
     problem, run = found.problem, int(history.run[-1])
     effects = [
