@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from datetime import date
 from pathlib import Path
@@ -23,6 +24,10 @@ def add_issuing(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--laboratory", type=Path, required=True, metavar="FILE", help="what the laboratory states"
     )
+    parser.add_argument(
+        "--as-left", type=int, metavar="N",
+        help="the run after an adjustment or repair: its results stand behind those as found, or alone without --run",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="PATH", help="a folder, or a file ending in .pdf")
     parser.add_argument("--number", metavar="NUMBER", help="default: the next of the year")
     parser.add_argument("--date", type=_day, metavar="YYYY-MM-DD", help="of issue; default: today")
@@ -75,6 +80,9 @@ def add_fonts(parser: ArgumentParser) -> None:
 
 def _day(text: str) -> date:
     try:
+        # strptime would take 2026-3-2, fromisoformat 20260302 and 2026-W10-1: what a reader may take for another day.
+        if re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", text) is None:
+            raise ValueError(text)
         return date.fromisoformat(text)
     except ValueError as error:
         raise ArgumentTypeError(f"'{text}' is no day; write it as 2026-03-02") from error
@@ -83,6 +91,7 @@ def _day(text: str) -> date:
 def issuing(options: Namespace) -> dict[str, Any]:
     """The options as ``certificates.issue`` and ``certificates.amend`` take them. Raises InputError."""
     return {
+        "as_left": options.as_left,
         "out": options.out,
         "number": options.number,
         "issued_on": options.date,

@@ -26,7 +26,7 @@ _CONDITION_WORDS = {"ambient_degC": "ambient", "humidity_percent": "humidity", "
 def certificate_record(
     laboratory: LaboratoryFile,
     campaign: Campaign,
-    run: int,
+    runs: int | Sequence[int],
     results: Sequence[ResultSet],
     *,
     number: str | None,
@@ -35,13 +35,15 @@ def certificate_record(
     method_name: str | None = None,
     volumetric: Sequence[VolumetricResult] = (),
 ) -> CertificateRecord:
-    """The record for one run of a campaign. ``model`` is the stored model's name and version.
+    """The record for one run of a campaign, or for two: as found and as left, in the order of ``results``.
+
+    ``model`` is the stored model's name and version.
 
     ``method_name`` replaces the campaign's word for its method. The words around the numbers are in the laboratory's
     language. Nothing is checked here: see ``check_complete``. Raises NotFoundError where the campaign has no such run.
     """
-    chosen = _run_of(campaign, run)
-    day = chosen.started_at.date()
+    chosen = [_run_of(campaign, run) for run in ([runs] if isinstance(runs, int) else runs)]
+    days = [one.started_at.date() for one in chosen]
     machine = campaign.machine
     texts = texts_of(laboratory.language or ENGLISH)
     return CertificateRecord(
@@ -62,7 +64,7 @@ def certificate_record(
             condition=laboratory.item_condition,
         ),
         received_on=laboratory.received_on,
-        performed_on=(day, day),
+        performed_on=(min(days), max(days)),
         issued_on=issued_on,
         sampling=laboratory.sampling,
         relates_only=laboratory.relates_only,
@@ -71,7 +73,7 @@ def certificate_record(
         authorised_by=laboratory.authorised_by,
         external_results=laboratory.external_results,
         reproduction=laboratory.reproduction,
-        conditions=_conditions(campaign, chosen, texts),
+        conditions=_conditions_of(campaign, chosen, [one.state for one in results], texts),
         traceability=laboratory.traceability,
         references=_references(laboratory, campaign, texts),
         adjustment=laboratory.adjustment,
@@ -102,6 +104,23 @@ def _identification(machine: Machine, texts: Texts) -> str:
     if not machine.serial_number:
         return machine.id
     return texts("record.serial_number", id=machine.id, serial=machine.serial_number)
+
+
+def _conditions_of(
+    campaign: Campaign, runs: Sequence[Run], states: Sequence[str], texts: Texts
+) -> tuple[Condition, ...]:
+    """The conditions of every run; those that differ between two runs say of which state of the machine they are."""
+    each = [_conditions(campaign, run, texts) for run in runs]
+    if len(each) == 1:
+        return each[0]
+    shared = set(each[0]).intersection(*each[1:])
+    own = [
+        Condition(f"{one.name}, {state}", one.value)
+        for conditions, state in zip(each, states, strict=True)
+        for one in conditions
+        if one not in shared
+    ]
+    return (*own, *(one for one in each[0] if one in shared))
 
 
 def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, ...]:

@@ -1,18 +1,16 @@
 """What a calibration certificate states: a record with every item that ISO/IEC 17025:2017 asks for.
 
 Each item of 7.8.2.1 a to p and 7.8.4.1 a to f is a field; none has a default. A field that is None, or has an
-empty part, is missing: ``missing_items`` names it with its clause and ``check_complete`` refuses the record.
+empty part, is missing: ``completeness`` names it with its clause and refuses the record.
 What does not apply is said by the laboratory in words, with ``NotApplicable``.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 
-from monitor.exceptions import InputError
 from monitor.reporting.results import ResultSet
 from monitor.reporting.texts import ENGLISH
 from monitor.reporting.volumetric_result import VolumetricResult
@@ -92,12 +90,18 @@ class ConformityVerdict:
 
 @dataclass(frozen=True)
 class ConformityStatement:
-    """A statement of conformity: decision rule and risk in words, the verdicts, the joint probability of conformity."""
+    """A statement of conformity: decision rule and risk in words, the verdicts, the joint probability of conformity.
+
+    ``state``: to which results it applies; ``basis``: from where the tolerances are, and by which distribution the
+    probabilities were found (ISO/IEC 17025:2017, 7.8.6.2).
+    """
 
     rule: str
     risk: str
     verdicts: tuple[ConformityVerdict, ...]
     joint_probability: float
+    state: str
+    basis: str
 
 
 @dataclass(frozen=True)
@@ -108,29 +112,6 @@ class Replaced:
     issued_on: date | None
     reason: str | None
     sha256: str | None
-
-
-@dataclass(frozen=True)
-class MissingItem:
-    """An item that the certificate lacks: the clause, what it is, and what of it is missing (may be empty)."""
-
-    clause: str
-    item: str
-    part: str = ""
-
-    def __str__(self) -> str:
-        return f"{self.item}{f', {self.part}' if self.part else ''} (ISO/IEC 17025:2017, {self.clause})"
-
-
-class IncompleteCertificateError(InputError):
-    """A certificate that lacks items; ``missing`` lists them all."""
-
-    def __init__(self, missing: tuple[MissingItem, ...]) -> None:
-        self.missing = missing
-        count = len(missing)
-        lines = [f"the certificate is refused: {count} item{'s are' if count != 1 else ' is'} missing"]
-        lines += [f"  {item}" for item in missing]
-        super().__init__("\n".join(lines))
 
 
 #: Field of the record: the clause of ISO/IEC 17025:2017 that asks for it, and the item in words.
@@ -159,9 +140,6 @@ ITEMS: Mapping[str, tuple[str, str]] = {
     "conformity": ("7.8.4.1 e", "statement of conformity" + _EITHER),
     "opinions": ("7.8.4.1 f", "opinions and interpretations" + _EITHER),
 }
-
-#: What only a certificate that replaces another has to say.
-AMENDMENT = ("7.8.8.1 and 7.8.8.3", "reference to the certificate that it replaces, with the reason")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,45 +184,3 @@ class CertificateRecord:
     replaces: Replaced | None = None
     volumetric: tuple[VolumetricResult, ...] = ()
     language: str = ENGLISH
-
-
-def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
-    """Every item that is None, blank or empty, and every such part of an item, in the order of the record."""
-    found: list[MissingItem] = []
-    for name, (clause, item) in ITEMS.items():
-        found += [MissingItem(clause, item, part) for part in _gaps(getattr(record, name))]
-    if record.replaces is not None:
-        found += [MissingItem(*AMENDMENT, part) for part in _gaps(record.replaces)]
-    return tuple(found)
-
-
-def check_complete(record: CertificateRecord) -> None:
-    """Raise IncompleteCertificateError, with the whole list, where an item is missing."""
-    missing = missing_items(record)
-    if missing:
-        raise IncompleteCertificateError(missing)
-
-
-def _gaps(value: object) -> list[str]:
-    """Which parts of a value are missing; ``""`` is the value itself."""
-    if value is None or (isinstance(value, str) and not value.strip()):
-        return [""]
-    if isinstance(value, tuple):
-        if not value:
-            return [""]
-        parts = [(_label(element), gap) for element in value for gap in _gaps(element)]
-        return [" of ".join(filter(None, (gap, label))) or "one entry" for label, gap in parts]
-    if isinstance(value, ResultSet):
-        return list(value.gaps())
-    if dataclasses.is_dataclass(value):
-        return [
-            " of ".join(filter(None, (gap, place.name)))
-            for place in dataclasses.fields(value)
-            for gap in _gaps(getattr(value, place.name))
-        ]
-    return []
-
-
-def _label(element: object) -> str:
-    name = getattr(element, "name", None)
-    return name if isinstance(name, str) else ""

@@ -11,7 +11,6 @@ from monitor.reporting.certificate import (
     CertificateRecord,
     ConformityStatement,
     MethodUsed,
-    check_complete,
 )
 from monitor.reporting.certificate_matrix import Block, correlation_blocks
 from monitor.reporting.certificate_pictures import Picture, beside, map_picture, pictures_of
@@ -23,6 +22,7 @@ from monitor.reporting.certificate_tables import (
 )
 from monitor.reporting.certificate_volumetric import POINTS_FILE, printed_map
 from monitor.reporting.certificate_words import amendment, answer
+from monitor.reporting.completeness import check_complete
 from monitor.reporting.numbers import written_factor, written_probability
 from monitor.reporting.results import ResultSet
 from monitor.reporting.texts import Texts, texts_of

@@ -18,9 +18,9 @@ from monitor.reporting.certificate import (
     ConformityStatement,
     Party,
     Replaced,
-    check_complete,
 )
 from monitor.reporting.certificate_words import amendment, answer, verdict_words
+from monitor.reporting.completeness import check_complete
 from monitor.reporting.dcc_results import DCC, SI, add, geometric_errors, say, volumetric_error
 from monitor.reporting.numbers import decimal_of
 from monitor.reporting.texts import Texts, texts_of
@@ -133,7 +133,12 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
     if isinstance(conformity, ConformityStatement):
         for verdict in conformity.verdicts:
             one = add(parent, "statement")
-            say(one, "name", texts("dcc.conformity_of", name=verdict.name), texts.language)
+            say(
+                one,
+                "name",
+                texts("dcc.conformity_of", name=verdict.name, state=conformity.state),
+                texts.language,
+            )
             words = texts(
                 "dcc.verdict",
                 verdict=verdict_words(verdict.verdict, texts),
@@ -142,6 +147,7 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
                 probability=texts.number(decimal_of(verdict.probability)),
                 rule=conformity.rule,
                 risk=conformity.risk,
+                basis=conformity.basis,
             )
             say(one, "declaration", words, texts.language)
             add(one, "conformity", _STATUS[verdict.verdict])

@@ -151,7 +151,9 @@ class Database:
                 self._connection.commit()
             except BaseException as fault:
                 self._roll_back()
-                if isinstance(fault, duckdb.IOException | duckdb.OutOfMemoryException):
+                # A disk that is full when the transaction ends is told as a fault of the transaction.
+                full = isinstance(fault, duckdb.TransactionException) and "Could not write file" in str(fault)
+                if full or isinstance(fault, duckdb.IOException | duckdb.OutOfMemoryException):
                     raise StoreError(
                         f"{self.path} could not be written, nothing was kept: {fault}"
                     ) from fault

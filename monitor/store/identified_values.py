@@ -1,7 +1,7 @@
-"""The values of an identification in one row, found by its number: what the history of one machine is read from.
+"""The values of an identification in one row, a list a parameter: what histories and the fleet's sums are read from.
 
-``parameter_value`` holds the same numbers a row each, for people and for sums over the fleet; there the rows of one
-machine lie scattered over the weeks, and DuckDB looks through whole blocks of 122 880 rows for a few of them.
+``parameter_value`` holds the same numbers a row each, for people; there the rows of one machine lie scattered over the
+weeks, and DuckDB looks through whole blocks of 122 880 rows for a few of them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from monitor.records import Array
 from monitor.store.connection import Database
-from monitor.store.gathering import PORTION, gather
+from monitor.store.gathering import BY_PARAMETER, PORTION, gather
 from monitor.store.results import StoredIdentification
 
 
@@ -32,8 +32,8 @@ def insert_values(db: Database, number: int, identification: StoredIdentificatio
     """Write the row of an identification, inside the transaction that writes it."""
     value, u = _matrices(identification)
     db.execute(
-        "INSERT INTO identified_values VALUES (?, ?::BIGINT[], ?::DOUBLE[], ?::DOUBLE[])",
-        [number, [run.run for run in identification.runs], _list(value), _list(u)],
+        "INSERT INTO identified_values VALUES (?, ?::BIGINT[], ?::DOUBLE[][], ?::DOUBLE[][])",
+        [number, [run.run for run in identification.runs], _lists(value), _lists(u)],
     )
 
 
@@ -46,12 +46,12 @@ def values_of(db: Database, numbers: Sequence[int]) -> Mapping[int, IdentifiedVa
         list(numbers),
     ):
         # DuckDB gives None where a list holds NULL; numpy makes NaN of it.
-        shape = (len(runs), -1)
+        shape = (len(value), len(runs))
         found[number] = IdentifiedValues(
             number,
             np.array(runs, dtype=np.int64),
-            np.array(value, dtype=np.float64).reshape(shape),
-            np.array(u, dtype=np.float64).reshape(shape),
+            np.array(value, dtype=np.float64).reshape(shape).T,
+            np.array(u, dtype=np.float64).reshape(shape).T,
         )
     return found
 
@@ -74,7 +74,7 @@ def agrees(db: Database, number: int, identification: StoredIdentification) -> b
 def gather_values(db: Database, portion: int = PORTION) -> None:
     """Write the rows that are missing after ``parameter_value`` was filled by SQL, as large test data are."""
     with db.connected() as connection:
-        gather(connection, portion)
+        gather(connection, BY_PARAMETER, portion)
 
 
 def _matrices(identification: StoredIdentification) -> tuple[Array, Array]:
@@ -84,5 +84,5 @@ def _matrices(identification: StoredIdentification) -> tuple[Array, Array]:
     )
 
 
-def _list(matrix: Array) -> list[float | None]:
-    return [None if np.isnan(value) else float(value) for value in matrix.ravel()]
+def _lists(matrix: Array) -> list[list[float | None]]:
+    return [[None if np.isnan(value) else float(value) for value in column] for column in matrix.T]

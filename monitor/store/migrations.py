@@ -135,7 +135,7 @@ def _apply(connection: duckdb.DuckDBPyConnection, migration: Migration) -> None:
             connection.execute(_LEDGER)
         for statement in statements:
             if statement.query.lstrip().startswith(gathering.REPLACED):
-                gathering.gather(connection)
+                gathering.gather(connection, gathering.RUN_BY_RUN)
             else:
                 connection.execute(statement)
         connection.execute(

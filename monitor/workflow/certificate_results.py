@@ -94,9 +94,14 @@ def _stored(number: int, document: Mapping[str, Any], found: Evaluated) -> Store
 
 
 def results_of(
-    found: Evaluated, texts: Texts, monte_carlo: StoredMonteCarlo | None = None, method: str = "guf"
+    found: Evaluated,
+    texts: Texts,
+    monte_carlo: StoredMonteCarlo | None = None,
+    method: str = "guf",
+    *,
+    state: str | None = None,
 ) -> ResultSet:
-    """The results that a certificate prints, by the GUM framework or by Monte Carlo.
+    """The results that a certificate prints, by the GUM framework or by Monte Carlo; as found where no state is given.
 
     The readings' covariance is known from few runs: both methods are printed with the factors that hold for so few
     (Hotelling, Student), which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where
@@ -124,7 +129,7 @@ def results_of(
         found.units,
         estimate,
         covariance,
-        state=texts("record.as_found"),
+        state=state or texts("record.as_found"),
         p=guf.p,
         k_p=k_p,
         k_q=k_q,
@@ -166,7 +171,13 @@ def _evaluation(found: Evaluated, texts: Texts, monte_carlo: StoredMonteCarlo | 
     else:
         parts = [texts("evaluation.framework", readings=readings)]
     if np.isfinite(guf.dof):
-        parts[0] += ", " + texts("evaluation.degrees_of_freedom", dof=f"{guf.dof:.0f}")
+        # Two numbers, so that either factor can be found again: k_q by Student's t of the least known of the outputs,
+        # k_p by Hotelling's T² of all of them together.
+        single, joint = (
+            texts.number(round_to_place(float(one), decimal_of(0.1)))
+            for one in (np.min(guf.dof_by_output), guf.dof)
+        )
+        parts[0] += ", " + texts("evaluation.degrees_of_freedom", single=single, joint=joint)
         if method == "mcm" and monte_carlo is not None:
             k_q, k_p = (written_factor(one, texts.decimal_sign) for one in (monte_carlo.k_q, monte_carlo.k_p))
             parts[0] += "; " + texts("evaluation.known_covariance", k_q=k_q, k_p=k_p)

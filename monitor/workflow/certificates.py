@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any, Literal
 
 from monitor import __version__
-from monitor.exceptions import InputError, NotFoundError
-from monitor.records import Campaign, LinearAxes
+from monitor.records import LinearAxes
 from monitor.reporting.assembly import certificate_record
-from monitor.reporting.certificate import CertificateRecord, Replaced
+from monitor.reporting.certificate import CertificateRecord
 from monitor.reporting.documents import to_document
 from monitor.reporting.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.render import certificate_pdf
@@ -20,7 +20,6 @@ from monitor.reporting.signing import Key, sign
 from monitor.reporting.texts import ENGLISH, texts_of
 from monitor.store import (
     Database,
-    list_certificates,
     load_campaign,
     load_certificate,
     mark_certificate,
@@ -29,6 +28,16 @@ from monitor.store import (
 from monitor.workflow.certificate_checks import summary
 from monitor.workflow.certificate_files import font_hashes, keep_issued, path_of, prepared, publish
 from monitor.workflow.certificate_map import volumetric_result
+from monitor.workflow.certificate_orders import (
+    Measured,
+    check_adjustment,
+    check_day,
+    check_number,
+    measured_runs,
+    next_number,
+    replaced_by,
+    runs_of,
+)
 from monitor.workflow.certificate_results import StoredMonteCarlo, results_of, stored_monte_carlo
 from monitor.workflow.conformity import statement_of
 from monitor.workflow.models import label
@@ -45,7 +54,8 @@ class Wishes:
     or mcm for the stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the
     laboratory's word on conformity. ``with_map`` adds the volumetric error. ``key`` signs it. ``fonts`` are files with
     letters that DejaVu Sans lacks. ``replaces`` is the number of the certificate that this one amends, for a
-    ``reason``: it says so on paper (ISO/IEC 17025:2017, 7.8.8.3), and the old one is marked with it.
+    ``reason``: it says so on paper (ISO/IEC 17025:2017, 7.8.8.3), and the old one is marked with it. ``as_left`` is the
+    run that was measured after an adjustment or repair: its results stand beside those as found (7.8.4.1 d), or alone.
     """
 
     model: str | None = None
@@ -58,13 +68,7 @@ class Wishes:
     fonts: tuple[Path, ...] = ()
     replaces: str | None = None
     reason: str = ""
-
-
-def next_number(db: Database, year: int) -> str:
-    """The next free number of a year: ``2026-0001``."""
-    taken = [str(number) for number in list_certificates(db)["number"]]
-    last = max((int(n[5:]) for n in taken if n.startswith(f"{year}-") and n[5:].isdigit()), default=0)
-    return f"{year}-{last + 1:04d}"
+    as_left: int | None = None
 
 
 def issue(
@@ -80,31 +84,31 @@ def issue(
 ) -> Document:
     """Issue a certificate for one run: PDF in ``out`` (a folder or a file), record and document in the database.
 
-    ``run`` may be None where the campaign has one run only. ``wishes`` are the fields of ``Wishes``. Raises
+    ``run`` may be None where the campaign has one run only, or where ``as_left`` names the only one that is certified.
+    ``wishes`` are the fields of ``Wishes``. Raises
     IncompleteCertificateError with the list of what the laboratory's file and the campaign leave open, InputError where
     the campaign states no tolerances or the key does not open.
     """
     wanted = Wishes(**wishes)
     stated = read_laboratory(laboratory)
     loaded = load_campaign(db, campaign)
-    day = issued_on or date.today()
-    run = _run_of(loaded, run)
+    now = today()
+    day = issued_on or now
+    measured = measured_runs(loaded, run, wanted.as_left)
     if number is not None:
-        _check_number(db, number)
-    _check_day(loaded, run, day)
+        check_number(db, number)
+    check_day(loaded, measured, day, day if wanted.draft else now)
+    check_adjustment(stated, measured)
     replaced = None
     if wanted.replaces is not None:
-        replaced = _replaced(db, wanted.replaces, wanted.reason, wanted.draft, loaded)
-    found = evaluate(db, campaign, run, model=wanted.model, method="guf", linear_axes=wanted.linear_axes)
+        replaced = replaced_by(db, wanted.replaces, wanted.reason, wanted.draft, loaded)
     chosen = number or next_number(db, day.year)
     path = path_of(out, chosen)
     keep_issued(db, path)
-    monte_carlo = stored_monte_carlo(db, found)
-    record = _record(stated, found, monte_carlo, wanted, number=chosen, issued_on=day)
+    parts = [_part(db, campaign, one, wanted) for one in measured]
+    record = _record(stated, parts, wanted, number=chosen, issued_on=day)
     record = dataclasses.replace(record, replaces=replaced)
-    inputs = {**_inputs(found, monte_carlo), "fonts": font_hashes(wanted.fonts)}
-    if wanted.linear_axes is not None:
-        inputs["linear_axes_mm"] = dataclasses.asdict(wanted.linear_axes)
+    inputs = _inputs(parts, wanted)
     pdf = certificate_pdf(record, wanted.fonts, inputs)
     if wanted.key is not None:
         pdf = sign(pdf, wanted.key)
@@ -115,7 +119,7 @@ def issue(
         with db.transaction():
             state: Literal["draft", "issued"] = "draft" if wanted.draft else "issued"
             document = {**to_document(record), "inputs": inputs}
-            save_certificate(db, chosen, state, campaign, [run], document, pdf)
+            save_certificate(db, chosen, state, campaign, [one.run for one in measured], document, pdf)
             if wanted.replaces is not None:
                 mark_certificate(db, wanted.replaces, "amended", wanted.reason, chosen)
     except BaseException:
@@ -125,62 +129,54 @@ def issue(
     return {**summary(db, chosen), "file": str(path)}
 
 
-def _run_of(campaign: Campaign, run: int | None) -> int:
-    """The run that is certified: the one that was asked for, or the only one. Raises InputError where it is open."""
-    known = [one.run for one in campaign.runs]
-    if run is None and len(known) == 1:
-        return known[0]
-    if run is None:
-        raise InputError(
-            f"campaign {campaign.name} has {len(known)} runs ({min(known)} to {max(known)}): --run N says which "
-            "one the certificate is of"
-        )
-    return run
+def today() -> date:
+    """The present day by the clock of this computer."""
+    return date.today()
 
 
-def _check_number(db: Database, number: str) -> None:
-    """Before anything is computed: a number is used once. Raises InputError."""
-    try:
-        old = load_certificate(db, number)
-    except NotFoundError:
-        return
-    if old.state != "draft":
-        raise InputError(
-            f"the number {number} is taken, by the {old.state} certificate of campaign {old.campaign}; leave --number "
-            "out for the next free one"
-        )
+@dataclass(frozen=True)
+class _Part:
+    """A certified run: which state of the machine, its evaluation, the Monte Carlo result stored of it."""
+
+    measured: Measured
+    found: Evaluated
+    monte_carlo: StoredMonteCarlo | None
 
 
-def _check_day(campaign: Campaign, run: int, day: date) -> None:
-    measured = [one.started_at.date() for one in campaign.runs if one.run == run]
-    if measured and day < measured[0]:
-        raise InputError(f"run {run} was measured on {measured[0]}; no certificate was issued of it on {day}")
+def _part(db: Database, campaign: str, measured: Measured, wanted: Wishes) -> _Part:
+    found = evaluate(
+        db, campaign, measured.run, model=wanted.model, method="guf", linear_axes=wanted.linear_axes
+    )
+    return _Part(measured, found, stored_monte_carlo(db, found))
 
 
 def _record(
-    stated: LaboratoryFile,
-    found: Evaluated,
-    monte_carlo: StoredMonteCarlo | None,
-    wanted: Wishes,
-    *,
-    number: str,
-    issued_on: date,
+    stated: LaboratoryFile, parts: Sequence[_Part], wanted: Wishes, *, number: str, issued_on: date
 ) -> CertificateRecord:
     texts = texts_of(stated.language or ENGLISH)
-    result = results_of(found, texts, monte_carlo, wanted.method)
+    results = [
+        results_of(one.found, texts, one.monte_carlo, wanted.method, state=texts(one.measured.state))
+        for one in parts
+    ]
+    last = parts[-1].found
     record = certificate_record(
         stated,
-        found.campaign,
-        found.run,
-        [result],
+        last.campaign,
+        [one.measured.run for one in parts],
+        results,
         number=number,
         issued_on=issued_on,
-        model=label(found.model),
-        volumetric=[volumetric_result(found, result.state)] if wanted.with_map else [],
+        model=label(last.model),
+        volumetric=[
+            volumetric_result(one.found, result.state)
+            for one, result in zip(parts, results, strict=True)
+            if wanted.with_map
+        ],
     )
     if wanted.conformity is not None:
+        # Of the state in which the machine is handed back.
         statement = statement_of(
-            result, wanted.conformity, texts, campaign=found.campaign.name, dof=found.framework.dof
+            results[-1], wanted.conformity, texts, campaign=last.campaign.name, dof=last.framework.dof
         )
         record = dataclasses.replace(record, conformity=statement)
     if wanted.draft and record.title:
@@ -188,36 +184,34 @@ def _record(
     return record
 
 
-def _replaced(db: Database, number: str, reason: str, draft: bool, campaign: Campaign) -> Replaced:
-    """The certificate to be replaced. Raises InputError where it cannot be replaced by one of ``campaign``."""
-    old = load_certificate(db, number)
-    if old.state != "issued":
-        raise InputError(f"certificate {number} is {old.state}; only an issued one can be replaced")
-    if draft:
-        raise InputError("a draft replaces nothing; leave --replaces out until it is issued")
-    if not reason.strip():
-        raise InputError(f"say why certificate {number} is replaced: --reason TEXT")
-    if old.machine != campaign.machine.id:
-        raise InputError(
-            f"campaign {campaign.name} is of machine {campaign.machine.id}, certificate {number} of {old.machine}: "
-            "it cannot replace it"
-        )
-    issued_on = date.fromisoformat(str(old.record["issued_on"]))
-    return Replaced(number, issued_on, reason.strip(), old.pdf_sha256)
-
-
-def _inputs(found: Evaluated, monte_carlo: StoredMonteCarlo | None) -> Document:
+def _inputs(parts: Sequence[_Part], wanted: Wishes) -> Document:
     """What the results were computed from: kept with the certificate and inside its PDF."""
+    first = parts[0]
+    inputs = {
+        "campaign": first.found.campaign.name,
+        **_own(first),
+        "files": [{"name": file.name, "sha256": file.sha256} for file in first.found.campaign.files],
+        "model": label(first.found.model),
+        "model_effects": list(first.found.model.effects),
+        "software": f"machine-health-monitor {__version__}",
+        "fonts": font_hashes(wanted.fonts),
+        "states": [one.measured.state for one in parts],
+    }
+    if len(parts) > 1:
+        inputs["as_left"] = _own(parts[1])
+    if wanted.linear_axes is not None:
+        inputs["linear_axes_mm"] = dataclasses.asdict(wanted.linear_axes)
+    return inputs
+
+
+def _own(part: _Part) -> Document:
+    """What belongs to one run alone."""
+    monte_carlo = part.monte_carlo
     return {
-        "campaign": found.campaign.name,
-        "run": found.run,
-        "files": [{"name": file.name, "sha256": file.sha256} for file in found.campaign.files],
-        "model": label(found.model),
-        "model_effects": list(found.model.effects),
+        "run": part.measured.run,
         # The GUM framework draws no random numbers; the Monte Carlo that it was compared with does.
         "seed": None if monte_carlo is None else monte_carlo.seed,
         "stored_result": None if monte_carlo is None else monte_carlo.number,
-        "software": f"machine-health-monitor {__version__}",
     }
 
 
@@ -225,18 +219,22 @@ def amend(
     db: Database, replaces: str, laboratory: Path, reason: str, *, campaign: str | None = None,
     run: int | None = None, **options: Any,
 ) -> Document:  # fmt: skip
-    """Issue a new certificate that replaces another, of the same run unless ``campaign`` and ``run`` are given.
+    """Issue a new certificate that replaces another, of the same runs unless ``run`` or ``as_left`` is given.
 
     ``options`` are those of ``issue``. Raises what ``issue`` raises.
     """
     old = load_certificate(db, replaces)
+    as_left = options.pop("as_left", None)
+    if run is None and as_left is None:
+        run, as_left = runs_of(old.record, old.runs)
     return issue(
         db,
         campaign or old.campaign,
-        old.runs[0] if run is None else run,
+        run,
         laboratory,
         replaces=replaces,
         reason=reason,
+        as_left=as_left,
         **options,
     )
 

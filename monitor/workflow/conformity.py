@@ -6,7 +6,7 @@ import numpy as np
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate import ConformityStatement, ConformityVerdict
-from monitor.reporting.numbers import written_probability
+from monitor.reporting.numbers import decimal_of, round_to_place, written_probability
 from monitor.reporting.results import ResultSet
 from monitor.reporting.texts import Texts
 from monitor.uncertainty.conformity import conformity
@@ -23,7 +23,7 @@ def statement_of(
     """The statement on every parameter of a result that has a tolerance, in the language of ``texts``.
 
     ``dof`` are the degrees of freedom of the result's covariance. Raises InputError for an unknown rule or no
-    tolerance; ``campaign`` is named in the message.
+    tolerance; ``campaign`` is where the tolerances are from.
     """
     if rule not in RULES:
         raise InputError(f"there is no decision rule '{rule}'; there are {', '.join(RULES)}")
@@ -51,7 +51,10 @@ def statement_of(
         )
         for what in ("rule", "risk")
     )
-    return ConformityStatement(words, risk, tuple(verdicts), judged.joint)
+    law = "normal" if np.isinf(dof) else "student"
+    freedom = "" if np.isinf(dof) else texts.number(round_to_place(dof, decimal_of(0.1)))
+    basis = texts(f"conformity.basis_{law}", campaign=campaign, dof=freedom)
+    return ConformityStatement(words, risk, tuple(verdicts), judged.joint, result.state, basis)
 
 
 def _verdict(rule: str, value: float, limit: float, expanded: float, probability: float) -> str:

@@ -15,12 +15,10 @@ from monitor.reporting.assembly import certificate_record
 from monitor.reporting.certificate import (
     ITEMS,
     CertificateRecord,
-    IncompleteCertificateError,
     NotApplicable,
     Replaced,
-    check_complete,
-    missing_items,
 )
+from monitor.reporting.completeness import IncompleteCertificateError, check_complete, missing_items
 from monitor.reporting.laboratory import LaboratoryFile
 from monitor.reporting.render import certificate_pdf
 from monitor.reporting.results import RefusedParameters, ResultSet, result_set

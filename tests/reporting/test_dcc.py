@@ -18,9 +18,9 @@ from monitor.reporting.certificate import (
     CertificateRecord,
     ConformityStatement,
     ConformityVerdict,
-    IncompleteCertificateError,
     Replaced,
 )
+from monitor.reporting.completeness import IncompleteCertificateError
 from monitor.reporting.dcc import dcc_xml
 from monitor.reporting.dcc_results import DCC, SI, unit_of
 from monitor.reporting.render import certificate_pdf
@@ -50,7 +50,7 @@ def record(make_record: Make) -> CertificateRecord:
     return dataclasses.replace(
         made,
         country="DE",
-        conformity=ConformityStatement("a rule", "a risk", verdicts, 0.5),
+        conformity=ConformityStatement("a rule", "a risk", verdicts, 0.5, "as found", "a basis"),
         accreditation="none",
     )
 

@@ -126,23 +126,22 @@ def test_the_same_as_from_the_values_themselves_for_days_and_campaigns_of_any_si
             ]
             keep(db, machine, days, f"{machine}{campaign}", factor=1e-3)
             values.setdefault(machine, []).extend(days)
-    for portion in (10, 16_000_000):
-        sums = fleet_sums(db, portion=portion)
-        assert sums.machine.tolist() == ["A", "B"]
-        found = cells(sums)
-        for i, machine in enumerate(("A", "B")):
-            y = np.concatenate(values[machine])[:, np.newaxis] / 1e-3
-            labels = np.repeat(np.arange(len(values[machine])), [len(day) for day in values[machine]])
-            plain, pooled = anova(y, labels), pool(y, labels)
-            assert sums.groups[i] == len(values[machine])
-            assert found.anova_f[i] == pytest.approx(plain.statistic[0], rel=1e-10)
-            assert found.anova_p[i] == pytest.approx(plain.p_value[0], rel=1e-8)
-            assert found.bartlett[i] == pytest.approx(bartlett(y, labels).statistic[0], rel=1e-9)
-            assert found.bartlett_p[i] == pytest.approx(bartlett(y, labels).p_value[0], rel=1e-8)
-            assert sums.origin[i] + found.mean[i] == pytest.approx(pooled.mean[0], rel=1e-12)
-            assert found.sd_pooled[i] == pytest.approx(pooled.u_pooled[0], rel=1e-10)
-            assert found.sd_all[i] == pytest.approx(pooled.u_all[0], rel=1e-10)
-            assert sums.origin[i] + sums.latest[i] == pytest.approx(np.mean(values[machine][-1]) / 1e-3)
+    sums = fleet_sums(db)
+    assert sums.machine.tolist() == ["A", "B"]
+    found = cells(sums)
+    for i, machine in enumerate(("A", "B")):
+        y = np.concatenate(values[machine])[:, np.newaxis] / 1e-3
+        labels = np.repeat(np.arange(len(values[machine])), [len(day) for day in values[machine]])
+        plain, pooled = anova(y, labels), pool(y, labels)
+        assert sums.groups[i] == len(values[machine])
+        assert found.anova_f[i] == pytest.approx(plain.statistic[0], rel=1e-10)
+        assert found.anova_p[i] == pytest.approx(plain.p_value[0], rel=1e-8)
+        assert found.bartlett[i] == pytest.approx(bartlett(y, labels).statistic[0], rel=1e-9)
+        assert found.bartlett_p[i] == pytest.approx(bartlett(y, labels).p_value[0], rel=1e-8)
+        assert sums.origin[i] + found.mean[i] == pytest.approx(pooled.mean[0], rel=1e-12)
+        assert found.sd_pooled[i] == pytest.approx(pooled.u_pooled[0], rel=1e-10)
+        assert found.sd_all[i] == pytest.approx(pooled.u_all[0], rel=1e-10)
+        assert sums.origin[i] + sums.latest[i] == pytest.approx(np.mean(values[machine][-1]) / 1e-3)
 
 
 def test_drift_from_sums_is_the_straight_line_through_the_days(db: Database) -> None:
@@ -163,12 +162,30 @@ def test_only_the_latest_identification_of_a_campaign_counts_and_refused_values_
 ) -> None:
     keep(db, "A", [[1.0, 2.0], [3.0, 5.0]], "a")
     own = keep(db, "A", [[11.0, 12.0], [13.0, 15.0]], "a")
-    keep(db, "A", [[14.0, 15.0]], "b")
     db.execute("UPDATE parameter_value SET value = NULL WHERE identification_id = ? AND run = 4", [own])
+    db.execute("DELETE FROM identified_values WHERE identification_id = ?", [own])
+    keep(db, "A", [[14.0, 15.0]], "b")
     sums = fleet_sums(db)
     assert sums.runs.tolist() == [5.0]
     assert sums.groups.tolist() == [3.0]
     assert sums.origin[0] + sums.offset[0] / 5.0 == pytest.approx(13.0)
+
+
+def test_machines_may_have_parameters_of_their_own_and_identify_some_of_their_runs(db: Database) -> None:
+    keep(db, "A", [[1.0, 2.0]], "a", parameter="EZZ")
+    keep(db, "A", [[1.0, 2.0], [4.0, 5.0], [7.0, 9.0]], "b")
+    # Of campaign b the runs of the last day and the first of the second were not identified.
+    db.execute("DELETE FROM parameter_value WHERE identification_id = 2 AND run IN (3, 5, 6)")
+    db.execute("DELETE FROM identified_values WHERE identification_id = 2")
+    keep(db, "B", [[3.0, 6.0]], "c", parameter="EYY")
+    sums = fleet_sums(db)
+    assert list(zip(sums.machine, sums.parameter, sums.groups, sums.runs, strict=True)) == [
+        ("A", "EXX", 2.0, 3.0), ("A", "EZZ", 1.0, 2.0), ("B", "EYY", 1.0, 2.0),
+    ]  # fmt: skip
+    assert (sums.origin + sums.offset / sums.runs).tolist() == pytest.approx([8.0 / 3.0, 1.5, 4.5])
+    # The last day of A holds neither parameter.
+    assert sums.latest_runs.tolist() == [0.0, 0.0, 2.0]
+    assert np.isnan(sums.last_d[:2]).all()
 
 
 def test_groups_that_never_vary_or_stand_alone_say_nothing(db: Database) -> None:

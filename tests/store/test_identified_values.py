@@ -44,14 +44,17 @@ def test_the_row_holds_what_parameter_value_holds(filled: Database) -> None:
         assert np.array_equal([found.value[place], found.u[place]], expected, equal_nan=True)
 
 
-@pytest.mark.parametrize("way", ["sql", "migration"])
-def test_made_anew_from_the_rows_it_is_the_same(filled: Database, way: str) -> None:
+def test_made_anew_from_the_rows_it_is_the_same(filled: Database) -> None:
     filled.execute("DELETE FROM identified_values")
-    if way == "sql":
-        gather_values(filled, portion=1)
-    else:
-        statement = next(one.sql for one in available() if one.name == "0007_history.sql")
-        filled.execute(statement[statement.index("INSERT INTO identified_values") :])
+    gather_values(filled, portion=1)
+    assert verify_audit(filled).ok
+
+
+def test_the_migrations_make_it_from_the_rows(filled: Database) -> None:
+    filled.execute("DROP TABLE identified_values")
+    history, by_parameter = (one.sql for one in available() if one.number in (7, 9))
+    filled.execute(history[history.index("CREATE TABLE identified_values") :])
+    filled.execute(by_parameter)
     assert verify_audit(filled).ok
 
 

@@ -71,7 +71,7 @@ def test_empty_database_is_in_order(db: Database) -> None:
          "identification 1 was altered"),
         ("UPDATE parameter_value SET u = u / 2 WHERE run = 1", "identification 1 was altered"),
         ("UPDATE parameter_value SET unit = 'nm' WHERE run = 1", "identification 1 was altered"),
-        ("UPDATE identified_values SET value = list_transform(value, lambda x: x * 1.0000001)",
+        ("UPDATE identified_values SET value = list_transform(value, lambda one: list_reverse(one))",
          "identification 1 was altered"),
         ("DELETE FROM identified_values", "identification 1 was altered"),
         ("UPDATE residual SET dx_mm = 0 WHERE run = 1", "identification 1 was altered"),

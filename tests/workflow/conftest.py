@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,14 @@ from monitor.workflow.campaigns import import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CAMPAIGNS = ("five-days", "cold-cold", "hidden-reversal-x")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def clock() -> Iterator[None]:
+    """Certificates are issued on a day of ours, whatever the clock of the computer says."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("monitor.workflow.certificates.today", lambda: date(2027, 6, 1))
+        yield
 
 
 @pytest.fixture(scope="session")

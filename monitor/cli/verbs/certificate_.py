@@ -21,8 +21,9 @@ def options(parser: ArgumentParser) -> None:
     issued = verbs.add_parser("issue", **told("a certificate for one run", EXAMPLE))
     issued.add_argument("campaign", metavar="CAMPAIGN")
     issued.add_argument(
-        "--run", type=int, metavar="N", dest="number_of_run", help="needed where the campaign has several"
-    )
+        "--run", type=int, metavar="N", dest="number_of_run",
+        help="the machine as found; needed where the campaign has several runs",
+    )  # fmt: skip
     add_issuing(issued)
     issued.add_argument("--draft", action="store_true", help="a draft, to be looked at")
     issued.add_argument(
