@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg, special
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -48,11 +48,11 @@ class MixedFit:
     def p_value(self) -> Array:
         """Two-sided p-value of each coefficient being zero (q,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(2.0 * special.stdtr(self.dof, -np.abs(self.coefficients / self.u)))
+            return np.asarray(2.0 * scipy.special.stdtr(self.dof, -np.abs(self.coefficients / self.u)))
 
     def interval(self, level: float) -> Array:
         """Intervals (q, 2) of the coefficients at a level of confidence."""
-        half = -special.stdtrit(self.dof, (1.0 - level) / 2.0) * self.u
+        half = -scipy.special.stdtrit(self.dof, (1.0 - level) / 2.0) * self.u
         return np.column_stack([self.coefficients - half, self.coefficients + half])
 
 
@@ -115,7 +115,7 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
         """Triangle (q, q), coefficients, chi-square and its slope for t² = ``variance`` in units of s²."""
         rows = outer / np.sqrt(1.0 + variance * total)[:, np.newaxis]
         triangle = _triangle(np.vstack([inner, rows]))
-        found = linalg.solve_triangular(triangle[:q, :q], triangle[:q, q], check_finite=False)
+        found = scipy.linalg.solve_triangular(triangle[:q, :q], triangle[:q, q], check_finite=False)
         left = (rows[:, q] - rows[:, :q] @ found) ** 2
         within_days = ((inner[:, q] - inner[:, :q] @ found) ** 2).sum()
         slope = (left * total / (1.0 + variance * total)).sum()
@@ -135,7 +135,7 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
             triangle, coefficients, chi_square, slope = solve(variance)
             if chi_square - goal <= 1e-13 * goal or step <= 1e-14 * variance or variance == most:
                 break
-    inverse = linalg.solve_triangular(triangle, np.eye(q), check_finite=False)
+    inverse = scipy.linalg.solve_triangular(triangle, np.eye(q), check_finite=False)
     unscaled = inverse @ inverse.T
     factor = chi_square / (n - q)
     within_part = ((inner[:, :q] @ unscaled) ** 2).sum(axis=0) / np.diag(unscaled)

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -87,7 +87,7 @@ def theil_sen(
     for column in (values, times):
         k = np.unique(column, return_counts=True)[1].astype(np.float64)
         variance -= float((k * (k - 1) * (2 * k + 5)).sum()) / 18.0
-    half = float(special.ndtri(0.5 * (1.0 + level)) * np.sqrt(max(variance, 0.0)))
+    half = float(scipy.special.ndtri(0.5 * (1.0 + level)) * np.sqrt(max(variance, 0.0)))
     low, high = max(round((many - half) / 2.0) - 1, 0), min(round((many + half) / 2.0), many - 1)
     middle = ((many - 1) // 2, many // 2)
     slopes = np.partition(slopes, sorted({low, high, *middle}))
@@ -144,4 +144,4 @@ def _ranks(values: Array) -> Array:
 
 def _p_value(s: int, variance: float) -> float:
     """Two-sided normal p-value with the continuity correction."""
-    return float(2.0 * special.ndtr(-max(abs(s) - 1, 0) / np.sqrt(variance)))
+    return float(2.0 * scipy.special.ndtr(-max(abs(s) - 1, 0) / np.sqrt(variance)))

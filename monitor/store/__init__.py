@@ -7,6 +7,7 @@ its unit. Only this room imports duckdb.
 
 from monitor.store.analyses import (
     StoredAnalysis,
+    check_analysis,
     latest_documents,
     list_analyses,
     load_analysis,
@@ -24,6 +25,7 @@ from monitor.store.catalogue import (
 )
 from monitor.store.certificates import (
     StoredCertificate,
+    certificate_numbers,
     find_certificate,
     list_certificates,
     load_certificate,
@@ -67,6 +69,8 @@ __all__ = [
     "Verification",
     "Withdrawal",
     "campaign_notes",
+    "certificate_numbers",
+    "check_analysis",
     "clear_refusals",
     "curve_names",
     "described_machines",

@@ -12,7 +12,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from monitor import __version__
-from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.exceptions import DataError, InputError, NotFoundError, StoreError
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number, check_machine
 from monitor.store.connection import Database, utc_now
@@ -192,3 +192,15 @@ def list_analyses(db: Database, kind: str | None = None) -> pd.DataFrame:
 def analysis_content(db: Database, number: int) -> str:
     """The hash of all that is stored of a result."""
     return audit.digest(*db.rows("SELECT * FROM analysis WHERE analysis_id = ?", [number]))
+
+
+def check_analysis(db: Database, number: int) -> None:
+    """Raise StoreError where a stored result is not what the audit says was stored."""
+    told = db.rows(
+        "SELECT content_sha256 FROM audit WHERE subject = 'analysis' AND key = ? ORDER BY entry",
+        [str(number)],
+    )
+    if not told or told[-1][0] != analysis_content(db, number):
+        raise StoreError(
+            f"the stored result {number} was altered after it was stored; `monitor verify` tells what else was"
+        )

@@ -152,6 +152,11 @@ def list_certificates(db: Database) -> pd.DataFrame:
     return db.frame("SELECT * FROM v_certificates ORDER BY number")
 
 
+def certificate_numbers(db: Database) -> list[str]:
+    """The numbers of all certificates, in order."""
+    return [str(number) for (number,) in db.rows("SELECT number FROM v_certificates ORDER BY number")]
+
+
 def find_certificate(db: Database, pdf_sha256: str) -> str | None:
     """The number of the certificate whose document has this hash, None where there is none."""
     found = db.rows("SELECT number FROM certificate WHERE pdf_sha256 = ? ORDER BY entry", [pdf_sha256])

@@ -9,7 +9,6 @@ import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor import __version__
 from monitor.exceptions import NotFoundError
@@ -151,9 +150,10 @@ def stored_identification_content(db: Database, number: int) -> str:
         "WHERE identification_id = ? ORDER BY rowid",
         [number],
     )
+    columns = [np.asarray(column).tolist() for column in _values(identification).values()]
     expected = [
         tuple(None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row)
-        for row in zip(*(column.tolist() for column in _values(identification).values()), strict=True)
+        for row in zip(*columns, strict=True)
     ]
     alike = rows == expected and identified_values.agrees(db, number, identification)
     return identification_content(number, identification) if alike else ""
@@ -182,7 +182,7 @@ def _insert_values(db: Database, number: int, identification: StoredIdentificati
     db.insert("INSERT INTO parameter_value SELECT ?, * FROM incoming", incoming, [number])
 
 
-def _values(identification: StoredIdentification) -> dict[str, npt.NDArray[Any]]:
+def _values(identification: StoredIdentification) -> dict[str, Any]:
     """The columns of ``parameter_value``."""
     count = len(identification.parameters)
     repeats = len(identification.runs)
