@@ -53,12 +53,13 @@ def ellipsoid_factor(outputs: int, p: float = 0.95, dof: float = math.inf) -> fl
     covariance bounds nothing and the answer is infinity. Raises DataError for p outside (0, 1).
     """
     _check(outputs, p, dof)
+    # The functions that scipy.stats takes its quantiles from: it needs half a second to load.
     if math.isinf(dof):
-        return math.sqrt(float(scipy.stats.chi2.ppf(p, outputs)))
+        return math.sqrt(float(2.0 * scipy.special.gammaincinv(0.5 * outputs, p)))
     rest = dof - outputs + 1.0
     if rest <= 0.0:
         return math.inf
-    return math.sqrt(dof * outputs / rest * float(scipy.stats.f.ppf(p, outputs, rest)))
+    return math.sqrt(dof * outputs / rest * float(scipy.special.fdtri(outputs, rest, p)))
 
 
 def rectangle_factor(
@@ -79,8 +80,8 @@ def rectangle_factor(
     else:
         raise DataError(f"no form '{form}' of k_q; there are bonferroni and independent")
     if math.isinf(dof):
-        return float(scipy.stats.norm.isf(0.5 * tail))
-    return float(scipy.stats.t.isf(0.5 * tail, dof))
+        return -float(scipy.special.ndtri(0.5 * tail))
+    return -float(scipy.special.stdtrit(dof, 0.5 * tail))
 
 
 def correlated_rectangle_factor(
