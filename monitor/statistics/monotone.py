@@ -126,7 +126,7 @@ def mann_kendall(
     if variance == 0.0:
         return MonotoneTrend(0, 0.0, 0.0, 1.0, 1.0, 1.0)
     slope = float(np.median(slopes)) if slope is None else slope
-    ranks = scipy.stats.rankdata(y - slope * t)
+    ranks = _ranks(y - slope * t)
     seen = lag_one(np.asarray(ranks), fitted=2)
     r = float(np.clip(seen + SCATTER / np.sqrt(n), 0.0, 0.95))
     lags = np.arange(1, n)
@@ -134,6 +134,12 @@ def mann_kendall(
     tau = s / (n * (n - 1) / 2.0)
     plain, allowed = (_p_value(s, v) for v in (variance, variance * inflation))
     return MonotoneTrend(s, tau, max(seen, 0.0), inflation, allowed, plain)
+
+
+def _ranks(values: Array) -> Array:
+    """Ranks (n,) from 1; ties share the mean of theirs."""
+    _, index, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(counts) - 0.5 * (counts - 1))[index])
 
 
 def _p_value(s: int, variance: float) -> float:

@@ -77,7 +77,7 @@ def reference_nodes(n: float, dof: float) -> tuple[Array, Array, Array]:
         return np.zeros(1), np.ones(1), np.ones(1)
     z, wz = np.polynomial.hermite_e.hermegauss(NODES)
     x, wx = np.polynomial.legendre.leggauss(NODES)
-    ratio = np.sqrt(scipy.stats.chi2.ppf(0.5 * (x + 1.0), dof) / dof)
+    ratio = np.sqrt(2.0 * scipy.special.gammaincinv(0.5 * dof, 0.5 * (x + 1.0)) / dof)
     shift = (-(z[:, np.newaxis] / np.sqrt(n)) / ratio).ravel()
     scatter = np.repeat((1.0 / ratio)[np.newaxis, :], NODES, axis=0).ravel()
     weight = np.outer(wz / wz.sum(), wx / wx.sum()).ravel()

@@ -75,7 +75,7 @@ def t_squared_chart(
     _wanted(arl)
     statistic, shares = _quadratic(z, inverse)
     factor = p * (m + 1.0) * (m - 1.0) / (m * (m - p))
-    limit = float(factor * scipy.stats.f.isf(1.0 / arl, p, m - p))
+    limit = float(factor * scipy.special.fdtri(p, m - p, 1.0 - 1.0 / arl))
     return VectorChart("T²", m, statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
 
 

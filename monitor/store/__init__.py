@@ -34,7 +34,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.events import list_events, record_event
+from monitor.store.events import list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
@@ -102,6 +102,7 @@ __all__ = [
     "load_curve",
     "load_identification",
     "load_model",
+    "machine_events",
     "machine_history",
     "mark_certificate",
     "model_history",

@@ -89,16 +89,18 @@ def save_analysis(
     return number
 
 
-def latest_documents(db: Database, kind: str, machine: str) -> dict[str, Mapping[str, Any]]:
-    """The document of the latest result of a kind of each campaign of a machine that has one, in one query for all."""
-    return {
-        campaign: json.loads(document)
-        for campaign, document in db.rows(
-            "SELECT c.campaign, arg_max(a.document, a.analysis_id) FROM analysis AS a JOIN campaign AS c "
-            "USING (campaign_id) WHERE a.kind = ? AND c.machine = ? GROUP BY ALL ORDER BY ALL",
-            [kind, machine],
-        )
-    }
+def latest_documents(db: Database, kind: str, campaigns: Mapping[int, str]) -> dict[str, Mapping[str, Any]]:
+    """The document of the latest result of a kind of each of the ``campaigns`` (number to name) that has one."""
+    numbers = list(campaigns)
+    if not numbers:
+        return {}
+    marks = ", ".join("?" * len(numbers))
+    found = db.rows(
+        "SELECT campaign_id, arg_max(document, analysis_id) FROM analysis "
+        f"WHERE kind = ? AND campaign_id IN ({marks}) GROUP BY campaign_id",
+        [kind, *numbers],
+    )
+    return dict(sorted((campaigns[number], json.loads(document)) for number, document in found))
 
 
 class Which(TypedDict, total=False):

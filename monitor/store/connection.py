@@ -109,6 +109,12 @@ class Database:
             finally:
                 self._connection.unregister("incoming")
 
+    @contextmanager
+    def connected(self) -> Iterator[duckdb.DuckDBPyConnection]:
+        """DuckDB's own connection, for this block; no other thread uses the database meanwhile."""
+        with self._lock, _stopped_by_ctrl_c():
+            yield self._connection
+
     def next_number(self, table: str, column: str) -> int:
         """One more than the largest number in use; call it inside the transaction that uses it."""
         ((number,),) = self.rows(f"SELECT coalesce(max({column}), 0) + 1 FROM {table}")

@@ -53,6 +53,15 @@ def list_events(db: Database, machine: str | None = None) -> pd.DataFrame:
     )
 
 
+def machine_events(db: Database, machine: str) -> list[tuple[datetime, str, str]]:
+    """Time (UTC), kind and description of the events of a machine, in the order of time."""
+    rows = db.rows(
+        "SELECT happened_at, kind, description FROM v_events WHERE machine = ? ORDER BY happened_at",
+        [machine],
+    )
+    return [(at.replace(tzinfo=UTC), kind, text) for at, kind, text in rows]
+
+
 def event_content(db: Database, number: int) -> str:
     """The hash of all that is stored of an event."""
     return audit.digest(*db.rows("SELECT * FROM event WHERE event_id = ?", [number]))
