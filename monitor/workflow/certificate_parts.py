@@ -46,12 +46,12 @@ def _evaluated(
     """The evaluation of a run that has none in the database."""
     # Solver and compiler take a second to load, for which a stored result need not wait.
     from monitor.workflow.uncertainty import evaluate
-    from monitor.workflow.uncertainty_documents import document
+    from monitor.workflow.uncertainty_documents import statement
 
     done = evaluate(
         db, campaign.name, run, model=f"{model.name}@{model.version}", method="guf", linear_axes=linear_axes
     )
-    return evaluation_of(document(done), campaign, model)
+    return evaluation_of(statement(done), campaign, model)
 
 
 def inputs_of(parts: Sequence[Part], linear_axes: LinearAxes | None, fonts: Sequence[Path]) -> Document:

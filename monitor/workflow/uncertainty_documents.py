@@ -33,6 +33,13 @@ def _finite(value: float) -> float | None:
 
 def document(found: Evaluated) -> Document:
     """The result as people see it."""
+    result = statement(found)
+    result["guf"]["joint_coverage_of_k_2_each"] = joint_coverage(found.framework.correlation).value
+    return result
+
+
+def statement(found: Evaluated) -> Document:
+    """As ``document``, without what k = 2 each covers: sampling that takes half a second, and nobody states it."""
     guf, units = found.framework, found.units
     result: Document = {
         "campaign": found.campaign.name,
@@ -60,7 +67,6 @@ def document(found: Evaluated) -> Document:
             "k_p_with_degrees_of_freedom": _finite(guf.k_p),
             "k_q_with_degrees_of_freedom": _finite(guf.k_q),
             "expanded": _values(guf.names, units, guf.expanded),
-            "joint_coverage_of_k_2_each": joint_coverage(guf.correlation).value,
             "budget": {
                 line.source: dict(zip(guf.names, map(float, shares), strict=True))
                 for line, shares in zip(guf.budget, guf.budget_shares(), strict=True)

@@ -23,7 +23,7 @@ from monitor.workflow.evaluations import Evaluation, evaluation_of
 from monitor.workflow.known_errors import geometric_errors
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty import evaluate
-from monitor.workflow.uncertainty_documents import document as document_of
+from monitor.workflow.uncertainty_documents import statement
 
 Document = dict[str, Any]
 # Points along each axis: an error of a serial machine with straight axes bends with the square of the position at
@@ -115,9 +115,7 @@ def volumetric_map(
     found = evaluate(
         db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty, before=before
     )
-    mapped = map_of(
-        evaluation_of(document_of(found), found.campaign, found.model), found.fit, points, absolute
-    )
+    mapped = map_of(evaluation_of(statement(found), found.campaign, found.model), found.fit, points, absolute)
     document = map_document(mapped, p)
     save_map(db, document, found.model, before)
     return document, mapped
