@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from xml.etree import ElementTree as ET
 
@@ -136,7 +137,14 @@ def _values(parent: ET.Element, result: ResultSet, region: str, factor: float) -
             add(element, "unit", second + unit, SI)
     add(around, "coverageFactor", _number(factor), SI)
     add(around, "coverageProbability", _number(result.p), SI)
-    add(around, "distribution", "normal" if result.trials is None else "numerical", SI)
+    add(around, "distribution", _distribution(result), SI)
+
+
+def _distribution(result: ResultSet) -> str:
+    """The law that the coverage factor is of: the t distribution where the covariance is known from few runs."""
+    if math.isfinite(result.dof):
+        return "t"
+    return "normal" if result.trials is None else "numerical"
 
 
 def _number(value: float) -> str:

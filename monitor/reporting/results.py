@@ -49,7 +49,8 @@ class ResultSet:
     products of the display units. ``k_q`` is the coverage factor of the hyper-rectangle, ``k_p`` that of the
     hyper-ellipsoid of ``rank`` dimensions, both for probability ``p`` (JCGM 102:2011 6.5). ``evaluation``
     names the way the uncertainty was found, with its clause. ``trials`` and ``validation`` belong to Monte
-    Carlo. ``tolerances`` (m,) are limits of absolute values, NaN where there is none.
+    Carlo. ``tolerances`` (m,) are limits of absolute values, NaN where there is none. ``dof``: degrees of freedom of
+    the covariance, for which the factors hold (Student, Hotelling); not finite where it is known.
     """
 
     state: str
@@ -68,6 +69,7 @@ class ResultSet:
     trials: int | None = None
     validation: str | None = None
     tolerances: Array | None = None
+    dof: float = math.inf
 
     @property
     def u(self) -> Array:
@@ -122,6 +124,7 @@ def result_set(
     trials: int | None = None,
     validation: str | None = None,
     tolerances: Mapping[str, float] | None = None,
+    dof: float = math.inf,
     texts: Texts | None = None,
 ) -> ResultSet:
     """A result to print from ``estimate`` (m,) and ``covariance`` (m, m) in internal units.
@@ -167,6 +170,7 @@ def result_set(
         trials=trials,
         validation=validation,
         tolerances=limits,
+        dof=dof,
     )
 
 

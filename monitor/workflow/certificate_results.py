@@ -137,6 +137,7 @@ def results_of(
         trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
         validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
         tolerances={name: limits[name] for name in limits if name in found.names} or None,
+        dof=found.dof,
         texts=texts,
     )
 

@@ -240,3 +240,19 @@ def test_software_without_a_release_is_no_software_of_a_dcc(make_record: Make) -
     assert made.method is not None
     with pytest.raises(InputError, match=r"names a program and its release; method\.software is 'own'"):
         dcc_xml(dataclasses.replace(made, method=dataclasses.replace(made.method, software="own")))
+
+
+def test_factors_of_few_runs_are_told_as_those_of_the_t_distribution(make_record: Make) -> None:
+    made = dataclasses.replace(make_record(3), country="DE")
+    assert made.results is not None
+
+    def told(**changes: object) -> set[str]:
+        assert made.results is not None
+        result = dataclasses.replace(made.results[0], **changes)  # type: ignore[arg-type]
+        tree = ET.fromstring(dcc_xml(dataclasses.replace(made, results=(result,))))
+        return {str(one.text) for one in tree.iterfind(".//si:distribution", SPACES)}
+
+    assert told() == {"normal"}
+    assert told(dof=15.0) == told(dof=15.0, trials=10**6) == {"t"}
+    assert told(trials=10**6) == {"numerical"}
+    assert told(dof=float("nan")) == {"normal"}  # as a stored record says that it is known
