@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.readers import read_linear_axes
 from monitor.reporting.signing import FileKey, Key, TokenKey
 from monitor.workflow.certificate_results import METHODS
 from monitor.workflow.conformity import RULES
@@ -90,13 +89,19 @@ def _day(text: str) -> date:
 
 def issuing(options: Namespace) -> dict[str, Any]:
     """The options as ``certificates.issue`` and ``certificates.amend`` take them. Raises InputError."""
+    axes = None
+    if options.linear_axes is not None:
+        # Loaded here: hardly any certificate states errors of the linear axes.
+        from monitor.readers import read_linear_axes
+
+        axes = read_linear_axes(options.linear_axes)
     return {
         "as_left": options.as_left,
         "out": options.out,
         "number": options.number,
         "issued_on": options.date,
         "model": options.model,
-        "linear_axes": None if options.linear_axes is None else read_linear_axes(options.linear_axes),
+        "linear_axes": axes,
         "method": options.method,
         "conformity": options.conformity,
         "with_map": options.map,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special, stats
+import scipy
 
 from monitor.discovery.fit import Fit
 from monitor.machine import MOTION
@@ -106,7 +106,7 @@ def _deviations(fit: Fit) -> _Deviations:
     # the others as a whole has no bad points for that.
     squares = np.sum(vectors**2, axis=1) / inflation
     share = fit.degrees_of_freedom / (fit.readings + 1e-300)
-    usual = stats.chi2.median(white.shape[1]) * max(share, 1e-6)
+    usual = scipy.stats.chi2.median(white.shape[1]) * max(share, 1e-6)
     scale = np.full(len(kept), np.median(squares[kept]) / usual)
     for own in rows:
         if kept[own].any():
@@ -163,7 +163,7 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
             checked, square / deviations.inflation[rows] / deviations.scale[rows] ** 2, -1.0
         )
         place = int(chi_square.argmax())
-        p = float(special.chdtrc(rank[place], chi_square[place]))
+        p = float(scipy.special.chdtrc(rank[place], chi_square[place]))
         row, size = int(rows[place]), sizes[place]
         if p * tests <= alpha:
             axis, off = _as_reading(fit, row, size * fit.problem.sigma[row])
@@ -216,7 +216,7 @@ def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
                 run=int(context.run[row]),
                 sequence=int(context.sequence[row]),
                 shift=(x, y, z),
-                p_value=float(special.chdtrc(rank[place], chi_square[place])),
+                p_value=float(scipy.special.chdtrc(rank[place], chi_square[place])),
                 chi_square=float(chi_square[place]),
             )
         if best is not None:

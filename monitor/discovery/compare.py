@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.discovery.anomalies import plan_places
 from monitor.discovery.fit import Fit
@@ -100,7 +100,7 @@ def lack_of_fit(fit: Fit) -> tuple[LackOfFit | None, float | None]:
     if freedom < 1 or own < 1 or error <= 0:
         return None, None
     f = (lack / own) / (error / freedom)
-    test = LackOfFit(float(f), float(stats.f.sf(f, own, freedom)), float(own), float(freedom))
+    test = LackOfFit(float(f), float(scipy.special.fdtrc(own, freedom, f)), float(own), float(freedom))
     return test, fit.sigma * float(np.sqrt(error / freedom))
 
 
@@ -139,7 +139,7 @@ def _breakdown(fit: Fit) -> dict[str, dict[str, Part]]:
 def compare(fit: Fit, campaign: str, model: str) -> Comparison:
     """Compare a fitted model with its campaign."""
     test, repeatability = lack_of_fit(fit)
-    excess = float(stats.chi2.sf(fit.sum_of_squares, fit.degrees_of_freedom))
+    excess = float(scipy.special.chdtrc(fit.degrees_of_freedom, fit.sum_of_squares))
     missing = test is not None and test.p_value < LACK_OF_FIT_LEVEL
     too_much = fit.scale > STATEMENT_TOLERANCE and excess < LACK_OF_FIT_LEVEL
     readings = fit.readings

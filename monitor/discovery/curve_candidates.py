@@ -8,7 +8,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from monitor.discovery.curve_scene import Scene, effect_of, variant
 from monitor.discovery.evidence import orthonormal, weigh, without
@@ -203,7 +203,7 @@ def at_best(scene: Scene, visible: Visible, chosen: Sequence[Candidate], place: 
         low, high = sorted((0.6 * rate, float(np.clip(1.6 * rate, -most, most))))
     if high <= low:
         return _named(candidate, effect)
-    best = optimize.minimize_scalar(
+    best = scipy.optimize.minimize_scalar(
         badness, bounds=(low, high), method="bounded", options={"xatol": 1e-4 * (high - low), "maxiter": 40}
     )
     better = effect.at(1.0 / float(best.x)) if best.fun <= badness(rate) else effect

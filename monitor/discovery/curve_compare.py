@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.discovery.compare import (
     EXPLAINED,
@@ -83,7 +83,7 @@ def lack_of_fit(fit: CurveFit) -> tuple[LackOfFit | None, float | None]:
         return None, repeatability
     f = (lack / own) / (scatter / repeated)
     return LackOfFit(
-        float(f), float(stats.f.sf(f, own, repeated)), float(own), float(repeated)
+        float(f), float(scipy.stats.f.sf(f, own, repeated)), float(own), float(repeated)
     ), repeatability
 
 
@@ -133,7 +133,7 @@ def compare_curve(fit: CurveFit, *, rate: float = 0.01, lacks: bool | None = Non
     expected = excess = None
     if stated is not None:
         expected = stated * float(np.sqrt(fit.degrees_of_freedom / len(rows)))
-        excess = float(stats.chi2.sf(fit.sum_of_squares / stated**2, fit.degrees_of_freedom))
+        excess = float(scipy.stats.chi2.sf(fit.sum_of_squares / stated**2, fit.degrees_of_freedom))
     missing = bool(lacks) or (test is not None and test.p_value < LACK_OF_FIT_LEVEL)
     if stated is not None and excess is not None:
         missing |= fit.deviation > STATEMENT_TOLERANCE * stated and excess < LACK_OF_FIT_LEVEL

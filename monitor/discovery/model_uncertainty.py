@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from monitor.discovery.compare import lack_of_fit
 from monitor.discovery.fit import Fit
@@ -87,7 +87,7 @@ def _lack(fit: Fit) -> tuple[float, float, float, int] | None:
         pure = fit.sum_of_squares / (test.f * test.degrees_of_freedom + test.pure_error_degrees_of_freedom)
         return pure * test.f * test.degrees_of_freedom, test.degrees_of_freedom, pure, len(fit.problem.runs)
     freedom = fit.degrees_of_freedom
-    if fit.scale <= 1.0 or float(stats.chi2.sf(fit.sum_of_squares, freedom)) > LEVEL:
+    if fit.scale <= 1.0 or float(scipy.special.chdtrc(freedom, fit.sum_of_squares)) > LEVEL:
         return None
     return fit.sum_of_squares, float(freedom), 1.0, 1
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from monitor.discovery.evidence import orthonormal, weigh, without
 from monitor.discovery.fit import Fit
@@ -122,7 +122,7 @@ def refine(fit: Fit, visible: Visible, chosen: Sequence[Candidate], place: int) 
         width = np.log(GRID_FACTOR)
     elif name == "periods a turn":
         width = ORDER_STEP / start
-    best = optimize.minimize_scalar(
+    best = scipy.optimize.minimize_scalar(
         badness,
         bounds=(np.log(start) - width, np.log(start) + width),
         method="bounded",

@@ -128,10 +128,11 @@ def _shades(coefficients: list[list[float]], pitch: float, title: str) -> Markup
         for column, value in enumerate(values):
             step = round(_GREYS * min(abs(value), 1.0))
             if step:
+                # A line as thick as the row is high: half of what an area takes to draw.
                 greys.setdefault(step, []).append(
-                    f"M{column * wide:g} {row * high:g}h{wide - 2:g}v{high - 1:g}h{2 - wide:g}z"
+                    f"M{column * wide:g} {row * high + (high - 1) / 2:g}h{wide - 2:g}"
                 )
     for step, marks in sorted(greys.items()):
         level = round(255 * (1.0 - _DARKEST * step / _GREYS))
-        on.path("".join(marks), fill=f"#{level:02x}{level:02x}{level:02x}")
+        on.path("".join(marks), stroke=f"#{level:02x}{level:02x}{level:02x}", width=high - 1)
     return Markup(on.svg())

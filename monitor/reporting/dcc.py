@@ -4,6 +4,9 @@
 once with the ellipsoidal region (k_p), once with the rectangular region (k_q), both of JCGM 102:2011. What the
 record says in words goes where the schema has a place for it; nothing is invented, so a record without the
 laboratory's country (ISO 3166-1) is refused.
+
+The writer stands alone: it loads neither the database nor what draws pages. ``results.result_set`` makes the results
+from an estimate and a covariance; ``examples/write_dcc.py`` is a whole program.
 """
 
 from __future__ import annotations
@@ -41,8 +44,8 @@ _STATUS = {
 def dcc_xml(record: CertificateRecord) -> bytes:
     """The certificate as a DCC, UTF-8, in the language of the record.
 
-    Raises IncompleteCertificateError where an item is missing, InputError without a country or for a unit that
-    has no D-SI notation here.
+    Raises IncompleteCertificateError where an item is missing, InputError without a country, without the release of
+    the software (behind its name: "program 1.4") or for a unit that has no D-SI notation here.
     """
     check_complete(record)
     if not re.fullmatch("[A-Z]{2}", record.country or ""):
@@ -50,6 +53,7 @@ def dcc_xml(record: CertificateRecord) -> bytes:
             "a digital certificate names the laboratory's country by two letters (ISO 3166-1): write "
             f'country = "DE" in the section [laboratory] of its file; it has {record.country!r}'
         )
+    _check_software(record)
     ET.register_namespace("dcc", DCC)
     ET.register_namespace("si", SI)
     root = ET.Element(f"{{{DCC}}}digitalCalibrationCertificate", {"schemaVersion": SCHEMA_VERSION})
@@ -62,6 +66,15 @@ def dcc_xml(record: CertificateRecord) -> bytes:
         volumetric_error(add(results, "measurementResult"), record, found, texts)
     ET.indent(root, " ")
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
+def _check_software(record: CertificateRecord) -> None:
+    software = str(record.method.software) if record.method is not None else ""
+    if not all(software.rpartition(" ")[::2]):
+        raise InputError(
+            f"a digital certificate names a program and its release; method.software is {software!r}, for example "
+            "'program 1.4'"
+        )
 
 
 def _administrative(parent: ET.Element, record: CertificateRecord, texts: Texts) -> None:

@@ -207,7 +207,8 @@ class FleetRow:
 class Fleet:
     """The first page: the week, when the report was made, and the machines by urgency.
 
-    ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known.
+    ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known. ``ended``
+    says whether the week had, by the shop's clock, when the report was made.
     """
 
     week: str
@@ -218,6 +219,7 @@ class Fleet:
     risk: float
     rows: tuple[FleetRow, ...]
     refused_imports: tuple[RefusedImport, ...] = ()
+    ended: bool = True
 
 
 def fleet_row(health: MachineHealth) -> FleetRow:

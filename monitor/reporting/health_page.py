@@ -112,6 +112,7 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         "made_iso": fleet.made_at.isoformat() + "Z",
         "software": fleet.software,
         "risk": percent(fleet.risk),
+        "ended": fleet.ended,
         "lines": [_line(row) for row in fleet.rows],
         "legend": [
             (SIGNS[state], state, words)

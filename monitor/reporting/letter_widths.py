@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from io import BytesIO
 
 from fontTools.ttLib import TTFont
@@ -14,6 +14,7 @@ MILLIMETRES_A_POINT = 25.4 / 72.0
 BOLD = 1.12
 
 
+@lru_cache(maxsize=4096)
 def in_units(words: str) -> int:
     """The width of a text in the font's units; a letter that it lacks counts an em."""
     em, widths = _widths()

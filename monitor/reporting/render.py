@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import threading
+import unicodedata
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,20 +20,29 @@ from typing import Any
 
 from fontTools.ttLib import TTFont
 from jinja2 import Environment, FunctionLoader, StrictUndefined, select_autoescape
-from weasyprint import HTML, Attachment
-from weasyprint.text.fonts import FontConfiguration
-from weasyprint.urls import FatalURLFetchingError, URLFetcher, URLFetcherResponse
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate import CertificateRecord
 from monitor.reporting.certificate_data import Attached, certificate_files
 from monitor.reporting.certificate_page import certificate_context
+from monitor.reporting.certificate_tables import LETTERS_PT
+from monitor.reporting.layout_engine import (
+    HTML,
+    Attachment,
+    FatalURLFetchingError,
+    FontConfiguration,
+    URLFetcher,
+    URLFetcherResponse,
+)
+from monitor.reporting.letter_widths import in_mm
 from monitor.reporting.resources import FONT_FILES, font_bytes, report_text
 
 PDF_VARIANT = "pdf/a-3u"
 _FONT_SCHEME = "font:"
 #: The process environment is shared: one document at a time may set SOURCE_DATE_EPOCH.
 _EPOCH_LOCK = threading.Lock()
+#: Signs that turn the order of the letters around them (Unicode UAX #9, 2): a number could be read as another.
+_REORDERING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
 
 class UnprintableError(InputError):
@@ -152,6 +162,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.tests["wider_than"] = lambda words, mm: in_mm(words, LETTERS_PT) > mm
     environment.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
     return environment
 
@@ -188,9 +199,16 @@ def _reproducible(moment: datetime) -> Iterator[None]:
 def _check_letters(record: CertificateRecord, extra: Sequence[Path]) -> None:
     """No system font steps in, so that a certificate looks alike everywhere: letters without a font are refused."""
     known = _letters(None).union(*(_letters(path) for path in extra))
-    missing = sorted(
-        {letter for letter in _text_of(record) if ord(letter) not in known and letter not in "\n\r\t"}
+    used = set(_text_of(record)) - set("\n\r\t")
+    hidden = sorted(
+        letter for letter in used if letter in _REORDERING or unicodedata.category(letter) == "Cc"
     )
+    if hidden:
+        shown = ", ".join(f"U+{ord(letter):04X}" for letter in hidden)
+        raise UnprintableError(
+            f"the certificate's texts hold signs that are not seen but change what is: {shown}; take them out"
+        )
+    missing = sorted(letter for letter in used if ord(letter) not in known)
     if missing:
         shown = ", ".join(f"{letter} (U+{ord(letter):04X})" for letter in missing[:8])
         raise UnprintableError(

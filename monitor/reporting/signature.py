@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import logging
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -31,19 +32,23 @@ def is_signed(pdf: bytes) -> bool:
     return any(mark in pdf for mark in _MARKS)
 
 
-def check_signature(pdf: bytes, trusted: Path | None = None) -> SignatureFinding:
+def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None = None) -> SignatureFinding:
     """Whether a PDF's signature covers the whole file and fits it.
 
     ``trusted`` is a PEM or DER file with the certificates that a signer's must lead to; without one nothing is
-    said of who signed beyond the name in the certificate. Never raises for the file's own faults: they are the
-    finding. Raises InputError where pyHanko is not installed or ``trusted`` cannot be read.
+    said of who signed beyond the name in the certificate. ``at`` (with an offset) is when the signature was there, as
+    somebody else than the signer knows: certificates end, and what was signed before stays signed. Without it they
+    have to be valid now (ETSI EN 319 102-1, 5.2.6: past validation needs a proof of existence). Never raises for the
+    file's own faults: they are the finding. Raises InputError where pyHanko is not installed or ``trusted`` cannot be
+    read.
     """
     need_pyhanko()
     from pyhanko.pdf_utils.reader import PdfFileReader
     from pyhanko.sign.validation import validate_pdf_signature
     from pyhanko.sign.validation.status import SignatureCoverageLevel
 
-    context = _context(trusted)
+    moment = at or datetime.now(UTC)
+    context = _context(trusted, moment)
     # What is wrong is the finding; pyHanko's own log says it again, with a traceback.
     logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
     logging.getLogger("pyhanko_certvalidator").setLevel(logging.CRITICAL)
@@ -56,6 +61,7 @@ def check_signature(pdf: bytes, trusted: Path | None = None) -> SignatureFinding
         (one,) = found
         status = validate_pdf_signature(one, signer_validation_context=context)
         signer = one.signer_cert.subject.human_friendly
+        first, last = one.signer_cert.not_valid_before, one.signer_cert.not_valid_after
         clean = _room_is_clean(pdf, [int(number) for number in one.byte_range])
     except Exception as error:  # an altered file breaks the reader in as many ways as there are bytes
         return SignatureFinding(
@@ -70,7 +76,11 @@ def check_signature(pdf: bytes, trusted: Path | None = None) -> SignatureFinding
         faults.append("the signature does not fit its certificate")
     if status.coverage != SignatureCoverageLevel.ENTIRE_FILE or not status.docmdp_ok:
         faults.append("the signature does not cover the whole file: something was added afterwards")
-    if trusted is not None and not status.trusted:
+    if trusted is not None and not first <= moment <= last:
+        faults.append(
+            f"the certificate of {signer} is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d}, not on {moment:%Y-%m-%d}"
+        )
+    elif trusted is not None and not status.trusted:
         faults.append(f"the certificate of {signer} does not lead to a trusted one")
     return SignatureFinding(not faults, signer, tuple(faults))
 
@@ -99,19 +109,19 @@ def need_pyhanko() -> None:
         raise InputError("signatures need pyHanko: pip install 'machine-health-monitor[sign]'") from error
 
 
-def _context(trusted: Path | None) -> Any:
+def _context(trusted: Path | None, moment: datetime) -> Any:
     from pyhanko.keys import load_certs_from_pemder
     from pyhanko_certvalidator import ValidationContext
 
     if trusted is None:
-        return ValidationContext(trust_roots=[], allow_fetching=False)
+        return ValidationContext(trust_roots=[], allow_fetching=False, moment=moment)
     try:
         roots = list(load_certs_from_pemder([str(trusted)]))  # type: ignore[no-untyped-call]
     except OSError as error:
         raise InputError(f"{trusted} cannot be read: {error.strerror or error}") from error
     except ValueError as error:
         raise InputError(f"{trusted} holds no certificates in PEM or DER: {error}") from error
-    return ValidationContext(trust_roots=roots, allow_fetching=False)
+    return ValidationContext(trust_roots=roots, allow_fetching=False, moment=moment)
 
 
 def _words(error: Exception) -> str:

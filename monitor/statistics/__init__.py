@@ -24,6 +24,7 @@ from monitor.statistics.groups import Selection, group_by, select_runs
 from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
 from monitor.statistics.joint_backtest import LengthBacktest, backtest_longest
 from monitor.statistics.joint_forecast import LengthForecast, forecast_longest, residual_correlation
+from monitor.statistics.longest_vector import longest, may_be_longest
 from monitor.statistics.means import AnalysisOfVariance, GroupTest, anova, kruskal_wallis, welch_anova
 from monitor.statistics.monotone import MonotoneTrend, mann_kendall
 from monitor.statistics.multivariate import VectorTest, box_m, manova
@@ -82,8 +83,10 @@ __all__ = [
     "known_reference",
     "kruskal_wallis",
     "levene",
+    "longest",
     "mann_kendall",
     "manova",
+    "may_be_longest",
     "mewma_chart",
     "mewma_limit",
     "normality",

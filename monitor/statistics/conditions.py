@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -80,7 +80,7 @@ def _cycle(fit: MixedFit, at: int, name: str, period: float, origin: float) -> C
     dof = float(fit.dof[at : at + 2].min())
     peak = origin + float(np.arctan2(pair[1], pair[0])) / (2.0 * np.pi) * period
     u = float(np.sqrt(direction @ block @ direction))
-    return Cycle(name, period, amplitude, u, peak, float(stats.f.sf(f, 2, dof)))
+    return Cycle(name, period, amplitude, u, peak, float(scipy.special.fdtrc(2.0, dof, f)))
 
 
 def _per(unit: Unit | None, channel: Unit | None) -> Unit | None:

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -117,9 +117,9 @@ def individuals_chart(
     _wanted(arl)
     swell = np.sqrt(1.0 + 1.0 / reference.n)
     if limit is None:
-        limit = float(stats.t.isf(0.5 / arl, reference.dof) * swell)
+        limit = float(-scipy.special.stdtrit(reference.dof, 0.5 / arl) * swell)
     else:
-        arl = float(0.5 / stats.t.sf(limit / swell, reference.dof))
+        arl = float(0.5 / scipy.special.stdtr(reference.dof, -limit / swell))
     half = np.full(len(y), limit * reference.sd)
     alarms = np.flatnonzero(np.abs(y - reference.centre) > half)
     lower, upper = reference.centre - half, reference.centre + half

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -67,7 +67,7 @@ def predict(line: Trend, times: npt.ArrayLike) -> tuple[Array, Array, Array]:
 
 def _crossing(line: Trend, limit: float, now: float, horizon: float) -> Crossing:
     """First time from ``now`` on at which the line, and each side of its band, reaches the limit."""
-    factor = float(stats.t.isf((1.0 - line.confidence) / 2.0, line.dof))
+    factor = float(-scipy.special.stdtrit(line.dof, (1.0 - line.confidence) / 2.0))
     side = 1.0 if limit > float(predict(line, now)[0]) else -1.0
     grid = now + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 400)]) * (horizon - now)
 
@@ -83,7 +83,7 @@ def _crossing(line: Trend, limit: float, now: float, horizon: float) -> Crossing
         return (
             float(grid[0])
             if i == 0
-            else float(optimize.brentq(lambda t: float(gap(t)), grid[i - 1], grid[i]))
+            else float(scipy.optimize.brentq(lambda t: float(gap(t)), grid[i - 1], grid[i]))
         )
 
     at = first(0.0)
@@ -93,8 +93,8 @@ def _crossing(line: Trend, limit: float, now: float, horizon: float) -> Crossing
 def _probability(line: Trend, times: npt.ArrayLike, lower: float, upper: float) -> Array:
     value, _, u = predict(line, times)
     scale = np.maximum(u, 1e-300)
-    below = stats.t.cdf((upper - value) / scale, line.dof)
-    return np.asarray(below - stats.t.cdf((lower - value) / scale, line.dof))
+    below = scipy.special.stdtr(line.dof, (upper - value) / scale)
+    return np.asarray(below - scipy.special.stdtr(line.dof, (lower - value) / scale))
 
 
 def forecast(

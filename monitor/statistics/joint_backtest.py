@@ -16,7 +16,8 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_probability
 from monitor.statistics.forecast import predict
-from monitor.statistics.joint_forecast import draw_lines, longest, residual_correlation
+from monitor.statistics.joint_forecast import draw_lines, residual_correlation
+from monitor.statistics.longest_vector import longest
 from monitor.statistics.trend import Trend
 
 #: Days foretold at most, evenly spread over those that can be: each costs a fit of every parameter.
@@ -73,7 +74,7 @@ def backtest_longest(
     whole = np.isfinite(values).all(axis=1)
     labels, first = np.unique(days[whole], return_index=True)
     rows = np.sort(np.flatnonzero(whole)[first])
-    possible = [row for row in rows if _known_days(values, days, times < times[row]) >= FEWEST_DAYS]
+    possible = rows[_known_days(values, days, times, times[rows]) >= FEWEST_DAYS].tolist()
     if not possible:
         raise DataError(
             f"{len(labels)} days of all parameters since the last change are too few to foretell one of them by the "
@@ -108,6 +109,12 @@ def backtest_longest(
     )
 
 
-def _known_days(values: Array, days: npt.NDArray[np.int64], before: npt.NDArray[np.bool_]) -> int:
-    """Fewest days of any parameter among the runs ``before`` (n,)."""
-    return min(len(np.unique(days[before & np.isfinite(column)])) for column in values.T)
+def _known_days(values: Array, days: npt.NDArray[np.int64], times: Array, at: Array) -> npt.NDArray[np.intp]:
+    """Fewest days (k,) of any parameter that had begun before each of the times ``at`` (k,)."""
+    fewest = np.full(len(at), len(days))
+    for column in values.T:
+        own = np.isfinite(column)
+        # Times do not fall: the first run of a day is where it is met first.
+        begins = times[own][np.unique(days[own], return_index=True)[1]]
+        fewest = np.minimum(fewest, np.searchsorted(np.sort(begins), at, side="left"))
+    return fewest

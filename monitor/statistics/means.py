@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.records import Array
 from monitor.statistics.sums import GroupedSums, grouped_sums
@@ -64,7 +64,7 @@ def anova_from_sums(sums: GroupedSums) -> AnalysisOfVariance:
         statistic=f,
         dof=sums.dof_between,
         dof_denominator=dof2,
-        p_value=np.asarray(stats.f.sf(f, sums.dof_between, dof2)),
+        p_value=np.asarray(scipy.stats.f.sf(f, sums.dof_between, dof2)),
         ss_between=sums.ss_between,
         ss_within=sums.ss_within,
         ms_between=sums.ms_between,
@@ -86,7 +86,7 @@ def welch_from_sums(sums: GroupedSums) -> GroupTest:
         numerator = (weight * (sums.mean_by_group - centre) ** 2).sum(axis=0) / (k - 1)
         f = numerator / (1.0 + 2.0 * (k - 2) / (k**2 - 1) * spread)
         dof2 = divide(np.full_like(spread, k**2 - 1.0), 3.0 * spread)
-    return GroupTest("Welch ANOVA", sums.labels, f, k - 1, dof2, np.asarray(stats.f.sf(f, k - 1, dof2)))
+    return GroupTest("Welch ANOVA", sums.labels, f, k - 1, dof2, np.asarray(scipy.stats.f.sf(f, k - 1, dof2)))
 
 
 def anova(values: npt.ArrayLike, groups: npt.ArrayLike) -> AnalysisOfVariance:
@@ -118,12 +118,12 @@ def kruskal_wallis(values: npt.ArrayLike, groups: npt.ArrayLike) -> GroupTest:
     groups: 3.1 % alarms at the nominal 5 % with five groups of four runs.
     """
     sums = grouped_sums(values, groups)
-    ranks = np.asarray(stats.rankdata(sums.centred, axis=0))
+    ranks = np.asarray(scipy.stats.rankdata(sums.centred, axis=0))
     n = sums.n
     offset = np.vstack([ranks[sums.index == j].mean(axis=0) for j in range(sums.k)]) - (n + 1) / 2.0
     between = (sums.counts[:, np.newaxis] * offset * offset).sum(axis=0)
     # The variance of the ranks themselves carries the correction for ties.
     h = divide(between, ranks.var(axis=0, ddof=1))
     dof = sums.k - 1
-    p_value = np.asarray(stats.chi2.sf(h, dof))
+    p_value = np.asarray(scipy.stats.chi2.sf(h, dof))
     return GroupTest("Kruskal-Wallis", sums.labels, h, dof, np.full_like(h, np.inf), p_value)

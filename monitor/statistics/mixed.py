@@ -8,10 +8,11 @@ suffice and nothing iterates beyond one root. Without repeated days, days and ru
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg, stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -47,11 +48,11 @@ class MixedFit:
     def p_value(self) -> Array:
         """Two-sided p-value of each coefficient being zero (q,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(2.0 * stats.t.sf(np.abs(self.coefficients / self.u), self.dof))
+            return np.asarray(2.0 * scipy.special.stdtr(self.dof, -np.abs(self.coefficients / self.u)))
 
     def interval(self, level: float) -> Array:
         """Intervals (q, 2) of the coefficients at a level of confidence."""
-        half = stats.t.isf((1.0 - level) / 2.0, self.dof) * self.u
+        half = -scipy.special.stdtrit(self.dof, (1.0 - level) / 2.0) * self.u
         return np.column_stack([self.coefficients - half, self.coefficients + half])
 
 
@@ -68,7 +69,13 @@ def _triangle(rows: Array) -> Array:
 
 def _rank(matrix: Array) -> int:
     """Rank of columns that were scaled to unit length before."""
-    return int(np.linalg.matrix_rank(matrix, tol=1e-9)) if matrix.size else 0
+    return _rank_of(np.ascontiguousarray(matrix).tobytes(), matrix.shape) if matrix.size else 0
+
+
+# The parameters of a machine have the same days, and so the same columns again and again.
+@lru_cache(maxsize=64)
+def _rank_of(numbers: bytes, shape: tuple[int, int]) -> int:
+    return int(np.linalg.matrix_rank(np.frombuffer(numbers).reshape(shape), tol=1e-9))
 
 
 def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.intp]) -> MixedFit:
@@ -108,7 +115,7 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
         """Triangle (q, q), coefficients, chi-square and its slope for t² = ``variance`` in units of s²."""
         rows = outer / np.sqrt(1.0 + variance * total)[:, np.newaxis]
         triangle = _triangle(np.vstack([inner, rows]))
-        found = linalg.solve_triangular(triangle[:q, :q], triangle[:q, q], check_finite=False)
+        found = scipy.linalg.solve_triangular(triangle[:q, :q], triangle[:q, q], check_finite=False)
         left = (rows[:, q] - rows[:, :q] @ found) ** 2
         within_days = ((inner[:, q] - inner[:, :q] @ found) ** 2).sum()
         slope = (left * total / (1.0 + variance * total)).sum()
@@ -128,7 +135,7 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
             triangle, coefficients, chi_square, slope = solve(variance)
             if chi_square - goal <= 1e-13 * goal or step <= 1e-14 * variance or variance == most:
                 break
-    inverse = linalg.solve_triangular(triangle, np.eye(q), check_finite=False)
+    inverse = scipy.linalg.solve_triangular(triangle, np.eye(q), check_finite=False)
     unscaled = inverse @ inverse.T
     factor = chi_square / (n - q)
     within_part = ((inner[:, :q] @ unscaled) ** 2).sum(axis=0) / np.diag(unscaled)

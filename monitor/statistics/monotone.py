@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special, stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -87,7 +87,7 @@ def theil_sen(
     for column in (values, times):
         k = np.unique(column, return_counts=True)[1].astype(np.float64)
         variance -= float((k * (k - 1) * (2 * k + 5)).sum()) / 18.0
-    half = float(special.ndtri(0.5 * (1.0 + level)) * np.sqrt(max(variance, 0.0)))
+    half = float(scipy.special.ndtri(0.5 * (1.0 + level)) * np.sqrt(max(variance, 0.0)))
     low, high = max(round((many - half) / 2.0) - 1, 0), min(round((many + half) / 2.0), many - 1)
     middle = ((many - 1) // 2, many // 2)
     slopes = np.partition(slopes, sorted({low, high, *middle}))
@@ -126,7 +126,7 @@ def mann_kendall(
     if variance == 0.0:
         return MonotoneTrend(0, 0.0, 0.0, 1.0, 1.0, 1.0)
     slope = float(np.median(slopes)) if slope is None else slope
-    ranks = stats.rankdata(y - slope * t)
+    ranks = _ranks(y - slope * t)
     seen = lag_one(np.asarray(ranks), fitted=2)
     r = float(np.clip(seen + SCATTER / np.sqrt(n), 0.0, 0.95))
     lags = np.arange(1, n)
@@ -136,6 +136,12 @@ def mann_kendall(
     return MonotoneTrend(s, tau, max(seen, 0.0), inflation, allowed, plain)
 
 
+def _ranks(values: Array) -> Array:
+    """Ranks (n,) from 1; ties share the mean of theirs."""
+    _, index, counts = np.unique(values, return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(counts) - 0.5 * (counts - 1))[index])
+
+
 def _p_value(s: int, variance: float) -> float:
     """Two-sided normal p-value with the continuity correction."""
-    return float(2.0 * special.ndtr(-max(abs(s) - 1, 0) / np.sqrt(variance)))
+    return float(2.0 * scipy.special.ndtr(-max(abs(s) - 1, 0) / np.sqrt(variance)))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.statistics.sums import GroupedSums, grouped_sums
@@ -55,7 +55,7 @@ def manova(values: npt.ArrayLike, groups: npt.ArrayLike) -> VectorTest:
     root = wilks ** (1.0 / s)
     f = float((1.0 - root) / root * dof2 / dof)
     name = "Hotelling T²" if k == 2 else "MANOVA (Wilks)"
-    return VectorTest(name, sums.labels, wilks, f, dof, dof2, float(stats.f.sf(f, dof, dof2)))
+    return VectorTest(name, sums.labels, wilks, f, dof, dof2, float(scipy.stats.f.sf(f, dof, dof2)))
 
 
 def box_m(values: npt.ArrayLike, groups: npt.ArrayLike) -> VectorTest:
@@ -90,7 +90,7 @@ def box_m(values: npt.ArrayLike, groups: npt.ArrayLike) -> VectorTest:
         b = dof2 / (1.0 - c1 + 2.0 / dof2)
         f = dof2 * m / (dof1 * (b - m)) if m < b else np.inf
     return VectorTest(
-        "Box's M", sums.labels, float(m), float(f), dof1, dof2, float(stats.f.sf(f, dof1, dof2))
+        "Box's M", sums.labels, float(m), float(f), dof1, dof2, float(scipy.stats.f.sf(f, dof1, dof2))
     )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy import linalg, signal, special
+import scipy
 
 from monitor.records import Array
 
@@ -87,7 +87,7 @@ class Noise:
             steps[row] = before / np.sqrt(variance)
             if abs(variance - 1.0) < _SETTLED:
                 if row + 1 < len(steps):
-                    steps[row + 1 :] = signal.lfilter(
+                    steps[row + 1 :] = scipy.signal.lfilter(
                         [1.0], [1.0, theta], steps[row + 1 :], axis=0, zi=-theta * before[None]
                     )[0]
                 break
@@ -126,7 +126,7 @@ def _likelihoods(y: Array, x: Array) -> list[tuple[Noise, float, float, Array, A
     found = []
     for noise, prior in processes():
         white, logarithm = noise.whiten(both)
-        q, r, _ = linalg.qr(white[:, 1:], mode="economic", pivoting=True)
+        q, r, _ = scipy.linalg.qr(white[:, 1:], mode="economic", pivoting=True)
         diagonal = np.abs(np.diag(r)) if r.size else np.zeros(0)
         rank = int(np.sum(diagonal > 1e-9 * max(diagonal.max(initial=0.0), 1e-300)))
         left = white[:, 0] - q[:, :rank] @ (q[:, :rank].T @ white[:, 0])
@@ -146,7 +146,7 @@ def assess(y: Array, x: Array) -> Assessed:
     found = _likelihoods(y, x)
     best = max(found, key=lambda one: one[1])
     ratio = 2.0 * (max(one[2] for one in found) - found[0][2])
-    return Assessed(best[0], float(special.chdtrc(2.0, max(ratio, 0.0))))
+    return Assessed(best[0], float(scipy.special.chdtrc(2.0, max(ratio, 0.0))))
 
 
 def p_value_in_noise(y: Array, x: Array, added: Array, *, white: bool = False) -> float:
@@ -173,7 +173,7 @@ def p_value_in_noise(y: Array, x: Array, added: Array, *, white: bool = False) -
 def _basis(columns: Array) -> tuple[Array, int]:
     if columns.shape[1] == 0:
         return np.zeros((len(columns), 0)), 0
-    q, r, _ = linalg.qr(columns, mode="economic", pivoting=True)
+    q, r, _ = scipy.linalg.qr(columns, mode="economic", pivoting=True)
     diagonal = np.abs(np.diag(r))
     rank = int(np.sum(diagonal > 1e-9 * max(diagonal.max(initial=0.0), 1e-300)))
     return q[:, :rank], rank
@@ -185,7 +185,7 @@ def _f_test(before: Array, after: Array, more: int, left: int) -> float:
     explained, stays = float(before @ before - after @ after), float(after @ after)
     if stays <= 0.0:
         return 0.0
-    return float(special.fdtrc(more, left, max(explained, 0.0) / more / (stays / left)))
+    return float(scipy.special.fdtrc(more, left, max(explained, 0.0) / more / (stays / left)))
 
 
 def p_value_against_noise(y: Array, x: Array, added: Array) -> float:
@@ -201,7 +201,7 @@ def p_value_against_noise(y: Array, x: Array, added: Array) -> float:
     if more <= rank or left < 1:
         return 1.0
     f = np.expm1(np.minimum(max(two - one, 0.0) * 2.0 / len(y), 700.0)) * left / (more - rank)
-    return float(special.fdtrc(more - rank, left, f))
+    return float(scipy.special.fdtrc(more - rank, left, f))
 
 
 def _largest_likelihood(y: Array, x: Array, white_only: bool) -> tuple[float, int]:

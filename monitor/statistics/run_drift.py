@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -92,7 +92,7 @@ def run_drift(
     error = scale * u / np.sqrt(square)
     with np.errstate(divide="ignore", invalid="ignore"):
         statistic = np.where(error > 0.0, np.abs(slope) / error, np.where(slope == 0.0, 0.0, np.inf))
-    p = np.asarray(2.0 * stats.t.sf(statistic, dof))
+    p = np.asarray(2.0 * scipy.stats.t.sf(statistic, dof))
     return RunDrift(slope, error, dof, p, control_false_discoveries(p).q_value, scale, common)
 
 
@@ -110,4 +110,4 @@ def _alike(variances: Array, dof: int) -> bool:
         return False
     statistic = dof * (k * np.log(variances.mean()) - np.sum(np.log(variances)))
     correction = 1.0 + (k + 1.0) / (3.0 * k * dof)
-    return bool(stats.chi2.sf(statistic / correction, k - 1) >= NOT_COMMON)
+    return bool(scipy.stats.chi2.sf(statistic / correction, k - 1) >= NOT_COMMON)

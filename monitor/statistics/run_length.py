@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 
 import numpy as np
-from scipy import optimize, special, stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -46,7 +46,9 @@ def ewma_run_length(width: float, shift: Array, scatter: Array, lam: float) -> A
     edges = np.linspace(-limit, limit, STATES + 1)
     middle = 0.5 * (edges[1:] + edges[:-1])
     reach = (edges[np.newaxis, :] - (1.0 - lam) * middle[:, np.newaxis]) / lam
-    below = special.ndtr((reach - shift[:, np.newaxis, np.newaxis]) / scatter[:, np.newaxis, np.newaxis])
+    below = scipy.special.ndtr(
+        (reach - shift[:, np.newaxis, np.newaxis]) / scatter[:, np.newaxis, np.newaxis]
+    )
     return _solve(np.diff(below, axis=2), STATES // 2)
 
 
@@ -62,7 +64,7 @@ def cusum_run_length(h: float, shift: Array, scatter: Array, k: float) -> Array:
     rate = np.zeros_like(shift)
     for side in (1.0, -1.0):
         reach = edges[np.newaxis, :] - middle[:, np.newaxis] + k
-        below = special.ndtr(
+        below = scipy.special.ndtr(
             (reach - side * shift[:, np.newaxis, np.newaxis]) / scatter[:, np.newaxis, np.newaxis]
         )
         rate += 1.0 / _solve(np.diff(below, axis=2), 0)
@@ -75,7 +77,7 @@ def reference_nodes(n: float, dof: float) -> tuple[Array, Array, Array]:
         return np.zeros(1), np.ones(1), np.ones(1)
     z, wz = np.polynomial.hermite_e.hermegauss(NODES)
     x, wx = np.polynomial.legendre.leggauss(NODES)
-    ratio = np.sqrt(stats.chi2.ppf(0.5 * (x + 1.0), dof) / dof)
+    ratio = np.sqrt(2.0 * scipy.special.gammaincinv(0.5 * dof, 0.5 * (x + 1.0)) / dof)
     shift = (-(z[:, np.newaxis] / np.sqrt(n)) / ratio).ravel()
     scatter = np.repeat((1.0 / ratio)[np.newaxis, :], NODES, axis=0).ravel()
     weight = np.outer(wz / wz.sum(), wx / wx.sum()).ravel()
@@ -116,4 +118,4 @@ def _limit(
     def excess(limit: float) -> float:
         return float(np.log(run_length(chart, limit, n, dof) / arl))
 
-    return float(optimize.brentq(excess, 0.2, top, xtol=1e-4))
+    return float(scipy.optimize.brentq(excess, 0.2, top, xtol=1e-4))

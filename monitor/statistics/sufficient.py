@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -113,9 +113,9 @@ def cells_from_sums(sums: GroupSums) -> CellTests:
         dof_within=dof2,
         ss_between=ss,
         anova_f=f,
-        anova_p=np.asarray(stats.f.sf(f, np.maximum(dof1, 1.0), np.maximum(dof2, 1.0))),
+        anova_p=np.asarray(scipy.stats.f.sf(f, np.maximum(dof1, 1.0), np.maximum(dof2, 1.0))),
         bartlett=np.asarray(bartlett),
-        bartlett_p=np.asarray(stats.chi2.sf(bartlett, np.where(np.isnan(b), 1.0, b))),
+        bartlett_p=np.asarray(scipy.stats.chi2.sf(bartlett, np.where(np.isnan(b), 1.0, b))),
     )
 
 
@@ -140,4 +140,4 @@ def drift_from_sums(
     slope = _quotient(stm, np.where(enough, stt, np.nan))
     dof = np.where(enough, k - 2.0, 1.0)
     u = np.sqrt(_quotient(np.maximum(smm - slope * stm, 0.0) / dof, np.where(enough, stt, np.nan)))
-    return CellDrift(slope, u, np.asarray(2.0 * stats.t.sf(np.abs(_quotient(slope, u)), dof)))
+    return CellDrift(slope, u, np.asarray(2.0 * scipy.stats.t.sf(np.abs(_quotient(slope, u)), dof)))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -75,7 +75,7 @@ def t_squared_chart(
     _wanted(arl)
     statistic, shares = _quadratic(z, inverse)
     factor = p * (m + 1.0) * (m - 1.0) / (m * (m - p))
-    limit = float(factor * stats.f.isf(1.0 / arl, p, m - p))
+    limit = float(factor * scipy.special.fdtri(p, m - p, 1.0 - 1.0 / arl))
     return VectorChart("T²", m, statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -123,7 +123,7 @@ def warm_up(
     profile = _profile(y, t, weight)
     n, best = len(y), int(profile.rss.argmin())
     variance = float(profile.rss[best]) / (n - 3)
-    allowed = profile.rss[best] + variance * stats.f.isf(1.0 - level, 1, n - 3)
+    allowed = profile.rss[best] + variance * scipy.special.fdtri(1, n - 3, level)
     inside = np.flatnonzero(profile.rss <= allowed)
     low = 0.0 if inside[0] == 0 else float(profile.tau[inside[0]])
     high = np.inf if inside[-1] == len(profile.tau) - 1 else float(profile.tau[inside[-1]])

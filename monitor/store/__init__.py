@@ -7,6 +7,7 @@ its unit. Only this room imports duckdb.
 
 from monitor.store.analyses import (
     StoredAnalysis,
+    check_analysis,
     latest_documents,
     list_analyses,
     load_analysis,
@@ -24,6 +25,7 @@ from monitor.store.catalogue import (
 )
 from monitor.store.certificates import (
     StoredCertificate,
+    certificate_numbers,
     find_certificate,
     list_certificates,
     load_certificate,
@@ -32,7 +34,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.events import list_events, record_event
+from monitor.store.events import list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
@@ -67,6 +69,8 @@ __all__ = [
     "Verification",
     "Withdrawal",
     "campaign_notes",
+    "certificate_numbers",
+    "check_analysis",
     "clear_refusals",
     "curve_names",
     "described_machines",
@@ -98,6 +102,7 @@ __all__ = [
     "load_curve",
     "load_identification",
     "load_model",
+    "machine_events",
     "machine_history",
     "mark_certificate",
     "model_history",

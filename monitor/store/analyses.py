@@ -9,15 +9,16 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, TypedDict, Unpack
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from monitor import __version__
-from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.exceptions import DataError, InputError, NotFoundError, StoreError
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number, check_machine
 from monitor.store.connection import Database, utc_now
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -88,16 +89,18 @@ def save_analysis(
     return number
 
 
-def latest_documents(db: Database, kind: str, machine: str) -> dict[str, Mapping[str, Any]]:
-    """The document of the latest result of a kind of each campaign of a machine that has one, in one query for all."""
-    return {
-        campaign: json.loads(document)
-        for campaign, document in db.rows(
-            "SELECT c.campaign, arg_max(a.document, a.analysis_id) FROM analysis AS a JOIN campaign AS c "
-            "USING (campaign_id) WHERE a.kind = ? AND c.machine = ? GROUP BY ALL ORDER BY ALL",
-            [kind, machine],
-        )
-    }
+def latest_documents(db: Database, kind: str, campaigns: Mapping[int, str]) -> dict[str, Mapping[str, Any]]:
+    """The document of the latest result of a kind of each of the ``campaigns`` (number to name) that has one."""
+    numbers = list(campaigns)
+    if not numbers:
+        return {}
+    marks = ", ".join("?" * len(numbers))
+    found = db.rows(
+        "SELECT campaign_id, arg_max(document, analysis_id) FROM analysis "
+        f"WHERE kind = ? AND campaign_id IN ({marks}) GROUP BY campaign_id",
+        [kind, *numbers],
+    )
+    return dict(sorted((campaigns[number], json.loads(document)) for number, document in found))
 
 
 class Which(TypedDict, total=False):
@@ -189,3 +192,15 @@ def list_analyses(db: Database, kind: str | None = None) -> pd.DataFrame:
 def analysis_content(db: Database, number: int) -> str:
     """The hash of all that is stored of a result."""
     return audit.digest(*db.rows("SELECT * FROM analysis WHERE analysis_id = ?", [number]))
+
+
+def check_analysis(db: Database, number: int) -> None:
+    """Raise StoreError where a stored result is not what the audit says was stored."""
+    told = db.rows(
+        "SELECT content_sha256 FROM audit WHERE subject = 'analysis' AND key = ? ORDER BY entry",
+        [str(number)],
+    )
+    if not told or told[-1][0] != analysis_content(db, number):
+        raise StoreError(
+            f"the stored result {number} was altered after it was stored; `monitor verify` tells what else was"
+        )

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from monitor.exceptions import NotFoundError
 from monitor.records import Machine
 from monitor.store.connection import Database
 from monitor.store.record_json import machine_record
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def list_campaigns(db: Database) -> pd.DataFrame:
@@ -61,12 +64,47 @@ def _withdrawn(db: Database, name: str) -> str:
     return f"it was withdrawn on {found[0][0]:%Y-%m-%d} ({found[0][1]}); " if found else ""
 
 
+def campaigns_of_machine(db: Database, machine: str) -> dict[int, tuple[str, str]]:
+    """Name and method of every campaign of a machine that counts, by its number, in the order of import.
+
+    Raises NotFoundError, listing what is there, for a machine that has neither a campaign that counts nor an event.
+    """
+    found = db.rows(
+        "SELECT campaign_id, campaign, method FROM imported_campaign WHERE machine = ? ORDER BY campaign_id",
+        [machine],
+    )
+    counting = _counting(db, [number for number, _, _ in found])
+    if not counting and not _has_event(db, machine):
+        raise _no_machine(db, machine)
+    return {number: (name, method) for number, name, method in found if number in counting}
+
+
 def check_machine(db: Database, machine: str) -> None:
     """Raise NotFoundError, listing what is there, for a machine that is not."""
-    # Not through the view `machine`, which looks at every campaign of the fleet.
-    known = "SELECT 1 FROM campaign WHERE machine = $machine UNION ALL SELECT 1 FROM event WHERE machine = $machine"
-    if not db.rows(f"{known} LIMIT 1", {"machine": machine}):
-        raise NotFoundError(f"there is no machine {machine!r}; {_what_is_there(db, 'machine')}")
+    # The campaigns first: nearly every machine has one, and an index finds them.
+    found = db.rows("SELECT campaign_id FROM imported_campaign WHERE machine = ?", [machine])
+    if not _counting(db, [number for (number,) in found]) and not _has_event(db, machine):
+        raise _no_machine(db, machine)
+
+
+def _counting(db: Database, numbers: list[int]) -> set[int]:
+    """Which of these campaigns the view ``campaign`` has: what it leaves out is left out here.
+
+    Through the view DuckDB looks at every campaign of the fleet for those of one machine (30 ms of 2.6 million): it
+    takes the index only where a table is asked by itself, and the campaigns of one machine are few.
+    """
+    if not numbers:
+        return set()
+    withdrawn = {number for (number,) in db.rows("SELECT campaign_id FROM withdrawn_campaign")}
+    return set(numbers) - withdrawn
+
+
+def _has_event(db: Database, machine: str) -> bool:
+    return bool(db.rows("SELECT 1 FROM event WHERE machine = ? LIMIT 1", [machine]))
+
+
+def _no_machine(db: Database, machine: str) -> NotFoundError:
+    return NotFoundError(f"there is no machine {machine!r}; {_what_is_there(db, 'machine')}")
 
 
 def _what_is_there(db: Database, table: str) -> str:

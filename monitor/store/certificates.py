@@ -11,15 +11,16 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Literal
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, Literal
 
 from monitor import __version__
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 State = Literal["draft", "issued", "amended", "withdrawn"]
 
@@ -149,6 +150,11 @@ def load_certificate(db: Database, number: str) -> StoredCertificate:
 def list_certificates(db: Database) -> pd.DataFrame:
     """All certificates in their present state: the view ``v_certificates``."""
     return db.frame("SELECT * FROM v_certificates ORDER BY number")
+
+
+def certificate_numbers(db: Database) -> list[str]:
+    """The numbers of all certificates, in order."""
+    return [str(number) for (number,) in db.rows("SELECT number FROM v_certificates ORDER BY number")]
 
 
 def find_certificate(db: Database, pdf_sha256: str) -> str | None:

@@ -10,19 +10,23 @@ is therefore computed with ``threads=1`` (or in numpy, in a fixed order).
 from __future__ import annotations
 
 import re
+import sys
 import threading
+import types
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import duckdb
-import pandas as pd
 
 from monitor.exceptions import StoreError
 from monitor.store import migrations
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Parameters = Sequence[Any] | Mapping[str, Any]
 
@@ -72,12 +76,12 @@ class Database:
 
     def execute(self, sql: str, parameters: Parameters = ()) -> None:
         """Run a statement. Values are always bound, never written into the text."""
-        with self._lock, _stopped_by_ctrl_c():
+        with self._lock, _stopped_by_ctrl_c(), _bound_without_pandas():
             self._connection.execute(sql, parameters)
 
     def rows(self, sql: str, parameters: Parameters = ()) -> list[tuple[Any, ...]]:
         """The rows of a query as tuples."""
-        with self._lock, _stopped_by_ctrl_c():
+        with self._lock, _stopped_by_ctrl_c(), _bound_without_pandas():
             return self._connection.execute(sql, parameters).fetchall()
 
     def frame(self, sql: str, parameters: Parameters = ()) -> pd.DataFrame:
@@ -87,18 +91,29 @@ class Database:
 
     def arrays(self, sql: str, parameters: Parameters = ()) -> dict[str, Any]:
         """The columns of a query as numpy arrays, masked where NULL."""
-        with self._lock, _stopped_by_ctrl_c():
+        with self._lock, _stopped_by_ctrl_c(), _bound_without_pandas():
             columns: dict[str, Any] = self._connection.execute(sql, parameters).fetchnumpy()
             return columns
 
-    def insert(self, sql: str, incoming: pd.DataFrame, parameters: Parameters = ()) -> None:
-        """Run an INSERT that selects from ``incoming``: 50 times as quick as row by row."""
+    def insert(
+        self, sql: str, incoming: Mapping[str, Any] | pd.DataFrame, parameters: Parameters = ()
+    ) -> None:
+        """Run an INSERT that selects from ``incoming``, columns by name: 50 times as quick as row by row."""
         with self._lock, _stopped_by_ctrl_c():
-            self._connection.register("incoming", incoming)
+            # Takes a fifth of a second to load: what only reads does not wait for it.
+            import pandas as pd
+
+            self._connection.register("incoming", pd.DataFrame(incoming))
             try:
                 self._connection.execute(sql, parameters)
             finally:
                 self._connection.unregister("incoming")
+
+    @contextmanager
+    def connected(self) -> Iterator[duckdb.DuckDBPyConnection]:
+        """DuckDB's own connection, for this block; no other thread uses the database meanwhile."""
+        with self._lock, _stopped_by_ctrl_c():
+            yield self._connection
 
     def next_number(self, table: str, column: str) -> int:
         """One more than the largest number in use; call it inside the transaction that uses it."""
@@ -180,6 +195,23 @@ def _stopped_by_ctrl_c() -> Iterator[None]:
         if str(fault) == "Query interrupted":
             raise KeyboardInterrupt from fault
         raise
+
+
+@contextmanager
+def _bound_without_pandas() -> Iterator[None]:
+    """DuckDB 1.5 asks pandas whether a bound value is one of its missing values, and loads it to ask.
+
+    Where it is not loaded there are no such values, and it can be done without. Only for the main thread: what another
+    one imports meanwhile would miss it.
+    """
+    if "pandas" in sys.modules or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    sys.modules["pandas"] = cast(types.ModuleType, None)
+    try:
+        yield
+    finally:
+        del sys.modules["pandas"]
 
 
 def _connect(path: str, read_only: bool, threads: int | None) -> duckdb.DuckDBPyConnection:

@@ -6,7 +6,6 @@ import json
 from dataclasses import asdict
 
 import numpy as np
-import pandas as pd
 
 from monitor import __version__
 from monitor.exceptions import DataError
@@ -59,7 +58,7 @@ def insert_curve(db: Database, campaign_id: int, curve: CurveCampaign, content: 
         "INSERT INTO curve_row SELECT $campaign_id, position, line, "
         f"map($names::VARCHAR[], [{numbers}]::DOUBLE[]), map($groups::VARCHAR[], [{labels}]::VARCHAR[]) "
         "FROM incoming ORDER BY position",
-        pd.DataFrame(columns),
+        columns,
         {"campaign_id": campaign_id, "names": list(curve.columns), "groups": list(curve.groups)},
     )
 

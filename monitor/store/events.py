@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from monitor.exceptions import InputError
 from monitor.store import audit
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database, utc_now
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def record_event(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> int:
@@ -49,6 +51,15 @@ def list_events(db: Database, machine: str | None = None) -> pd.DataFrame:
         "SELECT * FROM v_events WHERE $machine IS NULL OR machine = $machine ORDER BY machine, happened_at",
         {"machine": machine},
     )
+
+
+def machine_events(db: Database, machine: str) -> list[tuple[datetime, str, str]]:
+    """Time (UTC), kind and description of the events of a machine, in the order of time."""
+    rows = db.rows(
+        "SELECT happened_at, kind, description FROM v_events WHERE machine = ? ORDER BY happened_at",
+        [machine],
+    )
+    return [(at.replace(tzinfo=UTC), kind, text) for at, kind, text in rows]
 
 
 def event_content(db: Database, number: int) -> str:

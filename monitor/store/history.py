@@ -16,14 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
-from monitor.store.catalogue import check_machine
+from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
 from monitor.store.identified_values import IdentifiedValues, values_of
 
-# An index gives the campaigns of a machine. Their numbers are read once and are constants of what follows, for which
-# there are indices too: a joined table of numbers would be held against every row of the fleet.
-_CAMPAIGNS = "SELECT campaign_id, campaign, method FROM campaign WHERE machine = ? ORDER BY campaign_id"
-
+# The numbers of a machine's campaigns are read once and are constants of what follows, for which there are indices: a
+# joined table of numbers would be held against every row of the fleet.
 _IDENTIFICATIONS = """
 SELECT campaign_id, run_count, identification_id, parameters, units, display_factors
 FROM identification
@@ -46,7 +44,7 @@ _TOLERANCES = """
 SELECT machine, parameter, CAST(machine_description -> 'tolerances' ->> parameter AS DOUBLE) AS tolerance
 FROM (
     SELECT machine, machine_description, unnest(json_keys(machine_description, '$.tolerances')) AS parameter
-    FROM campaign WHERE campaign_id IN ({latest})
+    FROM imported_campaign WHERE campaign_id IN ({latest})
 )
 ORDER BY ALL
 """
@@ -78,10 +76,11 @@ class MachineHistory:
     are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
     the recorded channels, in the unit that the name ends in, NaN where not recorded. ``tolerances`` are those of the
     machine's latest campaign. ``unidentified`` names the campaigns, in order of import, of which no identification
-    under the model holds every run.
+    under the model holds every run; ``campaigns`` are the number and name of all that count, in the same order.
     """
 
     machine: str
+    campaigns: Mapping[int, str]
     campaign: npt.NDArray[np.str_]
     method: npt.NDArray[np.str_]
     run: npt.NDArray[np.int64]
@@ -115,9 +114,8 @@ def machine_history(
 
     May hold no run. Raises NotFoundError for a machine that is not there.
     """
-    check_machine(db, machine)
     start = None if since is None else since.astimezone(UTC).replace(tzinfo=None)
-    campaigns = {number: (name, method) for number, name, method in db.rows(_CAMPAIGNS, [machine])}
+    campaigns = campaigns_of_machine(db, machine)
     chosen = _chosen(db, list(campaigns), model, version)
     every = _of(db, _RUNS, list(campaigns))
     counts = Counter(row[0] for row in every)
@@ -128,6 +126,7 @@ def machine_history(
     latest = max(every, key=lambda row: (row[2], row[0]))[0] if every else max(campaigns, default=0)
     return MachineHistory(
         machine=machine,
+        campaigns={number: name for number, (name, _) in campaigns.items()},
         campaign=np.array([campaigns[row[1]][0] for row in rows], dtype=np.str_),
         method=np.array([campaigns[row[1]][1] for row in rows], dtype=np.str_),
         run=run,

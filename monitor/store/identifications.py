@@ -6,9 +6,9 @@ Nothing is replaced: a later identification stands beside an earlier one, and th
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from monitor import __version__
 from monitor.exceptions import NotFoundError
@@ -22,6 +22,9 @@ from monitor.store.results import (
     identification_content,
 )
 from monitor.units import Unit
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def save_identification(db: Database, identification: StoredIdentification) -> int:
@@ -147,9 +150,10 @@ def stored_identification_content(db: Database, number: int) -> str:
         "WHERE identification_id = ? ORDER BY rowid",
         [number],
     )
+    columns = [np.asarray(column).tolist() for column in _values(identification).values()]
     expected = [
         tuple(None if isinstance(cell, float) and np.isnan(cell) else cell for cell in row)
-        for row in _values(identification).itertuples(index=False, name=None)
+        for row in zip(*columns, strict=True)
     ]
     alike = rows == expected and identified_values.agrees(db, number, identification)
     return identification_content(number, identification) if alike else ""
@@ -178,33 +182,29 @@ def _insert_values(db: Database, number: int, identification: StoredIdentificati
     db.insert("INSERT INTO parameter_value SELECT ?, * FROM incoming", incoming, [number])
 
 
-def _values(identification: StoredIdentification) -> pd.DataFrame:
-    """The rows of ``parameter_value``."""
+def _values(identification: StoredIdentification) -> dict[str, Any]:
+    """The columns of ``parameter_value``."""
     count = len(identification.parameters)
     repeats = len(identification.runs)
-    return pd.DataFrame(
-        {
-            "run": np.repeat([run.run for run in identification.runs], count),
-            "parameter": np.tile(np.array(identification.parameters, dtype=object), repeats),
-            "value": np.concatenate([run.estimate for run in identification.runs]),
-            "u": np.concatenate([np.sqrt(np.diag(run.covariance)) for run in identification.runs]),
-            "unit": np.tile(np.array([unit.name for unit in identification.units], dtype=object), repeats),
-            "factor": np.tile([unit.factor for unit in identification.units], repeats),
-        }
-    )
+    return {
+        "run": np.repeat([run.run for run in identification.runs], count),
+        "parameter": np.tile(np.array(identification.parameters, dtype=object), repeats),
+        "value": np.concatenate([run.estimate for run in identification.runs]),
+        "u": np.concatenate([np.sqrt(np.diag(run.covariance)) for run in identification.runs]),
+        "unit": np.tile(np.array([unit.name for unit in identification.units], dtype=object), repeats),
+        "factor": np.tile([unit.factor for unit in identification.units], repeats),
+    }
 
 
 def _insert_residuals(db: Database, number: int, runs: tuple[StoredRun, ...]) -> None:
     vectors = np.concatenate([run.residuals for run in runs])
-    incoming = pd.DataFrame(
-        {
-            "run": np.repeat([run.run for run in runs], [len(run.sequence) for run in runs]),
-            "sequence": np.concatenate([run.sequence for run in runs]),
-            "dx": vectors[:, 0],
-            "dy": vectors[:, 1],
-            "dz": vectors[:, 2],
-        }
-    )
+    incoming = {
+        "run": np.repeat([run.run for run in runs], [len(run.sequence) for run in runs]),
+        "sequence": np.concatenate([run.sequence for run in runs]),
+        "dx": vectors[:, 0],
+        "dy": vectors[:, 1],
+        "dz": vectors[:, 2],
+    }
     db.insert("INSERT INTO residual SELECT ?, * FROM incoming", incoming, [number])
 
 

@@ -14,22 +14,8 @@ import numpy.typing as npt
 
 from monitor.records import Array
 from monitor.store.connection import Database
+from monitor.store.gathering import BY_PARAMETER, PORTION, gather
 from monitor.store.results import StoredIdentification
-
-# Of rows that were written by SQL into ``parameter_value`` alone.
-_GATHER = """
-INSERT INTO identified_values
-SELECT identification_id, first(runs), list(value ORDER BY place), list(u ORDER BY place)
-FROM (
-    SELECT identification_id, list_position(any_value(parameters), parameter) AS place,
-           list(run ORDER BY run) AS runs, list(value ORDER BY run) AS value, list(u ORDER BY run) AS u
-    FROM parameter_value JOIN identification USING (identification_id)
-    WHERE identification_id >= ? AND identification_id < ?
-    GROUP BY identification_id, parameter
-)
-GROUP BY identification_id
-ORDER BY identification_id
-"""
 
 
 @dataclass(frozen=True)
@@ -53,19 +39,24 @@ def insert_values(db: Database, number: int, identification: StoredIdentificatio
 
 def values_of(db: Database, numbers: Sequence[int]) -> Mapping[int, IdentifiedValues]:
     """The values of identifications by their number; one that has none is left out."""
+    if not numbers:
+        return {}
     marks = ", ".join("?" * len(numbers))
-    found = {}
-    for number, runs, value, u in db.rows(
-        f"SELECT identification_id, runs, value, u FROM identified_values WHERE identification_id IN ({marks})",
+    # As arrays of one list each: lists of lists of Python's numbers cost twice the rest.
+    columns = db.arrays(
+        "SELECT identification_id, runs, flatten(value) AS value, flatten(u) AS u FROM identified_values "
+        f"WHERE identification_id IN ({marks})",
         list(numbers),
-    ):
-        # DuckDB gives None where a list holds NULL; numpy makes NaN of it.
-        shape = (len(value), len(runs))
-        found[number] = IdentifiedValues(
-            number,
-            np.array(runs, dtype=np.int64),
-            np.array(value, dtype=np.float64).reshape(shape).T,
-            np.array(u, dtype=np.float64).reshape(shape).T,
+    )
+    found = {}
+    for number, runs, value, u in zip(*columns.values(), strict=True):
+        shape = (-1, len(runs))
+        found[int(number)] = IdentifiedValues(
+            int(number),
+            np.asarray(runs, dtype=np.int64),
+            # NULL, of what was refused, is masked.
+            np.ma.filled(value, np.nan).reshape(shape).T,
+            np.ma.filled(u, np.nan).reshape(shape).T,
         )
     return found
 
@@ -85,17 +76,10 @@ def agrees(db: Database, number: int, identification: StoredIdentification) -> b
     )
 
 
-def gather_values(db: Database, portion: int = 50_000) -> None:
-    """Write the rows that are missing after ``parameter_value`` was filled by SQL, as large test data are.
-
-    ``portion`` identifications at a time, so that memory does not grow with their number.
-    """
-    ((first,), (end,)) = (
-        db.rows("SELECT coalesce(max(identification_id), 0) + 1 FROM identified_values")[0],
-        db.rows("SELECT coalesce(max(identification_id), 0) + 1 FROM identification")[0],
-    )
-    for start in range(first, end, portion):
-        db.execute(_GATHER, [start, min(start + portion, end)])
+def gather_values(db: Database, portion: int = PORTION) -> None:
+    """Write the rows that are missing after ``parameter_value`` was filled by SQL, as large test data are."""
+    with db.connected() as connection:
+        gather(connection, BY_PARAMETER, portion)
 
 
 def _matrices(identification: StoredIdentification) -> tuple[Array, Array]:

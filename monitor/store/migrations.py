@@ -3,6 +3,8 @@
 Each applied file leaves its number, name and checksum in ``schema_migration``, in the same transaction. A
 database is refused, in words, when it was made by newer software, when a file that made it was edited or is
 missing, or when it is not one of ours.
+
+One statement is not run as its file has it: see ``gathering``.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import duckdb
 
 from monitor import __version__
 from monitor.exceptions import StoreError
+from monitor.store import gathering
 from monitor.store.resources import migration_folder
 
 _FILE_NAME = re.compile(r"(\d{4})_[a-z0-9_]+\.sql")
@@ -131,7 +134,10 @@ def _apply(connection: duckdb.DuckDBPyConnection, migration: Migration) -> None:
         if migration.number == 1:
             connection.execute(_LEDGER)
         for statement in statements:
-            connection.execute(statement)
+            if statement.query.lstrip().startswith(gathering.REPLACED):
+                gathering.gather(connection, gathering.RUN_BY_RUN)
+            else:
+                connection.execute(statement)
         connection.execute(
             "INSERT INTO schema_migration VALUES (?, ?, ?, ?, ?)",
             [

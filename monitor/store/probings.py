@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from monitor.exceptions import DataError
 from monitor.records import Array, Machine, Probings
@@ -113,7 +112,7 @@ def insert(db: Database, campaign_id: int, rows: PrintedProbings) -> None:
         "INSERT INTO probing SELECT $campaign_id, position, run, sequence, time_s, target, "
         f"map($axes::VARCHAR[], [{readings}]::DOUBLE[]), map($names::VARCHAR[], [{channels}]::DOUBLE[]) "
         "FROM incoming ORDER BY position",
-        pd.DataFrame(columns),
+        columns,
         {"campaign_id": campaign_id, "axes": list(rows.readings), "names": list(rows.channels)},
     )
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special, stats
-from scipy.stats import qmc
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -72,7 +71,7 @@ def conformity(
         raise DataError(f"degrees of freedom must be positive, but are {dof}")
     u = np.sqrt(variance)
     a, b = (low - y) / u, (high - y) / u
-    law = stats.norm() if math.isinf(dof) else stats.t(dof)
+    law = scipy.stats.norm() if math.isinf(dof) else scipy.stats.t(dof)
     single = np.asarray(law.cdf(b) - law.cdf(a))
     bounded = np.isfinite(a) | np.isfinite(b)
     if not bounded.any():
@@ -89,7 +88,7 @@ def conformity(
 def _box(correlation: Array, a: Array, b: Array, dof: float, rng: np.random.Generator) -> list[float]:
     """The probability of the box between ``a`` and ``b`` (m,), found once by every scramble."""
     # The narrowest limits first: the later factors then vary least.
-    order = np.argsort(special.ndtr(b) - special.ndtr(a), kind="stable")
+    order = np.argsort(scipy.special.ndtr(b) - scipy.special.ndtr(a), kind="stable")
     matrix = correlation[np.ix_(order, order)] + _JITTER * np.eye(len(order))
     root = np.linalg.cholesky(matrix)
     low, high = a[order], b[order]
@@ -97,17 +96,19 @@ def _box(correlation: Array, a: Array, b: Array, dof: float, rng: np.random.Gene
     finite = math.isfinite(dof)
     found = []
     for _ in range(_SCRAMBLES):
-        points = qmc.Sobol(count - 1 + finite, scramble=True, rng=rng).random(_POINTS)
+        points = scipy.stats.qmc.Sobol(count - 1 + finite, scramble=True, rng=rng).random(_POINTS)
         points = np.clip(points, 1e-15, 1.0 - 1e-15)
-        scale = np.sqrt(stats.chi2.ppf(points[:, -1], dof) / dof) if finite else np.ones(_POINTS)
+        scale = np.sqrt(scipy.stats.chi2.ppf(points[:, -1], dof) / dof) if finite else np.ones(_POINTS)
         drawn = np.zeros((_POINTS, count))
         inside = np.ones(_POINTS)
         for place in range(count):
             before = drawn[:, :place] @ root[place, :place]
-            d = special.ndtr((low[place] * scale - before) / root[place, place])
-            e = special.ndtr((high[place] * scale - before) / root[place, place])
+            d = scipy.special.ndtr((low[place] * scale - before) / root[place, place])
+            e = scipy.special.ndtr((high[place] * scale - before) / root[place, place])
             inside *= e - d
             if place < count - 1:
-                drawn[:, place] = special.ndtri(np.clip(d + points[:, place] * (e - d), 1e-300, 1.0 - 1e-16))
+                drawn[:, place] = scipy.special.ndtri(
+                    np.clip(d + points[:, place] * (e - d), 1e-300, 1.0 - 1e-16)
+                )
         found.append(float(inside.mean()))
     return found

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -53,12 +53,13 @@ def ellipsoid_factor(outputs: int, p: float = 0.95, dof: float = math.inf) -> fl
     covariance bounds nothing and the answer is infinity. Raises DataError for p outside (0, 1).
     """
     _check(outputs, p, dof)
+    # The functions that scipy.stats takes its quantiles from: it needs half a second to load.
     if math.isinf(dof):
-        return math.sqrt(float(stats.chi2.ppf(p, outputs)))
+        return math.sqrt(float(2.0 * scipy.special.gammaincinv(0.5 * outputs, p)))
     rest = dof - outputs + 1.0
     if rest <= 0.0:
         return math.inf
-    return math.sqrt(dof * outputs / rest * float(stats.f.ppf(p, outputs, rest)))
+    return math.sqrt(dof * outputs / rest * float(scipy.special.fdtri(outputs, rest, p)))
 
 
 def rectangle_factor(
@@ -79,8 +80,8 @@ def rectangle_factor(
     else:
         raise DataError(f"no form '{form}' of k_q; there are bonferroni and independent")
     if math.isinf(dof):
-        return float(stats.norm.isf(0.5 * tail))
-    return float(stats.t.isf(0.5 * tail, dof))
+        return -float(scipy.special.ndtri(0.5 * tail))
+    return -float(scipy.special.stdtrit(dof, 0.5 * tail))
 
 
 def correlated_rectangle_factor(
@@ -99,7 +100,9 @@ def correlated_rectangle_factor(
     reaches, rank = _reaches(correlation, rng)
     upper = 2.0 * rectangle_factor(outputs, p, dof)
     found = [
-        float(optimize.brentq(lambda k, r=part: float(np.mean(_radial(k / r, rank, dof))) - p, 0.0, upper))
+        float(
+            scipy.optimize.brentq(lambda k, r=part: float(np.mean(_radial(k / r, rank, dof))) - p, 0.0, upper)
+        )
         for part in reaches
     ]
     return Sampled(float(np.mean(found)), float(np.std(found, ddof=1) / math.sqrt(len(found))))
@@ -213,8 +216,8 @@ def _reaches(correlation: Array, rng: np.random.Generator | None) -> tuple[list[
     generator = np.random.default_rng(_SEED) if rng is None else rng
     reaches = []
     for _ in range(_SCRAMBLES):
-        points = stats.qmc.Sobol(root.rank, scramble=True, rng=generator).random(_DIRECTIONS)
-        normal = stats.norm.ppf(np.clip(points, 1e-15, 1.0 - 1e-15))
+        points = scipy.stats.qmc.Sobol(root.rank, scramble=True, rng=generator).random(_DIRECTIONS)
+        normal = scipy.stats.norm.ppf(np.clip(points, 1e-15, 1.0 - 1e-15))
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         reaches.append(np.max(np.abs(normal @ root.root.T), axis=1))
     return reaches, root.rank
@@ -223,5 +226,5 @@ def _reaches(correlation: Array, rng: np.random.Generator | None) -> tuple[list[
 def _radial(radius: Array, rank: int, dof: float) -> Array:
     """P(R <= radius) for the length R of a standard normal (or t) vector in ``rank`` dimensions."""
     if math.isinf(dof):
-        return np.asarray(stats.chi2.cdf(radius**2, rank))
-    return np.asarray(stats.f.cdf(radius**2 / rank, rank, dof))
+        return np.asarray(scipy.stats.chi2.cdf(radius**2, rank))
+    return np.asarray(scipy.stats.f.cdf(radius**2 / rank, rank, dof))

@@ -6,7 +6,7 @@ campaign before a recorded event with the first after it, of the same method.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -29,52 +29,64 @@ class Moment:
     description: str
 
 
-Evaluated = Mapping[str, Mapping[str, float]]
+@dataclass(frozen=True)
+class _Pair:
+    """Two campaigns to be compared, with what is said of them; ``before`` and ``after`` (n,) choose their runs."""
+
+    first: str
+    second: str
+    head: Document
+    before: npt.NDArray[np.bool_] | None = None
+    after: npt.NDArray[np.bool_] | None = None
 
 
-def evaluated(db: Database, machine: str) -> Evaluated:
-    """Standard uncertainties, in display units, of the latest `monitor uncertainty` of a machine's campaigns that have
-    one."""
-    found = latest_documents(db, "uncertainty", machine)
-    return {campaign: document["guf"]["u"] for campaign, document in found.items()}
-
-
-def agreement(
-    history: MachineHistory, events: Sequence[Moment], stated: Evaluated | None = None
-) -> list[Document]:
+def agreement(db: Database, history: MachineHistory, events: Sequence[Moment]) -> list[Document]:
     """The pairs of results of a machine, each with E_n of every parameter that both have.
 
     The uncertainty of a result is that of its identification or, where it is larger, the one that was evaluated for
-    its campaign (``stated``), and the scatter of its runs.
+    its campaign (the latest `monitor uncertainty`), and the scatter of its runs.
     """
-    history = _with(history, stated or {})
-    found = []
+    every = list(_pairs(history, events))
+    # Of years of campaigns few are compared: only their results are read.
+    compared = {name for one in every for name in (one.first, one.second)}
+    history = _with(history, _evaluated(db, history, compared))
+    found = [_pair(history, one) for one in every]
+    return [one for one in found if one["parameters"]]
+
+
+def _pairs(history: MachineHistory, events: Sequence[Moment]) -> Iterator[_Pair]:
     latest: dict[str, str] = {}
     for campaign, method in zip(history.campaign.tolist(), history.method.tolist(), strict=True):
         latest[method] = campaign  # runs are in the order of time
     for first, second in combinations(latest, 2):
-        found.append(
-            _pair(history, latest[first], latest[second], {"kind": "methods", "methods": [first, second]})
-        )
+        yield _Pair(latest[first], latest[second], {"kind": "methods", "methods": [first, second]})
     seconds = history.seconds
     for event in events:
         for method in latest:
             own = history.method == method
             before, after = own & (seconds < event.at), own & (seconds >= event.at)
             if before.any() and after.any():
-                # A campaign that the event cuts in two is compared with itself: its runs before, its runs after.
-                pair = history.campaign[before][-1], history.campaign[after][0]
                 head = {
                     "kind": "event",
                     "event": event.kind,
                     "description": event.description,
                     "method": method,
                 }
-                found.append(_pair(history, *pair, head, before, after))
-    return [one for one in found if one["parameters"]]
+                # A campaign that the event cuts in two is compared with itself: its runs before, its runs after.
+                first, second = history.campaign[before][-1], history.campaign[after][0]
+                yield _Pair(first, second, head, before, after)
 
 
-def _with(history: MachineHistory, stated: Evaluated) -> MachineHistory:
+def _evaluated(
+    db: Database, history: MachineHistory, campaigns: Collection[str]
+) -> Mapping[str, Mapping[str, float]]:
+    """Standard uncertainties, in display units, of the latest `monitor uncertainty` of the campaigns that have one."""
+    wanted = {number: name for number, name in history.campaigns.items() if name in campaigns}
+    found = latest_documents(db, "uncertainty", wanted)
+    return {campaign: document["guf"]["u"] for campaign, document in found.items()}
+
+
+def _with(history: MachineHistory, stated: Mapping[str, Mapping[str, float]]) -> MachineHistory:
     u = history.u.copy()
     for campaign, of in stated.items():
         rows = history.campaign == campaign
@@ -83,18 +95,11 @@ def _with(history: MachineHistory, stated: Evaluated) -> MachineHistory:
     return replace(history, u=u)
 
 
-def _pair(
-    history: MachineHistory,
-    first: str,
-    second: str,
-    head: Document,
-    before: npt.NDArray[np.bool_] | None = None,
-    after: npt.NDArray[np.bool_] | None = None,
-) -> Document:
+def _pair(history: MachineHistory, pair: _Pair) -> Document:
     parameters: Document = {}
     for place, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
         results = []
-        for campaign, side in ((first, before), (second, after)):
+        for campaign, side in ((pair.first, pair.before), (pair.second, pair.after)):
             rows = (history.campaign == campaign) & np.isfinite(history.values[:, place])
             rows &= np.isfinite(history.u[:, place])
             if side is not None:
@@ -111,8 +116,8 @@ def _pair(
             "e_n": float(one.e_n[0]), "agree": bool(one.agree[0]),
         }  # fmt: skip
     return {
-        **head,
-        "campaigns": [first, second],
+        **pair.head,
+        "campaigns": [pair.first, pair.second],
         "parameters": parameters,
         "disagree": [name for name, one in parameters.items() if not one["agree"]],
     }

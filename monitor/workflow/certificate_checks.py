@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Sequence
+from datetime import UTC
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +135,7 @@ def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
     """Whether a file is a certificate of this database, unaltered, and whether the database is as written.
 
     The signature is null where the file has none. ``trusted`` names the certificates (PEM or DER) that the
-    signer's has to lead to.
+    signer's has to lead to, on the day on which the file was stored where it is known here, else today.
     """
     try:
         content = file.read_bytes()
@@ -142,8 +143,12 @@ def verify(db: Database, file: Path, trusted: Path | None = None) -> Document:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
     number = find_certificate(db, hashlib.sha256(content).hexdigest())
     chain = verify_audit(db)
-    signature = check_signature(content, trusted) if is_signed(content) else SignatureFinding(None, None, ())
     found = None if number is None else load_certificate(db, number)
+    # The chain of entries, not the signer, says when this very file was there.
+    at = found.made_at.replace(tzinfo=UTC) if found is not None and chain.ok else None
+    signature = (
+        check_signature(content, trusted, at) if is_signed(content) else SignatureFinding(None, None, ())
+    )
     state = None if found is None else found.state
     checks = {
         "hash": number is not None,

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from monitor.discovery import fit
+from monitor.methods import method_named
 from monitor.records import Array
 from monitor.reporting.volumetric_result import Length, Place, VolumetricResult
 from monitor.units import DEGREE, MICROMETRE
-from monitor.workflow.uncertainty import Evaluated
+from monitor.workflow.evaluations import Evaluation
+from monitor.workflow.models import as_model
 from monitor.workflow.volumetric import Mapped, at_zero, map_of
 
 
-def volumetric_result(found: Evaluated, state: str) -> VolumetricResult:
+def volumetric_result(found: Evaluation, state: str) -> VolumetricResult:
     """The map of an evaluated run in display units. Raises InputError where not three linear axes moved."""
-    mapped = map_of(found)
+    problem = method_named(found.campaign.method).problem_of(found.campaign, as_model(found.model))
+    mapped = map_of(found, fit(problem))
     drawn = at_zero(mapped)
-    error, p = mapped.error, found.framework.p
+    error, p = mapped.error, found.p
     k = error.factor(p)
     worst = error.worst
     return VolumetricResult(

@@ -10,7 +10,7 @@ from monitor.exceptions import InputError, NotFoundError
 from monitor.records import Campaign, Run
 from monitor.reporting.certificate import NotApplicable, Replaced
 from monitor.reporting.laboratory import LaboratoryFile
-from monitor.store import Database, list_certificates, load_certificate
+from monitor.store import Database, certificate_numbers, load_certificate
 
 #: The texts of the two states of a machine that a certificate may describe (ISO/IEC 17025:2017, 7.8.4.1 d).
 AS_FOUND, AS_LEFT = "record.as_found", "record.as_left"
@@ -28,7 +28,7 @@ class Measured:
 
 def next_number(db: Database, year: int) -> str:
     """The next free number of a year: ``2026-0001``."""
-    taken = [str(number) for number in list_certificates(db)["number"]]
+    taken = certificate_numbers(db)
     last = max((int(n[5:]) for n in taken if n.startswith(f"{year}-") and n[5:].isdigit()), default=0)
     return f"{year}-{last + 1:04d}"
 

@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from monitor.discovery import compare
-from monitor.discovery.compare import SOMETHING_IS_MISSING
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.records import Array
 from monitor.reporting.numbers import decimal_of, round_to_place, written_factor
 from monitor.reporting.results import RefusedParameters, ResidualSummary, ResultSet, result_set
 from monitor.reporting.texts import Texts
-from monitor.store import Database, stored_analyses
-from monitor.units import MICROMETRE
-from monitor.workflow.uncertainty import LACK_OF_FIT, Evaluated
+from monitor.store import Database, check_analysis, stored_analyses
+from monitor.units import MICROMETRE, Unit
+from monitor.workflow.evaluations import LACK_OF_FIT, Evaluation
 
 METHODS = ("guf", "mcm")
 #: What two evaluations of the same readings may differ by, relative to u: the last digits of double precision.
@@ -28,7 +26,7 @@ _SAME = 1e-6
 class StoredMonteCarlo:
     """The latest stored Monte Carlo result of a run and what it says of the framework; ``number`` in v_analyses.
 
-    ``estimate`` (m,) and ``covariance`` (m, m) are in internal units.
+    ``estimate`` (m,) and ``covariance`` (m, m) are in display units.
     """
 
     number: int
@@ -42,41 +40,37 @@ class StoredMonteCarlo:
     differing: tuple[str, ...]
 
 
-def stored_monte_carlo(db: Database, found: Evaluated) -> StoredMonteCarlo | None:
+def stored_monte_carlo(db: Database, found: Evaluation) -> StoredMonteCarlo | None:
     """The latest stored Monte Carlo result that belongs to what is certified, None where there is none.
 
     It belongs where its framework result is the same: not one from a selection of runs, without the budget's line for
-    lack of fit, or for another probability.
+    lack of fit, or for another probability. Raises StoreError where it was altered since it was stored.
     """
     for one in stored_analyses(
         db, "uncertainty", campaign=found.campaign.name, run=found.run, model=found.model.name,
         model_version=found.model.version,
     ):  # fmt: skip
         if "mcm" in one.document and _belongs(one.document, found):
-            return _stored(one.number, one.document, found)
+            check_analysis(db, one.number)
+            return _stored(one.number, one.document)
     return None
 
 
-def _belongs(document: Mapping[str, Any], found: Evaluated) -> bool:
-    guf = found.framework
-    if tuple(document["parameters"]) != guf.names or document["p"] != guf.p:
+def _belongs(document: Mapping[str, Any], found: Evaluation) -> bool:
+    if tuple(document["parameters"]) != found.names or document["p"] != found.p:
         return False
-    u = np.array(
-        [unit.to_display(float(value)) for unit, value in zip(found.units, guf.u, strict=True)], dtype=float
+    guf = document["guf"]
+    u = np.array([guf["u"][name] for name in found.names])
+    estimate = np.array([guf["estimate"][name] for name in found.names])
+    return bool(
+        np.all(abs(u - found.u) <= _SAME * found.u)
+        and np.all(abs(estimate - found.estimate) <= _SAME * found.u)
     )
-    y = np.array(
-        [unit.to_display(float(value)) for unit, value in zip(found.units, guf.estimate, strict=True)]
-    )
-    own_u = np.array([document["guf"]["u"][name] for name in guf.names])
-    own_y = np.array([document["guf"]["estimate"][name] for name in guf.names])
-    return bool(np.all(abs(own_u - u) <= _SAME * u) and np.all(abs(own_y - y) <= _SAME * u))
 
 
-def _stored(number: int, document: Mapping[str, Any], found: Evaluated) -> StoredMonteCarlo:
-    mcm, checked = document["mcm"], document.get("validation")
-    factor = np.array([unit.factor for unit in found.units])
-    names = found.framework.names
-    u = np.array([mcm["u"][name] for name in names]) * factor
+def _stored(number: int, document: Mapping[str, Any]) -> StoredMonteCarlo:
+    mcm, checked, names = document["mcm"], document.get("validation"), document["parameters"]
+    u = np.array([mcm["u"][name] for name in names])
     differing = () if checked is None else tuple(
         name for name, value in checked["differences"].items() if abs(value) > checked["tolerances"][name]
     )  # fmt: skip
@@ -84,7 +78,7 @@ def _stored(number: int, document: Mapping[str, Any], found: Evaluated) -> Store
         number=number,
         trials=int(mcm["trials"]),
         seed=int(mcm["seed"]),
-        estimate=np.array([mcm["estimate"][name] for name in names]) * factor,
+        estimate=np.array([mcm["estimate"][name] for name in names]),
         covariance=np.asarray(mcm["correlation"], dtype=np.float64) * np.outer(u, u),
         k_p=float(mcm["k_p"]),
         k_q=float(mcm["k_q"]),
@@ -94,7 +88,7 @@ def _stored(number: int, document: Mapping[str, Any], found: Evaluated) -> Store
 
 
 def results_of(
-    found: Evaluated,
+    found: Evaluation,
     texts: Texts,
     monte_carlo: StoredMonteCarlo | None = None,
     method: str = "guf",
@@ -107,50 +101,53 @@ def results_of(
     (Hotelling, Student), which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where
     the method cannot be certified, DataError where there are too few runs for any joint region.
     """
-    guf = found.framework
     if method not in METHODS:
         raise InputError(f"--method {method}: a certificate states guf or mcm")
-    if not np.isfinite(guf.k_p):
+    if not np.isfinite(found.k_p):
         raise DataError(
-            f"{guf.dof:.0f} degrees of freedom bound no joint region of {len(guf.names)} parameters; "
+            f"{found.dof:.0f} degrees of freedom bound no joint region of {len(found.names)} parameters; "
             "a certificate needs more repeated runs"
         )
-    estimate, covariance, k_p, k_q = guf.estimate, guf.covariance, guf.k_p, guf.k_q
+    estimate, covariance, k_p, k_q = found.estimate, found.covariance, found.k_p, found.k_q
     if method == "mcm":
         monte_carlo = _certifiable(found, monte_carlo)
         estimate, covariance = monte_carlo.estimate, monte_carlo.covariance
-        if not np.isfinite(guf.dof):
+        if not np.isfinite(found.dof):
             k_p, k_q = monte_carlo.k_p, monte_carlo.k_q
-    tolerances = {
-        name: limit for name, limit in found.campaign.machine.tolerances.items() if name in guf.names
-    }
+    limits = found.campaign.machine.tolerances
     return result_set(
-        guf.names,
-        found.units,
+        found.names,
+        # In display units already.
+        [Unit(unit, 1.0) for unit in found.units],
         estimate,
         covariance,
         state=state or texts("record.as_found"),
-        p=guf.p,
+        p=found.p,
         k_p=k_p,
         k_q=k_q,
-        rank=guf.rank,
+        rank=found.rank,
         evaluation=_evaluation(found, texts, monte_carlo, method),
-        refused=[RefusedParameters(one.parameters, one.why) for one in found.refused],
-        residuals=_by_target(found),
+        refused=[RefusedParameters(parameters, why) for parameters, why in found.refused],
+        residuals=ResidualSummary(
+            "target",
+            tuple(found.residuals),
+            tuple(found.residuals.values()),
+            MICROMETRE.to_display(found.campaign.probe.standard_uncertainty),
+        ),
         trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
         validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
-        tolerances=tolerances or None,
+        tolerances={name: limits[name] for name in limits if name in found.names} or None,
         texts=texts,
     )
 
 
-def _certifiable(found: Evaluated, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:
+def _certifiable(found: Evaluation, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:
     if monte_carlo is None:
         raise NotFoundError(
             f"there is no stored Monte Carlo result of run {found.run} of campaign {found.campaign.name}; first: "
             f"monitor uncertainty {found.campaign.name} --run {found.run} --method both"
         )
-    if LACK_OF_FIT in {line.source for line in found.framework.budget}:
+    if LACK_OF_FIT in found.sources:
         raise InputError(
             "the model does not explain all of the measurement, and the Monte Carlo result holds no part for that: "
             "certify the framework's result (--method guf), or complete the model"
@@ -158,9 +155,8 @@ def _certifiable(found: Evaluated, monte_carlo: StoredMonteCarlo | None) -> Stor
     return monte_carlo
 
 
-def _evaluation(found: Evaluated, texts: Texts, monte_carlo: StoredMonteCarlo | None, method: str) -> str:
+def _evaluation(found: Evaluation, texts: Texts, monte_carlo: StoredMonteCarlo | None, method: str) -> str:
     """How the results were found, sentence by sentence, the last without its full stop."""
-    guf = found.framework
     readings = texts.computed(found.input_covariance)
     if method == "mcm" and monte_carlo is not None:
         parts = [
@@ -170,12 +166,11 @@ def _evaluation(found: Evaluated, texts: Texts, monte_carlo: StoredMonteCarlo | 
         ]
     else:
         parts = [texts("evaluation.framework", readings=readings)]
-    if np.isfinite(guf.dof):
+    if np.isfinite(found.dof):
         # Two numbers, so that either factor can be found again: k_q by Student's t of the least known of the outputs,
         # k_p by Hotelling's T² of all of them together.
         single, joint = (
-            texts.number(round_to_place(float(one), decimal_of(0.1)))
-            for one in (np.min(guf.dof_by_output), guf.dof)
+            texts.number(round_to_place(float(one), decimal_of(0.1))) for one in (found.fewest_dof, found.dof)
         )
         parts[0] += ", " + texts("evaluation.degrees_of_freedom", single=single, joint=joint)
         if method == "mcm" and monte_carlo is not None:
@@ -202,33 +197,14 @@ def _verdict(monte_carlo: StoredMonteCarlo, texts: Texts) -> str | None:
     return texts("evaluation.not_validated", quantities=", ".join(monte_carlo.differing))
 
 
-def _how_it_fits(found: Evaluated, texts: Texts) -> str:
+def _how_it_fits(found: Evaluation, texts: Texts) -> str:
     """Whether the model explains the measurement, in a sentence that ends without its full stop."""
-    compared = compare(found.fit, found.campaign.name, found.model.name)
     rms, expected = (
-        texts.number(round_to_place(MICROMETRE.to_display(one), decimal_of(0.01)))
-        for one in (compared.rms, compared.expected_rms)
+        texts.number(round_to_place(one, decimal_of(0.01))) for one in (found.rms_um, found.expected_rms_um)
     )
     fits = texts("evaluation.fit", rms=rms, expected=expected)
-    if LACK_OF_FIT in {line.source for line in found.framework.budget}:
+    if LACK_OF_FIT in found.sources:
         fits += "; " + texts("evaluation.fit_counted")
-    elif compared.verdict == SOMETHING_IS_MISSING:
+    elif found.something_is_missing:
         fits += "; " + texts("evaluation.fit_not_counted")
     return fits
-
-
-def _by_target(found: Evaluated) -> ResidualSummary:
-    context = found.fit.problem.context
-    vectors = found.fit.vectors
-    own = context.run == found.run
-    # A target touched once a run (the bar's) is followed exactly by its own coordinates: nothing checks it.
-    labels = tuple(
-        str(name) for name in found.fit.problem.targets if int(np.sum(own & (context.target == name))) > 1
-    )
-    rms = tuple(
-        MICROMETRE.to_display(float(np.sqrt(np.mean(vectors[own & (context.target == name)] ** 2))))
-        for name in labels
-    )
-    return ResidualSummary(
-        "target", labels, rms, MICROMETRE.to_display(found.campaign.probe.standard_uncertainty)
-    )

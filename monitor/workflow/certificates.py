@@ -10,16 +10,19 @@ from pathlib import Path
 from typing import Any, Literal
 
 from monitor import __version__
-from monitor.records import LinearAxes
+from monitor.records import Campaign, LinearAxes
 from monitor.reporting.assembly import certificate_record
 from monitor.reporting.certificate import CertificateRecord
 from monitor.reporting.documents import to_document
 from monitor.reporting.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.render import certificate_pdf
+from monitor.reporting.results import ResultSet
 from monitor.reporting.signing import Key, sign
 from monitor.reporting.texts import ENGLISH, texts_of
+from monitor.reporting.volumetric_result import VolumetricResult
 from monitor.store import (
     Database,
+    StoredModel,
     load_campaign,
     load_certificate,
     mark_certificate,
@@ -27,7 +30,6 @@ from monitor.store import (
 )
 from monitor.workflow.certificate_checks import summary
 from monitor.workflow.certificate_files import font_hashes, keep_issued, path_of, prepared, publish
-from monitor.workflow.certificate_map import volumetric_result
 from monitor.workflow.certificate_orders import (
     Measured,
     check_adjustment,
@@ -40,8 +42,8 @@ from monitor.workflow.certificate_orders import (
 )
 from monitor.workflow.certificate_results import StoredMonteCarlo, results_of, stored_monte_carlo
 from monitor.workflow.conformity import statement_of
-from monitor.workflow.models import label
-from monitor.workflow.uncertainty import Evaluated, evaluate
+from monitor.workflow.evaluations import Evaluation, evaluation_of, stored_evaluation
+from monitor.workflow.models import label, resolve
 
 Document = dict[str, Any]
 
@@ -105,7 +107,8 @@ def issue(
     chosen = number or next_number(db, day.year)
     path = path_of(out, chosen)
     keep_issued(db, path)
-    parts = [_part(db, campaign, one, wanted) for one in measured]
+    model = resolve(db, wanted.model, loaded.method)
+    parts = [_part(db, loaded, model, one, wanted) for one in measured]
     record = _record(stated, parts, wanted, number=chosen, issued_on=day)
     record = dataclasses.replace(record, replaces=replaced)
     inputs = _inputs(parts, wanted)
@@ -139,15 +142,29 @@ class _Part:
     """A certified run: which state of the machine, its evaluation, the Monte Carlo result stored of it."""
 
     measured: Measured
-    found: Evaluated
+    found: Evaluation
     monte_carlo: StoredMonteCarlo | None
 
 
-def _part(db: Database, campaign: str, measured: Measured, wanted: Wishes) -> _Part:
-    found = evaluate(
-        db, campaign, measured.run, model=wanted.model, method="guf", linear_axes=wanted.linear_axes
-    )
+def _part(db: Database, campaign: Campaign, model: StoredModel, measured: Measured, wanted: Wishes) -> _Part:
+    found = stored_evaluation(db, campaign, measured.run, model, wanted.linear_axes)
+    if found is None:
+        found = _evaluated(db, campaign, model, measured.run, wanted.linear_axes)
     return _Part(measured, found, stored_monte_carlo(db, found))
+
+
+def _evaluated(
+    db: Database, campaign: Campaign, model: StoredModel, run: int, linear_axes: LinearAxes | None
+) -> Evaluation:
+    """The evaluation of a run that has none in the database."""
+    # Solver and compiler take a second to load, for which a stored result need not wait.
+    from monitor.workflow.uncertainty import evaluate
+    from monitor.workflow.uncertainty_documents import statement
+
+    done = evaluate(
+        db, campaign.name, run, model=f"{model.name}@{model.version}", method="guf", linear_axes=linear_axes
+    )
+    return evaluation_of(statement(done), campaign, model)
 
 
 def _record(
@@ -167,21 +184,24 @@ def _record(
         number=number,
         issued_on=issued_on,
         model=label(last.model),
-        volumetric=[
-            volumetric_result(one.found, result.state)
-            for one, result in zip(parts, results, strict=True)
-            if wanted.with_map
-        ],
+        volumetric=_maps(parts, results) if wanted.with_map else [],
     )
     if wanted.conformity is not None:
         # Of the state in which the machine is handed back.
         statement = statement_of(
-            results[-1], wanted.conformity, texts, campaign=last.campaign.name, dof=last.framework.dof
+            results[-1], wanted.conformity, texts, campaign=last.campaign.name, dof=last.dof
         )
         record = dataclasses.replace(record, conformity=statement)
     if wanted.draft and record.title:
         record = dataclasses.replace(record, title=texts("record.draft", title=record.title))
     return record
+
+
+def _maps(parts: Sequence[_Part], results: Sequence[ResultSet]) -> list[VolumetricResult]:
+    # Loaded here: a certificate without a map waits for no solver.
+    from monitor.workflow.certificate_map import volumetric_result
+
+    return [volumetric_result(one.found, result.state) for one, result in zip(parts, results, strict=True)]
 
 
 def _inputs(parts: Sequence[_Part], wanted: Wishes) -> Document:
@@ -211,7 +231,9 @@ def _own(part: _Part) -> Document:
         "run": part.measured.run,
         # The GUM framework draws no random numbers; the Monte Carlo that it was compared with does.
         "seed": None if monte_carlo is None else monte_carlo.seed,
-        "stored_result": None if monte_carlo is None else monte_carlo.number,
+        # Numbers in v_analyses; None for an evaluation that was made for the certificate.
+        "stored_result": part.found.number,
+        "stored_monte_carlo": None if monte_carlo is None else monte_carlo.number,
     }
 
 

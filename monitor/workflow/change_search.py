@@ -50,18 +50,31 @@ def weights_of(series: Recorded) -> Array | None:
 
 
 def day_means(series: Recorded) -> tuple[Array, Array, Array | None, Array]:
-    """Times, means and uncertainties of the means by day, in order of time, and when each day's first run was.
+    """Times, means and relative uncertainties of the means by day, in order of time, and when each day's first run was.
 
-    The uncertainties are None where the days weigh alike.
+    The uncertainties are in units of the first, None where the days weigh alike.
     """
     labels, first, index = np.unique(series.days, return_index=True, return_inverse=True)
-    weight = 1.0 / series.u**2 if weights_of(series) is not None else np.ones_like(series.values)
+    own = weights_of(series)
+    weight = np.ones_like(series.values) if own is None else 1.0 / _relative(own) ** 2
     total = np.bincount(index, weight)
     order = np.argsort(first, kind="stable")
-    t, y = (np.bincount(index, weight * x) / total for x in (series.t, series.values))
+    # Of all runs alike: parameters that were measured together then share their times, and with them one search.
+    t = np.bincount(index, series.t) / np.bincount(index)
+    y = np.bincount(index, weight * series.values) / total
     u = 1.0 / np.sqrt(total)
     assert len(labels) == len(total)
-    return t[order], y[order], u[order] if u.max() > ALIKE * u.min() else None, series.t[first[order]]
+    alike = u.max() <= ALIKE * u.min()
+    return t[order], y[order], None if alike else _relative(u[order]), series.t[first[order]]
+
+
+def _relative(u: Array) -> Array:
+    """Uncertainties in units of the first, to 9 digits.
+
+    Of the parameters that one plan determines they go together: their runs then weigh alike to the last bit, and one
+    search is theirs.
+    """
+    return np.asarray(np.round(u / u[0], 9))
 
 
 class _Plan(NamedTuple):
@@ -91,7 +104,7 @@ def search_changes(
             days = None
         else:
             t, y, begins, u = series.t, series.values, series.t, weights_of(series)
-            u = u if u is not None and u.max() > ALIKE * u.min() else None
+            u = _relative(u) if u is not None and u.max() > ALIKE * u.min() else None
             days = series.days
         key = tuple(b"" if one is None else one.tobytes() for one in (t, days))
         plan = searches.setdefault(key, _Plan(t, begins, days, {}, {}))

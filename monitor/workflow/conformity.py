@@ -9,7 +9,6 @@ from monitor.reporting.certificate import ConformityStatement, ConformityVerdict
 from monitor.reporting.numbers import decimal_of, round_to_place, written_probability
 from monitor.reporting.results import ResultSet
 from monitor.reporting.texts import Texts
-from monitor.uncertainty.conformity import conformity
 
 #: Probability of conformity that the third rule asks for; its complement decides for failure.
 WANTED = 0.95
@@ -25,6 +24,9 @@ def statement_of(
     ``dof`` are the degrees of freedom of the result's covariance. Raises InputError for an unknown rule or no
     tolerance; ``campaign`` is where the tolerances are from.
     """
+    # Loaded here: most certificates state no conformity, and every command knows the rules' names.
+    from monitor.uncertainty.conformity import conformity
+
     if rule not in RULES:
         raise InputError(f"there is no decision rule '{rule}'; there are {', '.join(RULES)}")
     limits = np.full(len(result.names), np.nan) if result.tolerances is None else result.tolerances

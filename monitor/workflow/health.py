@@ -59,7 +59,12 @@ def report(
     the fleet occupies; the results do not depend on it. Raises InputError for a week that is none, NotFoundError for a
     machine or campaign that is not there.
     """
-    chosen = week_named(week) if week else week_before(date.today())
+    today = date.today() if made_at is None else made_at.date()
+    chosen = week_named(week) if week else week_before(today)
+    if chosen.first > today:
+        raise InputError(
+            f"--week {chosen.name} begins on {chosen.first}, and today is {today}: nothing can be said of it"
+        )
     own = settings or Settings()
     if not 0.0 < own.risk < 1.0:
         raise InputError(f"the probability that alarms must lie between 0 and 1, not {own.risk}")
@@ -89,6 +94,7 @@ def report(
             chosen.name, chosen.first, chosen.last, now, f"machine-health-monitor {__version__}", own.risk,
             tuple(row for row, _ in rows),
             refused_elsewhere(db, {str(known["machine"]) for known in records(list_machines(db))}, chosen),
+            ended=today > chosen.last,
         )  # fmt: skip
         files = _write(db, fleet, [number for _, number in rows], out or Path(), machine, engine)
     return _document(fleet, chosen, files)
@@ -218,6 +224,7 @@ def _document(fleet: Fleet, week: Week, files: list[str]) -> Document:
         "to": week.last.isoformat(),
         "machines": [to_document(row) for row in fleet.rows],
         "measured": measured,
+        "ended": fleet.ended,
         "alarms": [row.machine for row in fleet.rows if row.state in ALARMS],
         "refused_imports": [to_document(one) for one in fleet.refused_imports],
         "message": ""

@@ -7,8 +7,8 @@ from datetime import datetime
 
 import numpy as np
 
-from monitor.reporting.health import DataQuality, MachineHealth, RefusedImport
-from monitor.store import Database, StoredModel
+from monitor.reporting.health import ALARMS, DataQuality, MachineHealth, RefusedImport
+from monitor.store import Database, StoredModel, stored_analyses
 from monitor.workflow.health_facts import (
     changes_noted,
     conditions_of,
@@ -115,7 +115,10 @@ def machine_health(db: Database, past: Begun, done: Done) -> MachineHealth:
     last = past.last
     if last is None or past.model is None or past.span is None or past.found is None:
         ahead = first_run(db, machine, settings.campaigns)
-        return _not_measured(machine, description, location, runs, ahead, events, refused, remarks, week)
+        left = _left_in_alarm(db, machine, runs)
+        return _not_measured(
+            machine, description, location, runs, ahead, events, refused, remarks, week, left
+        )
     model, span, here = past.model, past.span, past.here
     results = stored_with(db, past.found, done, past.method, model, span, remarks)
     evaluated, explained = results.uncertainty, results.explanation
@@ -146,12 +149,27 @@ def machine_health(db: Database, past: Begun, done: Done) -> MachineHealth:
         changed=changed_in_words(noted, explained, quality),
         since=since_when(state, parameters, noted, span.first), probability_out=judged.any,
         next_check=next_check(state, drifts, limits, last.at, week),
-        run=f"run {last.run} of campaign {last.campaign}, {last.at:%Y-%m-%d %H:%M}",
+        run=_words_of(last),
         basis="" if evaluated is None else evaluated["input_covariance"], factor=factor_in_words(evaluated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=conditions_of(here),
         model=model_of(explained, list(results.history or ()), span), quality=quality,
         map=map_told(results.map),
     )  # fmt: skip
+
+
+def _words_of(run: PastRun) -> str:
+    return f"run {run.run} of campaign {run.campaign}, {run.at:%Y-%m-%d %H:%M}"
+
+
+def _left_in_alarm(db: Database, machine: str, runs: list[PastRun]) -> str:
+    """What the last report said of the machine's last run, where that was an alarm: nothing has settled it since."""
+    if not runs:
+        return ""
+    for one in stored_analyses(db, "health", machine=machine, most=100):
+        if one.document["run"] == _words_of(runs[-1]):
+            state = str(one.document["state"])
+            return f", when it was reported as: {state}" if state in ALARMS else ""
+    return ""
 
 
 def _not_measured(
@@ -164,10 +182,11 @@ def _not_measured(
     refused: tuple[RefusedImport, ...],
     remarks: list[str],
     week: Week,
+    left: str,
 ) -> MachineHealth:
     if runs:
         check = "now: no run this week"
-        said = f"no run this week; its last run was on {runs[-1].at:%Y-%m-%d} ({runs[-1].campaign})"
+        said = f"no run this week; its last run was on {runs[-1].at:%Y-%m-%d} ({runs[-1].campaign}){left}"
     elif ahead is not None:
         check = "its first run"
         said = f"not yet measured in this week: its first run was on {ahead[0]:%Y-%m-%d} ({ahead[1]})"

@@ -24,9 +24,10 @@ from monitor.store import (
 )
 from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.comparison import save_explanation
+from monitor.workflow.evaluations import COVERAGE
 from monitor.workflow.health_history import PastRun, Span
-from monitor.workflow.health_work import COVERAGE, METHOD, Done, Work, kept
-from monitor.workflow.uncertainty import save_uncertainty
+from monitor.workflow.health_work import METHOD, Done, Work, kept
+from monitor.workflow.uncertainty_documents import save_uncertainty
 from monitor.workflow.volumetric import save_map
 
 Document = dict[str, Any]

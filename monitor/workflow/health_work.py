@@ -20,15 +20,15 @@ from monitor.methods.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
 from monitor.workflow.comparison import error_steps, explanation_document, explanation_of
+from monitor.workflow.evaluations import COVERAGE, Evaluation, evaluation_of
 from monitor.workflow.identification import identified
 from monitor.workflow.models import as_model
-from monitor.workflow.uncertainty import Evaluated, document, evaluate_fit
+from monitor.workflow.uncertainty import Evaluated, evaluate_fit
+from monitor.workflow.uncertainty_documents import document
 from monitor.workflow.volumetric import map_document, map_of
 
 Document = dict[str, Any]
 Result = TypeVar("Result")
-#: The probability that every expanded uncertainty of the report is stated with.
-COVERAGE = 0.95
 METHOD = "guf"
 
 
@@ -100,6 +100,14 @@ class _Fitted:
         work = self._work
         return evaluate_fit(work.known, work.model, self.fit, work.run, method=METHOD, p=COVERAGE)
 
+    @cached_property
+    def uncertainty(self) -> Document:
+        return document(self.evaluated)
+
+    @property
+    def evaluation(self) -> Evaluation:
+        return evaluation_of(self.uncertainty, self._work.known, self._work.model)
+
 
 def _computed(work: Work, fitted: _Fitted) -> Done:
     remarks: list[str] = []
@@ -117,7 +125,7 @@ def _computed(work: Work, fitted: _Fitted) -> Done:
     uncertainty = explanation = mapped = history = None
     if work.uncertainty:
         uncertainty = kept(
-            lambda: document(fitted.evaluated),
+            lambda: fitted.uncertainty,
             "the uncertainty of the last run could not be evaluated",
             remarks,
         )
@@ -130,7 +138,7 @@ def _computed(work: Work, fitted: _Fitted) -> Done:
     # Without an uncertainty there is no map, and its remark says why.
     if work.map and (uncertainty is not None or not work.uncertainty):
         mapped = kept(
-            lambda: map_document(map_of(fitted.evaluated), COVERAGE),
+            lambda: map_document(map_of(fitted.evaluation, fitted.fit), COVERAGE),
             "the volumetric error could not be mapped",
             remarks,
         )

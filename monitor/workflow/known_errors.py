@@ -4,31 +4,38 @@ from __future__ import annotations
 
 import numpy as np
 
+from monitor.discovery import Fit
 from monitor.effects import ChainEffect
 from monitor.methods.least_squares import eliminate
 from monitor.records import Array
 from monitor.uncertainty.volumetric import GeometricErrors
-from monitor.workflow.uncertainty import Evaluated
+from monitor.workflow.evaluations import Evaluation
 
 
-def geometric_errors(found: Evaluated) -> tuple[GeometricErrors, dict[str, str]]:
-    """What is known of the machine from one evaluated run, and what is not, with the reason."""
-    problem, solution = found.fit.problem, found.fit.solution
+def geometric_errors(found: Evaluation, fit: Fit) -> tuple[GeometricErrors, dict[str, str]]:
+    """What is known of the machine from one evaluated run, and what is not, with the reason.
+
+    ``fit`` is the evaluated model fitted to the campaign.
+    """
+    problem, solution = fit.problem, fit.solution
     context = problem.context
+    run = int(np.flatnonzero(problem.runs == found.run)[0])
     fixed, coefficients = problem.resolved(solution.common)
-    left_out = {name: refusal.why for refusal in found.refused for name in refusal.parameters}
+    left_out = {name: why for parameters, why in found.refused for name in parameters}
     effects: list[ChainEffect] = []
     names: list[str] = []
+    factors: list[float] = []
     for effect in problem.base:
         own = effect.parameters(context)
-        if isinstance(effect, ChainEffect) and all(name in found.framework.names for name in own):
+        if isinstance(effect, ChainEffect) and all(name in found.names for name in own):
             effects.append(effect)
             names += own
+            factors += [effect.unit.factor] * len(own)
         elif isinstance(effect, ChainEffect):
             left_out |= {name: "it has no number in this run" for name in own if name not in left_out}
-    places = [found.framework.names.index(name) for name in names]
+    places = [found.names.index(name) for name in names]
     local = [problem.base_names.index(name) for name in names]
-    estimate = [float(found.framework.estimate[place]) for place in places]
+    estimate = [float(found.estimate[place]) * factor for place, factor in zip(places, factors, strict=True)]
     shared: list[int] = []
     at = coefficient = 0
     for one, plain in zip(problem.shared, fixed.added, strict=True):
@@ -45,10 +52,11 @@ def geometric_errors(found: Evaluated) -> tuple[GeometricErrors, dict[str, str]]
             shared += own_places
         coefficient += one.size
     covariance = np.zeros((len(names), len(names)))
-    covariance[: len(places), : len(places)] = found.framework.covariance[np.ix_(places, places)]
+    covariance[: len(places), : len(places)] = found.covariance[np.ix_(places, places)] * np.outer(
+        factors, factors
+    )
     if len(solution.common):
-        covariance += _of_shared(found, local, shared)
-    run = int(np.flatnonzero(problem.runs == found.run)[0])
+        covariance += _of_shared(fit, run, local, shared)
     for effect, name in problem.known_errors:
         # Measured by other means: its uncertainty is the stated one, and what the others share with it is first order.
         place = problem.local_names.index(name)
@@ -68,25 +76,24 @@ def geometric_errors(found: Evaluated) -> tuple[GeometricErrors, dict[str, str]]
             context=context,
             run=found.run,
             tip=problem.ends(problem.own_of(solution.local))[1][int(np.argmax(context.run == found.run))],
-            degrees_of_freedom=float(np.min(found.framework.dof_by_output)),
+            degrees_of_freedom=found.fewest_dof,
         ),
         left_out,
     )
 
 
-def _of_shared(found: Evaluated, local: list[int], shared: list[int]) -> Array:
+def _of_shared(fit: Fit, run: int, local: list[int], shared: list[int]) -> Array:
     """What the uncertainty of the shared effects adds: their own, and what they pull the run's parameters by.
 
     The parameters of a run answer a change of the shared ones by D = -pinv(A) B of the whitened Jacobians. For
     white noise the shared ones and the run's at held shared ones are uncorrelated, because the former rest on
     what the latter leave of the readings.
     """
-    solution = found.fit.solution
-    place = int(np.flatnonzero(found.fit.problem.runs == found.run)[0])
-    space = eliminate(solution.last.local[[place]])
-    answer = -(space.inverse[0] @ (space.basis[0].T @ solution.last.common[place]))
+    solution = fit.solution
+    space = eliminate(solution.last.local[[run]])
+    answer = -(space.inverse[0] @ (space.basis[0].T @ solution.last.common[run]))
     count = len(solution.common)
     both = np.concatenate([answer[local], np.eye(count)[shared]])
     covariance = np.where(np.isfinite(solution.common_covariance), solution.common_covariance, 0.0)
-    added: Array = found.fit.scale**2 * both @ covariance @ both.T
+    added: Array = fit.scale**2 * both @ covariance @ both.T
     return added

@@ -92,6 +92,14 @@ def _faults(found: dict[str, Any]) -> list[str]:
             faults.append(f"{key} must be a {kind.__name__}, but is {found[key]!r}")
     if found.get("security", "starttls") not in PORTS:
         faults.append(f"security is one of {', '.join(PORTS)}, not {found['security']!r}")
+    if isinstance(found.get("port"), int) and not 1 <= found["port"] <= 65535:
+        faults.append(f"port is a number from 1 to 65535, not {found['port']}")
+    lines = [(key, found.get(key)) for key in ("server", "from", "user")]
+    lines += [("to", one) for one in found["to"]] if isinstance(found.get("to"), list) else []
+    for key, line in lines:
+        # A line feed in an address would begin another line of the message's head.
+        if isinstance(line, str) and not (line.strip() and line.isprintable()):
+            faults.append(f"{key} is one line of visible letters, not {line!r}")
     addresses = found.get("to")
     if isinstance(addresses, list) and not (
         addresses and all(isinstance(one, str) and "@" in one for one in addresses)
@@ -108,8 +116,9 @@ def message_of(settings: MailSettings, report: dict[str, Any]) -> EmailMessage:
     """The e-mail of a report's document: the fleet table as text, the PDF files attached."""
     alarms = report["alarms"]
     message = EmailMessage()
+    quiet = "no alarm" if report["measured"] else "no machine was measured"
     message["Subject"] = f"Machine health {report['week']}: " + (
-        f"{len(alarms)} alarm{'s' if len(alarms) != 1 else ''}" if alarms else "no alarm"
+        f"{len(alarms)} alarm{'s' if len(alarms) != 1 else ''}" if alarms else quiet
     )
     message["From"] = settings.sender
     message["To"] = ", ".join(settings.recipients)
@@ -168,7 +177,7 @@ def send(settings: MailSettings, message: EmailMessage) -> Sequence[str]:
         raise InputError(f"the mail server {place} took none of {', '.join(error.recipients)}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"the password file {settings.password_file} is not UTF-8; save it so") from error
-    except (smtplib.SMTPException, OSError) as error:
+    except (smtplib.SMTPException, OSError, UnicodeError) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError(f"the mail server {place} could not be used: {why}") from error
     if refused:

@@ -117,7 +117,8 @@ def side_by_side(db: Database, names: Sequence[str], model: str | None = None, p
     """
     # These two come back to this module for the selections.
     from monitor.workflow.runs_statistics import stats
-    from monitor.workflow.uncertainty import document, evaluate
+    from monitor.workflow.uncertainty import evaluate
+    from monitor.workflow.uncertainty_documents import document
 
     if len(dict.fromkeys(names)) < 2:
         raise InputError("name at least two selections or campaigns to set side by side")

@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from monitor.reporting.figure_style import save
 from monitor.reporting.figures_trend import parameter_over_time
@@ -49,7 +49,7 @@ def trend_figures(found: Trends, folder: Path) -> list[str]:
         if fit is not None:
             t = np.linspace(_day(one["since"]), float(series.t[-1]), 60)
             level, u, _ = predict(fit, t)
-            line = (t, level, stats.t.isf((1.0 - fit.confidence) / 2.0, fit.dof) * u)
+            line = (t, level, scipy.stats.t.isf((1.0 - fit.confidence) / 2.0, fit.dof) * u)
         u_run = np.where(np.isfinite(series.u), series.u, 0.0)
         shift = series.offset.total_seconds() / SECONDS_PER_DAY
         figure = parameter_over_time(

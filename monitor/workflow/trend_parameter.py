@@ -56,6 +56,8 @@ class Series:
 
     def part(self, chosen: npt.NDArray[np.bool_]) -> Series:
         """The chosen runs."""
+        if chosen.all():
+            return self
         return Series(
             self.name, self.unit, self.values[chosen], self.u[chosen], self.t[chosen], self.days[chosen],
             self.hour[chosen], self.offset,
@@ -86,7 +88,7 @@ def date(t: float, offset: timedelta) -> str | None:
         return None
     sign = "-" if offset < timedelta() else "+"
     minutes = abs(int(offset.total_seconds())) // 60
-    return f"{moment:%Y-%m-%dT%H:%M:%S}{sign}{minutes // 60:02d}:{minutes % 60:02d}"
+    return f"{moment.isoformat(timespec='seconds')}{sign}{minutes // 60:02d}:{minutes % 60:02d}"
 
 
 def number(value: float | None) -> float | None:

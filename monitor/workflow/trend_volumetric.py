@@ -14,17 +14,21 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from monitor.effects import ChainEffect
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics import Trend, backtest_longest, forecast_longest, predict, residual_correlation, trend
+from monitor.statistics import (
+    Trend,
+    backtest_longest,
+    forecast_longest,
+    may_be_longest,
+    predict,
+    residual_correlation,
+    trend,
+)
 from monitor.store import Database, MachineHistory
-from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
 from monitor.units import MICROMETRE
-from monitor.workflow.comparison import fitted
 from monitor.workflow.trend_forecast import HORIZON_YEARS
 from monitor.workflow.trend_parameter import DAYS_PER_YEAR, Series, date
-from monitor.workflow.volumetric import POINTS, poses_of, ranges_of
 
 Document = dict[str, Any]
 
@@ -46,7 +50,10 @@ class Followed(NamedTuple):
 
 @dataclass(frozen=True)
 class _Vectors:
-    """Error vectors at n points: ``at_zero`` (n, 3) and ``sensitivity`` (n, 3, p), in µm and per display unit."""
+    """Error vectors at n points: ``at_zero`` (n, 3) and ``sensitivity`` (n, 3, p), in µm and per display unit.
+
+    The points are those of the grid, ``points`` of them, that can have the longest vector.
+    """
 
     names: tuple[str, ...]
     sensitivity: Array
@@ -75,6 +82,12 @@ def _vectors(
     db: Database, history: MachineHistory, model: str | None, levels: Mapping[str, float]
 ) -> _Vectors:
     """The error vectors over the strokes of the latest campaign's machine about ``levels``, name to display value."""
+    # Loaded here: pages without a limit of the volumetric error start without the methods and all that they need.
+    from monitor.effects import ChainEffect
+    from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
+    from monitor.workflow.comparison import fitted
+    from monitor.workflow.volumetric import POINTS, poses_of, ranges_of
+
     campaign, _, found = fitted(db, str(history.campaign[-1]), model)
     problem, run = found.problem, int(history.run[-1])
     effects = [
@@ -100,14 +113,14 @@ def _vectors(
     ranges, _ = ranges_of(campaign, known.chain)
     poses = poses_of(known.chain, known.context.positions)
     error = volumetric_error(known, grid(known.chain, ranges, POINTS, poses), middle(known.chain, ranges))
-    at_zero = error.vectors - error.sensitivity @ estimate
     um = MICROMETRE.factor
+    sensitivity = error.sensitivity * factors / um
+    at_zero = (error.vectors - error.sensitivity @ estimate) / um
+    # With axes that run straight only the corners of the strokes are left, of 343 points at each pose 8.
+    long = max(float(error.lengths.max()) / um, 1.0)
+    kept = may_be_longest(sensitivity, at_zero, (len(poses), *[POINTS] * len(ranges)), long)
     return _Vectors(
-        names,
-        error.sensitivity * factors / um,
-        at_zero / um,
-        tuple(sorted(set(levels) - set(names))),
-        len(at_zero),
+        names, sensitivity[kept], at_zero[kept], tuple(sorted(set(levels) - set(names))), len(at_zero)
     )
 
 
@@ -145,7 +158,7 @@ def _backtest(
             own = one.series.part(np.isin(one.series.t, t[keep]))
             return _held(own, -np.inf)
         own_u = u[keep, column] if weighed[column] else None
-        return trend(values[keep, column], t[keep], u=own_u, days=days[keep])
+        return trend(values[keep, column], t[keep], u=own_u, days=days[keep], robust=False)
 
     try:
         found = backtest_longest(values, t, days, fit, vectors.sensitivity, vectors.at_zero, rng=rng)

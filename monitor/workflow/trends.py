@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,12 @@ from monitor.statistics import Change, History, Trend, control_false_discoveries
 from monitor.store import (
     Database,
     MachineHistory,
-    list_events,
+    machine_events,
     machine_history,
     save_analysis,
 )
-from monitor.workflow.agreement import Moment, agreement, evaluated
+from monitor.workflow.agreement import Moment, agreement
 from monitor.workflow.change_search import search_changes
-from monitor.workflow.identification import identify
-from monitor.workflow.models import resolve
 from monitor.workflow.trend_campaigns import chosen_only, same_hours
 from monitor.workflow.trend_control import Charts
 from monitor.workflow.trend_forecast import backtested, prediction
@@ -80,6 +78,8 @@ def _history(db: Database, machine: str, choice: Choice) -> MachineHistory:
     """The history of a machine; campaigns not yet identified are identified first where the database may be written."""
     model, version = None, None
     if choice.model is not None:
+        from monitor.workflow.models import resolve
+
         stored = resolve(db, choice.model)
         model, version = stored.name, stored.version
 
@@ -90,6 +90,9 @@ def _history(db: Database, machine: str, choice: Choice) -> MachineHistory:
 
     found = read()
     if not db.read_only and found.unidentified:
+        # Loaded here: most pages have nothing to identify, and the methods take as long to load as a page to make.
+        from monitor.workflow.identification import identify
+
         for campaign in found.unidentified:
             try:
                 identify(db, campaign, choice.model)
@@ -124,6 +127,7 @@ def _change(one: Change, series: Series) -> Document:
 def _parameter(
     series: Series, history: MachineHistory, own: npt.NDArray[np.bool_], events: list[float], check: float,
     choice: Choice, charts: Charts, place: int, searched: Mapping[str, tuple[History | None, str | None]],
+    several: bool,
 ) -> tuple[Document, Followed]:  # fmt: skip
     steady = steady_runs(series, history.warm_up[own])
     found, why = searched[series.name]
@@ -131,8 +135,9 @@ def _parameter(
     slope, line = drift(steady, begins)
     channels = {name: values[own] for name, values in history.conditions.items()}
     # The method is a condition like any other: 1 for the runs of each but the first.
-    for method in list(dict.fromkeys(history.method[own].tolist()))[1:]:
-        channels[f"method {method}"] = (history.method[own] == method).astype(np.float64)
+    if several:
+        for method in list(dict.fromkeys(history.method[own].tolist()))[1:]:
+            channels[f"method {method}"] = (history.method[own] == method).astype(np.float64)
     coefficients, why_conditions = conditions(series, channels, begins)
     waves, why_cycles = cycles(steady, begins)
     warmth, why_warm = warming(
@@ -182,7 +187,9 @@ def _next_check(history: MachineHistory, choice: Choice) -> float:
             )
         return at
     seconds = history.seconds
-    starts = np.sort([seconds[history.campaign == name].min() for name in set(history.campaign.tolist())])
+    # Runs are in the order of time: the first of a campaign that is met is its earliest.
+    first = np.unique(history.campaign, return_index=True)[1]
+    starts = np.sort(seconds[first])
     apart = np.diff(starts) / SECONDS_PER_DAY
     return float(last + (np.median(apart) if len(apart) else NEXT_CHECK_D))
 
@@ -194,12 +201,8 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
     """
     choice = choice or Choice()
     history = _history(db, machine, choice)
-    frame = list_events(db, machine)
-    moments = [at.to_pydatetime().replace(tzinfo=UTC) for at in frame["happened_at"]]
-    known = [
-        {"at": at.isoformat(), "kind": kind, "description": text}
-        for at, kind, text in zip(moments, frame["kind"], frame["description"], strict=True)
-    ]
+    happened = machine_events(db, machine)
+    known = [{"at": at.isoformat(), "kind": kind, "description": text} for at, kind, text in happened]
     head: Document = {
         "machine": machine,
         "since": None if choice.since is None else choice.since.isoformat(),
@@ -207,12 +210,7 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         "campaigns": list(dict.fromkeys(history.campaign.tolist())),
         "methods": list(dict.fromkeys(history.method.tolist())),
         "agreement": agreement(
-            history,
-            [
-                Moment(at.timestamp(), one["kind"], one["description"])
-                for at, one in zip(moments, known, strict=True)
-            ],
-            evaluated(db, machine),
+            db, history, [Moment(at.timestamp(), kind, text) for at, kind, text in happened]
         ),
         "events": known,
         "notes": same_hours(history),
@@ -225,7 +223,7 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         why = f"machine {machine} has no identified run{of} {when}"
         return Trends({**head, "why": why, "parameters": {}}, (), {})
     series = all_series(history)
-    events = [_days(at) for at in moments]
+    events = [_days(at) for at, _, _ in happened]
     reference = None if choice.reference is None else (_days(choice.reference[0]), _days(choice.reference[1]))
     charts = Charts(points_of(history, series), reference)
     check = _next_check(history, choice)
@@ -236,7 +234,9 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         seed=SEED,
     )
     judged = {
-        one.name: _parameter(one, history, own, events, check, choice, charts, place, searched)
+        one.name: _parameter(
+            one, history, own, events, check, choice, charts, place, searched, len(head["methods"]) > 1
+        )
         for place, (one, own) in enumerate(series)
         if len(one.t)
     }

@@ -7,7 +7,7 @@ runs where there are enough of them, else all runs together, else the stated sta
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
@@ -24,7 +24,7 @@ from monitor.methods import method_named
 from monitor.methods.identification import Refusal
 from monitor.methods.results import refusals
 from monitor.records import Array, Campaign, LinearAxes
-from monitor.store import Database, StoredModel, load_campaign, save_analysis
+from monitor.store import Database, StoredModel, load_campaign
 from monitor.uncertainty import (
     FrameworkResult,
     Inputs,
@@ -34,22 +34,22 @@ from monitor.uncertainty import (
     adaptive_monte_carlo,
     gum_framework,
     joined,
-    joint_coverage,
     overall,
     pooled_by_day,
     uncorrelated,
     validate,
 )
-from monitor.uncertainty.coverage import ellipsoid_factor, rectangle_factor
 from monitor.uncertainty.linear_axes import row_covariances
 from monitor.uncertainty.row_problem import repeated_readings, run_problem
 from monitor.uncertainty.run_problem import OneRun, RunProblem
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
 from monitor.units import Unit
-from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
-from monitor.workflow.models import as_model, label, resolve
+from monitor.workflow.campaign_parts import runs_before
+from monitor.workflow.evaluations import COVERAGE, LACK_OF_FIT, wished
+from monitor.workflow.models import as_model, resolve
 from monitor.workflow.selections import selected_readings
 from monitor.workflow.spreading import trials_of
+from monitor.workflow.uncertainty_documents import document, save_uncertainty
 
 Document = dict[str, Any]
 
@@ -59,7 +59,6 @@ VALIDATION_TIGHTENING = 2.5
 READINGS = "readings"
 BAR = "scale bar"
 CALIBRATED = "calibrated quantities"
-LACK_OF_FIT = "lack of fit of the model"
 # A covariance from fewer degrees of freedom than this says little about itself; then the next choice is taken.
 FEWEST_DEGREES_OF_FREEDOM = 8
 
@@ -68,7 +67,8 @@ FEWEST_DEGREES_OF_FREEDOM = 8
 class Evaluated:
     """What was evaluated for one run; ``units`` are the display units of ``framework.names``.
 
-    ``causes`` are the effects that lack of fit may come from, with their probabilities.
+    ``causes`` are the effects that lack of fit may come from, with their probabilities; ``asked`` is what was
+    asked for (``evaluations.wished``).
     """
 
     campaign: Campaign
@@ -82,6 +82,7 @@ class Evaluated:
     monte_carlo: MonteCarloResult | None
     validation: Validation | None
     causes: tuple[tuple[str, float], ...] = ()
+    asked: Document = field(default_factory=dict)
 
 
 # A covariance of 4 000 readings takes 128 MB and some copies; 10 000 trials of 1 000 readings some ten minutes.
@@ -175,7 +176,7 @@ def evaluate(
     method: str = "both",
     digits: int = 2,
     seed: int = 1,
-    p: float = 0.95,
+    p: float = COVERAGE,
     model_uncertainty: bool = True,
     workers: int | None = None,
     cluster: str | None = None,
@@ -213,7 +214,7 @@ def evaluate_fit(
     method: str = "both",
     digits: int = 2,
     seed: int = 1,
-    p: float = 0.95,
+    p: float = COVERAGE,
     model_uncertainty: bool = True,
     workers: int | None = None,
     cluster: str | None = None,
@@ -277,7 +278,10 @@ def evaluate_fit(
         validation = validate(plain, mcm, digits=digits)
     advice = method_named(loaded.method).advice
     refused = refusals(found.problem, found.solution.null_space[place], number, advice)
-    return Evaluated(loaded, stored, found, number, framework, units, refused, words, mcm, validation, causes)
+    asked = wished(p, None if chosen is None else chosen.name, model_uncertainty, linear_axes)
+    return Evaluated(
+        loaded, stored, found, number, framework, units, refused, words, mcm, validation, causes, asked
+    )
 
 
 def _check(method: str, digits: int, seed: int, p: float) -> None:
@@ -361,91 +365,6 @@ def _framework(
     )
 
 
-def _values(names: tuple[str, ...], units: tuple[Unit, ...], values: Array) -> Document:
-    return {
-        name: unit.to_display(float(value)) for name, unit, value in zip(names, units, values, strict=True)
-    }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def document(found: Evaluated) -> Document:
-    """The result as people see it."""
-    guf, units = found.framework, found.units
-    result: Document = {
-        "campaign": found.campaign.name,
-        "machine": found.campaign.machine.id,
-        "run": found.run,
-        "model": label(found.model),
-        "p": guf.p,
-        "parameters": list(guf.names),
-        "units": {name: unit.name for name, unit in zip(guf.names, units, strict=True)},
-        "input_covariance": found.input_covariance,
-        "refused": [{"parameters": list(one.parameters), "why": one.why} for one in found.refused],
-        "guf": {
-            "estimate": _values(guf.names, units, guf.estimate),
-            "u": _values(guf.names, units, guf.u),
-            "correlation": guf.correlation.tolist(),
-            # JCGM 102:2011 6.5 as it stands: normal outputs. Beside them what so few runs allow to claim.
-            "k_p": ellipsoid_factor(guf.rank, guf.p),
-            "k_q": rectangle_factor(len(guf.names), guf.p),
-            "lambda_max": guf.lambda_max,
-            "degrees_of_freedom": _finite(guf.dof),
-            "k_p_with_degrees_of_freedom": _finite(guf.k_p),
-            "k_q_with_degrees_of_freedom": _finite(guf.k_q),
-            "expanded": _values(guf.names, units, guf.expanded),
-            "joint_coverage_of_k_2_each": joint_coverage(guf.correlation).value,
-            "budget": {
-                line.source: dict(zip(guf.names, map(float, shares), strict=True))
-                for line, shares in zip(guf.budget, guf.budget_shares(), strict=True)
-            },
-        },
-    }
-    if found.causes:
-        result["lack_of_fit_causes"] = [
-            {"effect": name, "probability": probability} for name, probability in found.causes[:5]
-        ]
-    mcm = found.monte_carlo
-    if mcm is not None:
-        result["mcm"] = {
-            "estimate": _values(mcm.names, units, mcm.estimate),
-            "u": _values(mcm.names, units, mcm.u),
-            "correlation": mcm.correlation.tolist(),
-            "k_p": mcm.k_p,
-            "k_q": mcm.k_q,
-            "lambda_max": mcm.lambda_max,
-            "trials": mcm.trials,
-            "not_converged": mcm.not_converged,
-            "seconds": mcm.seconds,
-            "stable": mcm.stable,
-            "seed": mcm.seed,
-        }
-    if found.validation is not None:
-        result["validation"] = {
-            "passed": found.validation.passed,
-            "verdict": found.validation.verdict,
-            "differences": {
-                _what(one): _scaled(one, found, one.difference) for one in found.validation.comparisons
-            },
-            "tolerances": {
-                _what(one): _scaled(one, found, one.tolerance) for one in found.validation.comparisons
-            },
-        }
-    return result
-
-
-def _what(one: Any) -> str:
-    return f"{one.quantity} {one.output}".strip()
-
-
-def _scaled(one: Any, found: Evaluated, value: float) -> float:
-    if not one.output:
-        return float(value)
-    return found.units[found.framework.names.index(one.output)].to_display(float(value))
-
-
 def uncertainty(db: Database, campaign: str, run: int | None = None, **options: Any) -> Document:
     """Evaluate, store and return the document. ``options`` are those of ``evaluate``.
 
@@ -456,20 +375,3 @@ def uncertainty(db: Database, campaign: str, run: int | None = None, **options: 
     result = document(found)
     save_uncertainty(db, result, found.model, options.get("method", "both"), before)
     return result
-
-
-def save_uncertainty(
-    db: Database, result: Document, model: StoredModel, method: str, before: datetime | None
-) -> None:
-    """Keep the document of an evaluation, ``partial`` where runs from ``before`` on took no part."""
-    # How long it took is no part of what is stored: the same result has the same document.
-    kept = (
-        {**result, "mcm": {k: v for k, v in result["mcm"].items() if k != "seconds"}}
-        if "mcm" in result
-        else result
-    )
-    save_analysis(
-        db, kind_of("uncertainty", before), kept, method=method_of(method, before),
-        campaign=result["campaign"], run=result["run"], model=model.name, model_version=model.version,
-        seed=result["mcm"]["seed"] if "mcm" in result else None,
-    )  # fmt: skip

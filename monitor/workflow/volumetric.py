@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from monitor.discovery import Fit
 from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
 from monitor.records import Array, Campaign
@@ -18,9 +19,11 @@ from monitor.store import Database, StoredModel, save_analysis
 from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.campaign_parts import kind_of, method_of
+from monitor.workflow.evaluations import Evaluation, evaluation_of
 from monitor.workflow.known_errors import geometric_errors
 from monitor.workflow.models import label
-from monitor.workflow.uncertainty import Evaluated, evaluate
+from monitor.workflow.uncertainty import evaluate
+from monitor.workflow.uncertainty_documents import statement
 
 Document = dict[str, Any]
 # Points along each axis: an error of a serial machine with straight axes bends with the square of the position at
@@ -37,7 +40,7 @@ class Mapped:
     which the grid was laid; ``left_out`` says which parameters the map does not know, and why.
     """
 
-    evaluated: Evaluated
+    evaluated: Evaluation
     known: GeometricErrors
     ranges: dict[str, tuple[float, float]]
     from_strokes: bool
@@ -72,13 +75,13 @@ def poses_of(chain: Chain, positions: Array) -> Array:
     return np.concatenate([at_zero, others])
 
 
-def map_of(found: Evaluated, points: int = POINTS, absolute: bool = False) -> Mapped:
+def map_of(found: Evaluation, fit: Fit, points: int = POINTS, absolute: bool = False) -> Mapped:
     """The volumetric error of one evaluated run on a grid of ``points`` along every linear axis at every rotary pose.
 
-    The workpiece's zero is set in the middle of the strokes with the rotary axes at zero, unless ``absolute``.
-    Raises DataError where the run determines no error.
+    ``fit`` is the evaluated model fitted to the campaign. The workpiece's zero is set in the middle of the strokes with
+    the rotary axes at zero, unless ``absolute``. Raises DataError where the run determines no error.
     """
-    known, left_out = geometric_errors(found)
+    known, left_out = geometric_errors(found, fit)
     if not known.names:
         raise DataError(
             f"run {found.run} of campaign {found.campaign.name} determines no geometric error; there is nothing to map"
@@ -112,7 +115,7 @@ def volumetric_map(
     found = evaluate(
         db, campaign, run, model=model, method="guf", p=p, model_uncertainty=model_uncertainty, before=before
     )
-    mapped = map_of(found, points, absolute)
+    mapped = map_of(evaluation_of(statement(found), found.campaign, found.model), found.fit, points, absolute)
     document = map_document(mapped, p)
     save_map(db, document, found.model, before)
     return document, mapped

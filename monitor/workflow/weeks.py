@@ -8,6 +8,9 @@ from datetime import date, datetime, time, timedelta
 
 from monitor.exceptions import InputError
 
+#: The calendar of Python ends with 9999-12-31, and a week's end is computed.
+LAST_YEAR = 9998
+
 
 @dataclass(frozen=True)
 class Week:
@@ -43,9 +46,9 @@ class Week:
 
 def week_named(text: str) -> Week:
     """The week of a name like ``2026-W10``. Raises InputError."""
-    found = re.fullmatch(r"(\d{4})-?W(\d{1,2})", text.strip().upper())
+    found = re.fullmatch(r"([0-9]{4})-?W([0-9]{1,2})", text.strip().upper())
     try:
-        if found is None:
+        if found is None or int(found[1]) > LAST_YEAR:
             raise ValueError
         return Week(date.fromisocalendar(int(found[1]), int(found[2]), 1))
     except ValueError:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import io
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -12,6 +14,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pypdf
 import pytest
+from by_path import load
+from scipy.stats import chi2, norm
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate import (
@@ -37,6 +41,8 @@ SCHEMAS = Path(
 #: The signature schema of the W3C, which the DCC's imports and this writer does not use: an element of any content.
 SIGNATURE = """<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" targetNamespace="http://www.w3.org/2000/09/xmldsig#">
 <xs:element name="Signature" type="xs:anyType"/></xs:schema>"""
+#: The writer as somebody uses it who has nothing but numbers of his own.
+EXAMPLE = load("write_dcc", Path(__file__).resolve().parents[2] / "examples" / "write_dcc.py")
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +88,7 @@ def test_ptb_dcc_3_2_1_schema_validates_every_part(record: CertificateRecord, ma
         dataclasses.replace(make_record(13, language="de", maps=1), country="DE", replaces=old),
         dataclasses.replace(make_record(30), country="FR"),
         dataclasses.replace(make_record(1), country="US"),
+        EXAMPLE.RECORD,
     ):
         schema.assertValid(etree.fromstring(dcc_xml(one)))
     broken = dcc_xml(record).replace(b"coverageFactor>", b"coverFactor>")
@@ -206,3 +213,30 @@ def test_d_si_2_1_the_volumetric_error_has_its_expanded_uncertainty(make_record:
 )
 def test_d_si_2_1_units(name: str, notation: str) -> None:
     assert unit_of(name) == notation
+
+
+def test_the_writer_alone_needs_no_database_and_draws_nothing(tmp_path: Path) -> None:
+    place = tmp_path / "own.dcc.xml"
+    code = (
+        "import runpy, sys\n"
+        f"sys.argv = ['write_dcc.py', {str(place)!r}]\n"
+        f"runpy.run_path({EXAMPLE.__file__!r}, run_name='__main__')\n"
+        "print([one for one in ('duckdb', 'weasyprint', 'matplotlib', 'scipy') if one in sys.modules])"
+    )
+    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert said.splitlines()[-1] == "[]"
+    tree = ET.parse(place).getroot()
+    assert tree.findtext(".//dcc:uniqueIdentifier", None, SPACES) == "K-2026-0042"
+    values = str(tree.findtext(".//si:valueXMLList", None, SPACES)).split()
+    np.testing.assert_allclose([float(one) for one in values], [12.4, -31.0], rtol=1e-14)
+    # JCGM 102:2011, 6.5: what the example states as factors of two outputs.
+    np.testing.assert_allclose(
+        (EXAMPLE.RESULT.k_p, EXAMPLE.RESULT.k_q), (chi2.ppf(0.95, 2) ** 0.5, norm.isf(0.0125)), atol=5e-3
+    )
+
+
+def test_software_without_a_release_is_no_software_of_a_dcc(make_record: Make) -> None:
+    made = dataclasses.replace(make_record(1), country="DE")
+    assert made.method is not None
+    with pytest.raises(InputError, match=r"names a program and its release; method\.software is 'own'"):
+        dcc_xml(dataclasses.replace(made, method=dataclasses.replace(made.method, software="own")))

@@ -180,7 +180,7 @@ def test_chinese_and_japanese_letters_are_drawn_with_a_font_that_is_given(
     [
         (".results { width: 230mm; }", "is off the page's text area"),
         (".results { width: 230mm; }", "ink in the right margin"),
-        ("dd { height: 1.2mm; overflow: hidden; }", "is not to be seen"),
+        ("dl > div { height: 1.2mm; overflow: hidden; }", "is not to be seen"),
         ("h1 { white-space: nowrap; overflow: hidden; width: 55mm; }", "'certificate' is not to be seen"),
         ("h2 { color: white; }", "is not to be seen"),
         (".statements dd { margin-left: -45mm; }", "stands on"),

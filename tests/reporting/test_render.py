@@ -231,6 +231,17 @@ def test_nothing_is_fetched_from_disk_or_network() -> None:
             )
 
 
+@pytest.mark.parametrize(
+    ("sign", "shown"), [("\u202e", r"U\+202E"), ("\x07", r"U\+0007"), ("\u2066", r"U\+2066")]
+)
+def test_signs_that_turn_what_is_read_are_refused_by_their_number(
+    make_record: Make, sign: str, shown: str
+) -> None:
+    record = dataclasses.replace(make_record(), place=f"hall {sign}12")
+    with pytest.raises(UnprintableError, match=f"not seen but change what is: {shown}; take them out"):
+        certificate_html(record)
+
+
 def test_a_name_that_the_template_lacks_is_an_error() -> None:
     with pytest.raises(UndefinedError, match="'record' is undefined"):
         html_of("certificate.html", {})

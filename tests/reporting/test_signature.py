@@ -136,3 +136,20 @@ def test_a_certificate_that_is_not_valid_today_does_not_sign(
         InputError, match=rf"Laboratory {name} is valid from .* not today .*; sign with one that is"
     ):
         sign(plain, FileKey(keys[name], "words"))
+
+
+def test_en_319_102_1_a_certificate_that_ended_since_is_valid_on_the_day_of_the_signature(
+    signed: bytes, keys: dict[str, Path]
+) -> None:
+    now = datetime.now(UTC)
+    assert check_signature(signed, keys["lab.pem"], now).good is True
+    late = check_signature(signed, keys["lab.pem"], now + timedelta(days=400))
+    assert late.good is False
+    (fault,) = late.faults
+    assert fault.startswith("the certificate of Common Name: Made-up Laboratory lab is valid from ")
+    assert fault.endswith(f", not on {now + timedelta(days=400):%Y-%m-%d}")
+    # Who signed is another question than when.
+    other = check_signature(signed, keys["other.pem"], now)
+    assert other.faults == (
+        "the certificate of Common Name: Made-up Laboratory lab does not lead to a trusted one",
+    )

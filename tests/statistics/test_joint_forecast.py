@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from monitor.exceptions import DataError
 from monitor.statistics import forecast, forecast_longest, residual_correlation, trend
+from monitor.statistics.joint_forecast import _chi_square
 
 WEEKS = np.arange(30) * 7.0
 
@@ -104,3 +106,10 @@ def test_refusals_say_what_is_needed():
         forecast_longest(*one, 1.0, 210.0, [10.0], rng=rng, horizon=300.0)
     with pytest.raises(DataError, match=r"horizon is 100\.0; it must lie after now, 210"):
         forecast_longest(*one, 1.0, 210.0, [], rng=rng, horizon=100.0)
+
+
+def test_chi_square_between_its_points_is_that_of_scipy():
+    dof = np.array([1.0, 1.5, 2.0, 3.7, 10.0, 38.2, 250.0, 1e4, 1e6])
+    for seed, count in ((1, 2), (2, 500), (3, 2000)):
+        u = np.random.default_rng(seed).uniform(size=count)
+        np.testing.assert_allclose(_chi_square(u, dof), stats.chi2.isf(u[:, np.newaxis], dof), rtol=1e-10)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 import statsmodels.api as sm
@@ -9,6 +11,7 @@ from scipy import stats
 
 from monitor.exceptions import DataError
 from monitor.statistics import mann_kendall, trend
+from monitor.statistics.monotone import _ranks
 
 
 def test_nist_strd_norris(strd, certified, digits):
@@ -154,3 +157,22 @@ def test_refusals_say_what_is_needed():
         mann_kendall(np.arange(6.0), [0, 1, 1, 2, 3, 4])
     with pytest.raises(DataError, match="at least 6 are needed"):
         mann_kendall(np.arange(3.0), np.arange(3.0))
+
+
+def test_without_ranks_the_line_is_the_same():
+    rng = np.random.default_rng(8)
+    day = np.repeat(np.arange(20), 3)
+    t = day + np.tile([0.0, 0.1, 0.2], 20)
+    y, u = 0.1 * t + rng.normal(size=60), rng.uniform(0.5, 1.0, 60)
+    whole, line = (trend(y, t, u=u, days=day, robust=robust) for robust in (True, False))
+    assert np.isnan(line.robust_slope)
+    assert (line.robust_interval, line.monotone) == (None, None)
+    ranked = {"robust_slope", "robust_interval", "monotone", "covariance"}
+    for field in {field.name for field in fields(whole)} - ranked:
+        assert getattr(whole, field) == getattr(line, field), field
+    assert np.array_equal(whole.covariance, line.covariance)
+
+
+def test_ranks_share_ties_as_those_of_scipy():
+    values = np.random.default_rng(9).integers(0, 12, 40).astype(float)
+    assert np.array_equal(_ranks(values), stats.rankdata(values))

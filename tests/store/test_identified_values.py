@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
+import duckdb
 import numpy as np
 import pytest
 
@@ -12,9 +14,11 @@ from monitor.store import (
     Database,
     StoredIdentification,
     import_campaign,
+    migrations,
     save_identification,
     verify_audit,
 )
+from monitor.store.gathering import gather
 from monitor.store.identified_values import gather_values, values_of
 from monitor.store.migrations import available
 
@@ -56,6 +60,30 @@ def test_the_migrations_make_it_from_the_rows(filled: Database) -> None:
     filled.execute(history[history.index("CREATE TABLE identified_values") :])
     filled.execute(by_parameter)
     assert verify_audit(filled).ok
+
+
+@pytest.mark.parametrize("portion", [1, 2, 20_000])
+def test_a_database_of_before_is_filled_by_portions(monkeypatch: pytest.MonkeyPatch, portion: int) -> None:
+    monkeypatch.setattr(migrations.gathering, "gather", partial(gather, portion=portion))
+    with duckdb.connect() as connection:
+        migrations.migrate(connection, available()[:6])
+        connection.execute(
+            "INSERT INTO identification SELECT i, i, 'samba', 1, 'samba', ['Z', 'A'], ['µm', 'µm'], [1e-3, 1e-3], 2, "
+            "'0', TIMESTAMP '2026-01-01' FROM range(1, 6) AS r(i) WHERE i <> 3"
+        )
+        # Runs and parameters in another order than theirs; the second parameter of run 7 was refused.
+        connection.execute(
+            "INSERT INTO parameter_value SELECT i, run, parameter, CASE WHEN run < 7 OR parameter = 'Z' "
+            "THEN i + run / 100 + ascii(parameter) END, i / 10, 'µm', 1e-3 "
+            "FROM range(1, 6) AS r(i), (VALUES (7), (2)) AS s(run), (VALUES ('A'), ('Z')) AS p(parameter) WHERE i <> 3"
+        )
+        migrations.migrate(connection, available())
+        rows = connection.execute("SELECT * FROM identified_values ORDER BY identification_id").fetchall()
+    z, a = ord("Z"), ord("A")
+    assert rows == [
+        (i, [2, 7], [[i + 0.02 + z, i + 0.07 + z], [i + 0.02 + a, None]], [[i / 10] * 2] * 2)
+        for i in (1, 2, 4, 5)
+    ]
 
 
 def test_the_history_of_a_machine_is_found_by_indices(db: Database) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -34,6 +35,7 @@ from monitor.store import (
     verify_audit,
     withdraw_campaign,
 )
+from monitor.store.catalogue import campaigns_of_machine
 
 
 @pytest.fixture
@@ -62,7 +64,8 @@ def test_a_withdrawn_campaign_counts_nowhere(
     )  # fmt: skip
     assert list(list_campaigns(filled)["campaign"]) == ["two"]
     assert set(machine_history(filled, machine).campaign) == {"two"}
-    assert latest_documents(filled, "uncertainty", machine) == {"two": {"of": "two"}}
+    campaigns = machine_history(filled, machine).campaigns
+    assert latest_documents(filled, "uncertainty", campaigns) == {"two": {"of": "two"}}
     for view in ("v_runs", "v_probings", "v_parameters", "v_residuals", "v_identifications", "v_analyses",
                  "v_tolerances", "v_import_notes"):  # fmt: skip
         assert {name for (name,) in filled.rows(f"SELECT DISTINCT campaign FROM {view}")} == {"two"}, view
@@ -146,6 +149,42 @@ def test_a_machine_with_an_event_stays(filled: Database, make_campaign: Callable
         withdraw_campaign(filled, name, "wrong")
     assert list(list_machines(filled)["machine"]) == [machine]
     assert len(machine_history(filled, machine).run) == 0
+
+
+def test_the_campaigns_of_a_machine_are_those_of_the_view(
+    filled: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    machine = make_campaign("one").machine.id
+    import_campaign(filled, make_campaign("three", machine_id="other"))
+    withdraw_campaign(filled, "one", "wrong file")
+    import_campaign(filled, make_campaign("one", location="hall 4"))
+    withdraw_campaign(filled, "three", "wrong machine")
+    import_campaign(filled, make_campaign("four", machine_id="other"))
+    for name in (machine, "other"):
+        right = filled.rows(
+            "SELECT campaign_id, campaign, method FROM campaign WHERE machine = ? ORDER BY campaign_id",
+            [name],
+        )
+        found = campaigns_of_machine(filled, name)
+        assert [(number, *head) for number, head in found.items()] == right
+        assert machine_history(filled, name).campaigns == {number: name for number, name, _ in right}
+    assert [name for name, _ in campaigns_of_machine(filled, machine).values()] == ["two", "one"]
+
+
+def test_a_machine_whose_campaigns_are_all_withdrawn_is_none(
+    filled: Database, make_campaign: Callable[..., Campaign]
+) -> None:
+    machine = make_campaign("one").machine.id
+    import_campaign(filled, make_campaign("three", machine_id="other"))
+    for name in ("one", "two"):
+        withdraw_campaign(filled, name, "wrong")
+    refusal = re.escape(f"there is no machine {machine!r}; there are other")
+    with pytest.raises(NotFoundError, match=refusal):
+        machine_history(filled, machine)
+    with pytest.raises(NotFoundError, match=refusal):
+        save_analysis(filled, "trend", {}, method="all", machine=machine)
+    with pytest.raises(NotFoundError, match=refusal):
+        record_event(filled, machine, datetime(2026, 1, 1, tzinfo=UTC), "crash", "x")
 
 
 def test_its_certificates_stay_and_can_be_withdrawn(filled: Database) -> None:

@@ -24,12 +24,18 @@ from monitor.store import Database, import_campaign, load_certificate
 from monitor.workflow.certificate_checks import remake
 from monitor.workflow.certificate_results import results_of, stored_monte_carlo
 from monitor.workflow.certificates import issue
-from monitor.workflow.uncertainty import evaluate, uncertainty
+from monitor.workflow.evaluations import Evaluation, evaluation_of
+from monitor.workflow.uncertainty import Evaluated, evaluate, uncertainty
+from monitor.workflow.uncertainty_documents import document
 from monitor.workflow.volumetric import volumetric_map
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
 DAY = date(2026, 3, 12)
+
+
+def stated(found: Evaluated) -> Evaluation:
+    return evaluation_of(document(found), found.campaign, found.model)
 
 
 @pytest.fixture(scope="module")
@@ -60,9 +66,9 @@ def test_jcgm_102_7_a_monte_carlo_result_is_certified_only_from_what_is_stored(
     # Another probability is another result: it is not taken.
     uncertainty(db, "five-days", 20, method="mcm", seed=3, digits=1, p=0.9)
     found = evaluate(db, "five-days", 20, method="guf")
-    assert stored_monte_carlo(db, found) is None
+    assert stored_monte_carlo(db, stated(found)) is None
     kept = uncertainty(db, "five-days", 20, method="both", seed=4, digits=1)
-    stored = stored_monte_carlo(db, found)
+    stored = stored_monte_carlo(db, stated(found))
     assert stored is not None
     assert (stored.trials, stored.seed) == (kept["mcm"]["trials"], 4)
     made = issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="M-1", issued_on=DAY, method="mcm")
@@ -84,9 +90,9 @@ def test_jcgm_102_7_a_monte_carlo_result_is_certified_only_from_what_is_stored(
 def test_jcgm_102_8_the_verdict_of_the_validation_is_printed_beside_the_framework(db: Database) -> None:
     found = evaluate(db, "five-days", 20, method="guf")
     kept = uncertainty(db, "five-days", 20, method="both", seed=5, digits=1)
-    stored = stored_monte_carlo(db, found)
+    stored = stored_monte_carlo(db, stated(found))
     assert stored is not None
-    result = results_of(found, texts_of(), stored)
+    result = results_of(stated(found), texts_of(), stored)
     assert (
         f"compared with a Monte Carlo of {stored.trials} trials, seed 5 (JCGM 102:2011, 8): "
         in result.evaluation

@@ -20,6 +20,7 @@ from monitor.reporting.dcc import dcc_xml
 from monitor.reporting.dcc_results import DCC
 from monitor.reporting.documents import from_document
 from monitor.reporting.render import certificate_pdf
+from monitor.reporting.signature import SignatureFinding, check_signature
 from monitor.reporting.signing import FileKey, sign
 from monitor.store import Database, import_campaign, list_certificates, load_certificate
 from monitor.workflow import certificates
@@ -178,6 +179,25 @@ def test_17025_7_8_8_3_an_amended_certificate_has_a_new_number_the_reason_and_na
         InputError, match="campaign other is of machine M, certificate A-2 of HU40-T: it cannot"
     ):
         issue(db, "other", 20, LABORATORY, out=tmp_path, issued_on=DAY, replaces="A-2", reason="x")
+
+
+def test_a_signature_is_judged_on_the_day_on_which_the_database_received_it(
+    db: Database, key: FileKey, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="S-2", issued_on=DAY, key=key)
+    file = Path(made["file"])
+    asked: list[datetime | None] = []
+
+    def noted(pdf: bytes, trusted: Path | None, at: datetime | None) -> SignatureFinding:
+        asked.append(at)
+        return check_signature(pdf, trusted, at)
+
+    monkeypatch.setattr("monitor.workflow.certificate_checks.check_signature", noted)
+    assert verify(db, file)["ok"] is True
+    file.write_bytes(file.read_bytes() + b"x")
+    assert verify(db, file)["ok"] is False
+    # A file that is not the stored one was never seen here: it is judged as of now.
+    assert asked == [load_certificate(db, "S-2").made_at.replace(tzinfo=UTC), None]
 
 
 class Killed(BaseException):

@@ -26,13 +26,19 @@ from monitor.workflow.certificate_checks import digital, remake
 from monitor.workflow.certificate_results import results_of
 from monitor.workflow.certificates import issue
 from monitor.workflow.conformity import statement_of
+from monitor.workflow.evaluations import Evaluation, evaluation_of
 from monitor.workflow.uncertainty import Evaluated, evaluate
+from monitor.workflow.uncertainty_documents import document
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
 #: Run 20 of the example: EX0C is far outside, EXX inside by less than U, EA0B inside by more.
 LIMITS = {"EX0C": 20.0, "EXX": 60.0, "EA0B": 60.0}
 DAY = date(2026, 3, 12)
+
+
+def as_stated(found: Evaluated) -> Evaluation:
+    return evaluation_of(document(found), found.campaign, found.model)
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +116,7 @@ def test_iso_19005_3_6_8_every_attached_file_stands_once_in_af_with_its_relation
 def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, found: Evaluated) -> None:
     attached = pypdf.PdfReader(guarded).attachments
     rows = list(csv.DictReader(io.StringIO(attached["results-1.csv"][0].decode())))
-    result = results_of(found, texts_of())
+    result = results_of(as_stated(found), texts_of())
     assert [row["parameter"] for row in rows] == list(result.names)
     assert [float(row["estimate"]) for row in rows] == result.estimate.tolist()
     assert [float(row["standard_uncertainty"]) for row in rows] == result.u.tolist()
@@ -137,7 +143,7 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: Evaluated) -> None:
     expanded = [
         unit.to_display(float(guf.expanded[place])) for unit, place in zip(units, places, strict=True)
     ]
-    result, english = results_of(found, texts_of()), texts_of()
+    result, english = results_of(as_stated(found), texts_of()), texts_of()
 
     def stated(rule: str) -> ConformityStatement:
         return statement_of(result, rule, english, campaign="limited", dof=guf.dof)

@@ -177,6 +177,31 @@ def test_a_week_without_runs_says_so(fleet: Database, tmp_path: Path) -> None:
     assert "No machine was measured in this week." in text_of(found["files"][1])[0]
 
 
+def test_a_machine_left_in_alarm_and_not_measured_since_is_told_so(fleet: Database, tmp_path: Path) -> None:
+    late = datetime.fromisoformat("2026-03-24T06:00:00+00:00")
+    (before,) = report(fleet, "2026-W11", "A quiet one", tmp_path, made_at=late)["machines"]
+    assert before["state"] == "out of tolerance"
+    (row,) = report(fleet, "2026-W12", "A quiet one", tmp_path, made_at=late)["machines"]
+    assert row["state"] == "not measured"
+    assert row["changed"].endswith("(campaign-A quiet one), when it was reported as: out of tolerance")
+
+
+def test_a_week_to_come_is_refused_and_one_that_runs_says_so(fleet: Database, tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match="--week 2026-W12 begins on 2026-03-16, and today is 2026-03-09: nothing can"
+    ):
+        report(fleet, "2026-W12", out=tmp_path, made_at=MADE)
+    with pytest.raises(InputError, match="9999-W52: write a year and a week"):
+        report(fleet, "9999-W52", out=tmp_path, made_at=MADE)
+    assert list(tmp_path.iterdir()) == []
+    running = report(fleet, "2026-W11", "A quiet one", tmp_path, made_at=MADE)
+    assert running["ended"] is False
+    assert "The week has not ended yet." in text_of(running["files"][1])[0]
+    ended = report(fleet, "2026-W10", "A quiet one", tmp_path, made_at=MADE)
+    assert ended["ended"] is True
+    assert "has not ended" not in text_of(ended["files"][1])[0]
+
+
 def test_the_same_records_give_the_same_bytes(fleet: Database, week10: dict, tmp_path: Path) -> None:
     again = report(fleet, "2026-W10", out=tmp_path, made_at=MADE)
     for before, after in zip(week10["files"], again["files"], strict=True):

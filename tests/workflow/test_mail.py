@@ -100,6 +100,7 @@ def document(tmp_path: Path) -> Callable[..., dict[str, Any]]:
         }  # fmt: skip
         return {
             "week": "2026-W10", "from": "2026-03-02", "to": "2026-03-08", "machines": [row], "alarms": alarms,
+            "measured": 1,
             "message": "", "files": [str(tmp_path / "health-2026-W10.html"), str(pdf)],
         }  # fmt: skip
 
@@ -216,3 +217,30 @@ def test_the_example_is_a_configuration_and_the_units_type_verbs_that_exist() ->
         options = parse(line.split())
         assert options.fail_on_alarm
         assert str(options.mail) == "/etc/monitor/mail.toml"
+
+
+def test_no_line_is_slipped_into_the_head_of_the_message(tmp_path: Path) -> None:
+    path = tmp_path / "mail.toml"
+    path.write_text('[mail]\nserver = " "\nport = 99999\nfrom = "a@b.c"\nto = ["x@y.z\\nBcc: q@r.s"]\n')
+    with pytest.raises(InputError, match="was refused") as refused:
+        read_mail_settings(path)
+    for words in (
+        "port is a number from 1 to 65535, not 99999", "server is one line of visible letters, not ' '",
+        r"to is one line of visible letters, not 'x@y.z\nBcc: q@r.s'",
+    ):  # fmt: skip
+        assert words in str(refused.value)
+
+
+def test_a_week_in_which_nothing_was_measured_is_not_told_as_quiet(
+    document: Callable[..., Any], tmp_path: Path
+) -> None:
+    found = {**document([], b""), "measured": 0}
+    message = message_of(read_mail_settings(settings(tmp_path, 25)), found)
+    assert message["Subject"] == "Machine health 2026-W10: no machine was measured"
+
+
+def test_a_server_that_cannot_be_a_name_is_told(document: Callable[..., Any], tmp_path: Path) -> None:
+    path = settings(tmp_path, 25)
+    path.write_text(re.sub('server = ".*?"', f'server = "{"a" * 300}"', path.read_text()))
+    with pytest.raises(InputError, match="could not be used"):
+        mail_report(path, document([]))

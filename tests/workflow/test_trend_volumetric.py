@@ -17,9 +17,11 @@ from monitor.store import Database
 from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.campaigns import import_folders
+from monitor.workflow.evaluations import evaluation_of
 from monitor.workflow.identification import identify
 from monitor.workflow.trends import Choice, trends
 from monitor.workflow.uncertainty import evaluate
+from monitor.workflow.uncertainty_documents import document
 from monitor.workflow.volumetric import geometric_errors, poses_of, ranges_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -96,7 +98,9 @@ def test_the_date_is_that_of_the_exact_chain_at_the_extrapolated_parameters(db: 
     assert ahead["held"] == []
     # The other way: the whole grid through the exact chain, for parameters on their lines, and the root of the limit.
     evaluated = evaluate(db, "cold-cold", method="guf", model_uncertainty=False)
-    known, _ = geometric_errors(evaluated)
+    known, _ = geometric_errors(
+        evaluation_of(document(evaluated), evaluated.campaign, evaluated.model), evaluated.fit
+    )
     ranges, _ = ranges_of(evaluated.campaign, known.chain)
     points = grid(known.chain, ranges, 7, poses_of(known.chain, known.context.positions))
     units = {name: FACTOR[one["unit"]] for name, one in found.document["parameters"].items()}

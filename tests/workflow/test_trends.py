@@ -14,12 +14,15 @@ import pytest
 from monitor.cli import main
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
+from monitor.statistics import find_changes
 from monitor.store import Database, import_campaign, load_analysis, machine_history, record_event
 from monitor.store.identified_values import gather_values
+from monitor.workflow.change_search import search_changes
 from monitor.workflow.fleet import fleet
 from monitor.workflow.runs_statistics import stats
 from monitor.workflow.selections import select, side_by_side
 from monitor.workflow.trend_figures import headline, trend_figures
+from monitor.workflow.trend_parameter import Series
 from monitor.workflow.trends import Choice, trends
 from monitor.workflow.uncertainty import uncertainty
 
@@ -322,3 +325,25 @@ def test_a_headline_states_the_uncertainty_by_name_and_no_power_of_ten() -> None
     assert line == "EB0C: changed by +12350 µrad (u = 950 µrad) on 2026-03-05"
     slope = {"changes": [], "slope_per_year": -2960.0, "u_slope": 166.0, "unit": "µm", "p_value": 0.5}
     assert headline("EXX", slope) == "EXX: −2960 µm a year (u = 170 µm a year), no drift seen"
+
+
+def test_parameters_that_were_measured_together_share_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(12)
+    days = np.repeat(np.arange(20), 3)
+    t = 7.0 * days + np.tile([0.3, 0.4, 0.5], 20)
+    weighs = rng.uniform(0.5, 2.0, 60)
+
+    def series(name: str, u: np.ndarray) -> Series:
+        return Series(name, "µm", rng.normal(size=60), u, t, days, t % 1.0 * 24.0, timedelta())
+
+    every = [series("A", 0.3 * weighs), series("B", 0.07 * weighs), series("C", np.full(60, 0.1))]
+    asked = []
+
+    def counted(values, *args, **options):
+        asked.append(sorted(values))
+        return find_changes(values, *args, **options)
+
+    monkeypatch.setattr("monitor.workflow.change_search.find_changes", counted)
+    found = search_changes(every, [], false_alarm=0.05, seed=1)
+    assert asked == [["A", "B"], ["C"]]
+    assert list(found) == ["A", "B", "C"]
