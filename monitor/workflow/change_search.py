@@ -78,7 +78,10 @@ def _relative(u: Array) -> Array:
 
 
 class _Plan(NamedTuple):
-    """What is searched at once; ``days`` are None where the values are means of days, ``u`` where all weigh alike."""
+    """What is searched at once; ``days`` are None where the values are means of days.
+
+    ``u`` are of the parameters whose runs weigh differently.
+    """
 
     t: Array
     begins: Array
