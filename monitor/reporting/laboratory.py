@@ -177,16 +177,26 @@ def _answer(name: str, value: Any, faults: list[str]) -> Any:
     elif name == "item.received_on":
         if isinstance(value, date) and not isinstance(value, datetime):
             return value
-        faults.append(f"{name} is a date without quotes, for example 2026-03-02, but is {value!r}")
+        faults.append(f"{name} is a date without quotes, for example 2026-03-02, but is {_shown(value)}")
     elif name == "laboratory.language":
         if value in languages():
             return value
         faults.append(f"{name} is one of {', '.join(languages())}, but is {value!r}")
+    elif (
+        name in ("laboratory.accreditation", "laboratory.country")
+        and isinstance(value, str)
+        and not value.strip()
+    ):
+        faults.append(f"{name} is blank; leave the line out where there is none")
     elif isinstance(value, str):
         return value
     else:
         faults.append(f"{name} is a text in quotes, but is {value!r}")
     return None
+
+
+def _shown(value: object) -> str:
+    return value.isoformat() if isinstance(value, datetime) else repr(value)
 
 
 def _party(section: str, found: Mapping[str, Any]) -> Party | None:

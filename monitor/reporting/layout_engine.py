@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes.util
 import sys
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -34,9 +35,28 @@ def _by_the_loader_alone() -> Iterator[None]:
 
 
 with _by_the_loader_alone():
+    import fontTools
+    import pydyf
+    import pyphen
+    import weasyprint
     from weasyprint import HTML, Attachment
+    from weasyprint.text.ffi import pango
     from weasyprint.text.fonts import FontConfiguration
     from weasyprint.urls import FatalURLFetchingError, URLFetcher, URLFetcherResponse
+
+
+def engine_versions() -> dict[str, str]:
+    """What decides the bytes of a page besides its content: another version may break or compress otherwise."""
+    number = int(pango.pango_version())
+    return {
+        "weasyprint": weasyprint.__version__,
+        "pydyf": pydyf.__version__,
+        "fonttools": fontTools.version,
+        "pyphen": pyphen.__version__,
+        "pango": f"{number // 10000}.{number // 100 % 100}.{number % 100}",
+        "zlib": zlib.ZLIB_RUNTIME_VERSION,
+    }
+
 
 __all__ = [
     "HTML",
@@ -45,4 +65,5 @@ __all__ = [
     "FontConfiguration",
     "URLFetcher",
     "URLFetcherResponse",
+    "engine_versions",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.certificate import CertificateRecord
 from monitor.reporting.dcc import dcc_xml
 from monitor.reporting.documents import from_document
+from monitor.reporting.layout_engine import engine_versions
 from monitor.reporting.render import certificate_pdf
 from monitor.reporting.signature import SignatureFinding, check_signature, is_signed
 from monitor.store import (
@@ -76,14 +77,27 @@ def remake(db: Database, number: str, path: Path | None = None, fonts: Sequence[
     found = {**summary(db, number), "identical": same, "signed": signed, "file": None}
     if not same:
         found["why"] = (
-            f"it was issued with {stored.software_version} of this software, this is {__version__}; the stored "
-            "document is unchanged where `monitor verify` says so"
+            f"{_why_another(stored, inputs)}; the stored document is unchanged where `monitor verify` says so"
         )
     if path is not None:
         target = path_of(path, number)
         write_file(target, pdf)
         found["file"] = str(target)
     return found
+
+
+def _why_another(stored: StoredCertificate, inputs: Mapping[str, Any]) -> str:
+    """What is another than when a document was made: this software, or what lays out its pages."""
+    then = {"this software": stored.software_version, **inputs.get("page_made_by", {})}
+    here = {"this software": __version__, **engine_versions()}
+    others = [
+        f"{name} {then[name]} (here {here[name]})"
+        for name in then
+        if here.get(name, then[name]) != then[name]
+    ]
+    if others:
+        return f"it was made with {', '.join(others)}"
+    return f"it was made with the same {stored.software_version} of this software, but with other templates or texts"
 
 
 def digital(db: Database, number: str, path: Path) -> Document:

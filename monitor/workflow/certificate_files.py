@@ -29,10 +29,18 @@ def font_hashes(fonts: Sequence[Path]) -> list[dict[str, str]]:
 
 
 def keep_issued(db: Database, path: Path) -> None:
-    """Refuse to write over the file of an issued certificate."""
-    there = (
-        None if not path.is_file() else find_certificate(db, hashlib.sha256(path.read_bytes()).hexdigest())
-    )
+    """Refuse to write over the file of an issued certificate, of this database or of another, or over anything else.
+
+    What may be written over: a draft of this database, and an empty file.
+    """
+    if not path.is_file():
+        return
+    content = path.read_bytes()
+    there = find_certificate(db, hashlib.sha256(content).hexdigest())
+    if there is None and content:
+        raise InputError(
+            f"{path} is there already, and no draft of this database: name another file, or remove it"
+        )
     if there is not None and load_certificate(db, there).state != "draft":
         raise InputError(f"{path} is certificate {there}; name another file")
 

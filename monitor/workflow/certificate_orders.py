@@ -12,8 +12,8 @@ from monitor.reporting.certificate import NotApplicable, Replaced
 from monitor.reporting.laboratory import LaboratoryFile
 from monitor.store import Database, certificate_numbers, load_certificate
 
-#: The texts of the two states of a machine that a certificate may describe (ISO/IEC 17025:2017, 7.8.4.1 d).
-AS_FOUND, AS_LEFT = "record.as_found", "record.as_left"
+#: The two states of a machine that a certificate may describe (ISO/IEC 17025:2017, 7.8.4.1 d).
+AS_FOUND, AS_LEFT = "as found", "as left"
 #: A number stands in a line on every page, in a file's name and in other certificates.
 _LONGEST_NUMBER = 60
 
@@ -24,6 +24,11 @@ class Measured:
 
     run: int
     state: str
+
+    @property
+    def text(self) -> str:
+        """The key of its state among the texts."""
+        return f"record.{self.state.replace(' ', '_')}"
 
 
 def next_number(db: Database, year: int) -> str:

@@ -9,8 +9,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Literal
 
-from monitor import __version__
-from monitor.records import Campaign, LinearAxes
+from monitor.records import LinearAxes
 from monitor.reporting.assembly import certificate_record
 from monitor.reporting.certificate import CertificateRecord
 from monitor.reporting.documents import to_document
@@ -22,16 +21,14 @@ from monitor.reporting.texts import ENGLISH, texts_of
 from monitor.reporting.volumetric_result import VolumetricResult
 from monitor.store import (
     Database,
-    StoredModel,
     load_campaign,
     load_certificate,
     mark_certificate,
     save_certificate,
 )
 from monitor.workflow.certificate_checks import summary
-from monitor.workflow.certificate_files import font_hashes, keep_issued, path_of, prepared, publish
+from monitor.workflow.certificate_files import keep_issued, path_of, prepared, publish
 from monitor.workflow.certificate_orders import (
-    Measured,
     check_adjustment,
     check_day,
     check_number,
@@ -40,9 +37,9 @@ from monitor.workflow.certificate_orders import (
     replaced_by,
     runs_of,
 )
-from monitor.workflow.certificate_results import StoredMonteCarlo, results_of, stored_monte_carlo
+from monitor.workflow.certificate_parts import Part, inputs_of, part_of
+from monitor.workflow.certificate_results import results_of
 from monitor.workflow.conformity import statement_of
-from monitor.workflow.evaluations import Evaluation, evaluation_of, stored_evaluation
 from monitor.workflow.models import label, resolve
 
 Document = dict[str, Any]
@@ -108,10 +105,10 @@ def issue(
     path = path_of(out, chosen)
     keep_issued(db, path)
     model = resolve(db, wanted.model, loaded.method)
-    parts = [_part(db, loaded, model, one, wanted) for one in measured]
+    parts = [part_of(db, loaded, model, one, wanted.linear_axes) for one in measured]
     record = _record(stated, parts, wanted, number=chosen, issued_on=day)
     record = dataclasses.replace(record, replaces=replaced)
-    inputs = _inputs(parts, wanted)
+    inputs = inputs_of(parts, wanted.linear_axes, wanted.fonts)
     pdf = certificate_pdf(record, wanted.fonts, inputs)
     if wanted.key is not None:
         pdf = sign(pdf, wanted.key)
@@ -137,42 +134,12 @@ def today() -> date:
     return date.today()
 
 
-@dataclass(frozen=True)
-class _Part:
-    """A certified run: which state of the machine, its evaluation, the Monte Carlo result stored of it."""
-
-    measured: Measured
-    found: Evaluation
-    monte_carlo: StoredMonteCarlo | None
-
-
-def _part(db: Database, campaign: Campaign, model: StoredModel, measured: Measured, wanted: Wishes) -> _Part:
-    found = stored_evaluation(db, campaign, measured.run, model, wanted.linear_axes)
-    if found is None:
-        found = _evaluated(db, campaign, model, measured.run, wanted.linear_axes)
-    return _Part(measured, found, stored_monte_carlo(db, found))
-
-
-def _evaluated(
-    db: Database, campaign: Campaign, model: StoredModel, run: int, linear_axes: LinearAxes | None
-) -> Evaluation:
-    """The evaluation of a run that has none in the database."""
-    # Solver and compiler take a second to load, for which a stored result need not wait.
-    from monitor.workflow.uncertainty import evaluate
-    from monitor.workflow.uncertainty_documents import statement
-
-    done = evaluate(
-        db, campaign.name, run, model=f"{model.name}@{model.version}", method="guf", linear_axes=linear_axes
-    )
-    return evaluation_of(statement(done), campaign, model)
-
-
 def _record(
-    stated: LaboratoryFile, parts: Sequence[_Part], wanted: Wishes, *, number: str, issued_on: date
+    stated: LaboratoryFile, parts: Sequence[Part], wanted: Wishes, *, number: str, issued_on: date
 ) -> CertificateRecord:
     texts = texts_of(stated.language or ENGLISH)
     results = [
-        results_of(one.found, texts, one.monte_carlo, wanted.method, state=texts(one.measured.state))
+        results_of(one.found, texts, one.monte_carlo, wanted.method, state=texts(one.measured.text))
         for one in parts
     ]
     last = parts[-1].found
@@ -197,44 +164,11 @@ def _record(
     return record
 
 
-def _maps(parts: Sequence[_Part], results: Sequence[ResultSet]) -> list[VolumetricResult]:
+def _maps(parts: Sequence[Part], results: Sequence[ResultSet]) -> list[VolumetricResult]:
     # Loaded here: a certificate without a map waits for no solver.
     from monitor.workflow.certificate_map import volumetric_result
 
     return [volumetric_result(one.found, result.state) for one, result in zip(parts, results, strict=True)]
-
-
-def _inputs(parts: Sequence[_Part], wanted: Wishes) -> Document:
-    """What the results were computed from: kept with the certificate and inside its PDF."""
-    first = parts[0]
-    inputs = {
-        "campaign": first.found.campaign.name,
-        **_own(first),
-        "files": [{"name": file.name, "sha256": file.sha256} for file in first.found.campaign.files],
-        "model": label(first.found.model),
-        "model_effects": list(first.found.model.effects),
-        "software": f"machine-health-monitor {__version__}",
-        "fonts": font_hashes(wanted.fonts),
-        "states": [one.measured.state for one in parts],
-    }
-    if len(parts) > 1:
-        inputs["as_left"] = _own(parts[1])
-    if wanted.linear_axes is not None:
-        inputs["linear_axes_mm"] = dataclasses.asdict(wanted.linear_axes)
-    return inputs
-
-
-def _own(part: _Part) -> Document:
-    """What belongs to one run alone."""
-    monte_carlo = part.monte_carlo
-    return {
-        "run": part.measured.run,
-        # The GUM framework draws no random numbers; the Monte Carlo that it was compared with does.
-        "seed": None if monte_carlo is None else monte_carlo.seed,
-        # Numbers in v_analyses; None for an evaluation that was made for the certificate.
-        "stored_result": part.found.number,
-        "stored_monte_carlo": None if monte_carlo is None else monte_carlo.number,
-    }
 
 
 def amend(

@@ -127,6 +127,31 @@ def test_the_file_of_an_issued_certificate_is_not_written_over(
     assert Path("mine.pdf").read_bytes() == issued.file("2026-0001").read_bytes()
 
 
+def test_a_file_that_nobody_knows_is_not_written_over(
+    typed: Any, issued: Any, db: Path, laboratory: Path
+) -> None:
+    """Two databases in one folder both count from 0001: the second may not take the place of the first's."""
+    shutil.copyfile(issued.file("2026-0001"), "certificate-2026-0001.pdf")
+    issue = [
+        "certificate",
+        "issue",
+        "cold-cold",
+        "--run",
+        3,
+        "--laboratory",
+        laboratory,
+        "--date",
+        "2026-03-10",
+    ]
+    answer = typed(*issue, db=db)
+    assert answer.status == 2
+    assert "certificate-2026-0001.pdf is there already, and no draft of this database" in answer.err
+    assert Path("certificate-2026-0001.pdf").read_bytes() == issued.file("2026-0001").read_bytes()
+    assert typed("certificate", "show", db=db).out == "no certificate was made yet\n"
+    Path("empty.pdf").touch()  # as mktemp makes it
+    assert typed(*issue, "--out", "empty.pdf", db=db).status == 0
+
+
 @pytest.mark.parametrize("out", ["text", "text/x.pdf"])
 def test_a_file_that_cannot_be_written_leaves_no_certificate(
     typed: Any, db: Path, laboratory: Path, out: str

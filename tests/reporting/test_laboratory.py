@@ -106,6 +106,26 @@ def test_all_faults_are_listed_together(tmp_path: Path) -> None:
     ]
 
 
+def test_a_moment_is_no_day_and_what_may_be_left_out_is_not_left_blank(tmp_path: Path) -> None:
+    place = written(
+        tmp_path,
+        """
+        [laboratory]
+        accreditation = " "
+        country = ""
+        [item]
+        received_on = 2026-03-01T08:00:00
+        """,
+    )
+    with pytest.raises(InputError, match="was refused") as caught:
+        read_laboratory(place)
+    assert [line.strip() for line in str(caught.value).splitlines()[1:]] == [
+        "laboratory.accreditation is blank; leave the line out where there is none",
+        "laboratory.country is blank; leave the line out where there is none",
+        "item.received_on is a date without quotes, for example 2026-03-02, but is 2026-03-01T08:00:00",
+    ]
+
+
 def test_a_file_that_cannot_be_read_is_refused_in_words(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"nowhere\.toml cannot be read: No such file"):
         read_laboratory(tmp_path / "nowhere.toml")

@@ -150,3 +150,26 @@ def test_threads_share_a_database_as_if_one_after_the_other(
     assert (states.count("imported"), states.count("unchanged")) == (12, 12)
     assert sorted(list_campaigns(db)["campaign"]) == sorted(names)
     assert verify_audit(db).faults == ()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the limit of a file's size is POSIX's")
+@pytest.mark.parametrize("rows", [2_000, 200_000])
+def test_a_disk_that_is_full_is_told_in_words_and_nothing_is_kept(tmp_path: Path, rows: int) -> None:
+    """The log and, with more rows, the file itself find no room when the transaction ends."""
+    code = f"""
+import resource, sys
+from monitor.exceptions import StoreError
+from monitor.store import Database
+with Database(sys.argv[1]) as db:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (65536, resource.RLIM_INFINITY))
+    try:
+        with db.transaction():
+            db.execute("CREATE TABLE large AS SELECT md5(range::text) AS a FROM range({rows})")
+    except StoreError as error:
+        print(error)
+"""
+    path = tmp_path / "full.duckdb"
+    said = subprocess.run([sys.executable, "-c", code, str(path)], check=True, capture_output=True, text=True)
+    assert f"{path} could not be written, nothing was kept: " in said.stdout
+    with Database(path) as db:
+        assert db.rows("SELECT count(*) FROM information_schema.tables WHERE table_name = 'large'") == [(0,)]

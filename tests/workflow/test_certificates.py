@@ -20,6 +20,7 @@ from monitor.exceptions import InputError
 from monitor.readers import read_campaign
 from monitor.reporting.certificate import CertificateRecord, ConformityStatement
 from monitor.reporting.documents import from_document, to_document
+from monitor.reporting.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
 from monitor.workflow.certificate_checks import digital, remake
@@ -198,7 +199,10 @@ def test_remake_says_when_the_stored_document_is_another(
     )
     again = remake(db, "G-1")
     assert again["identical"] is False
-    assert "it was issued with" in again["why"]
+    assert "it was made with the same" in again["why"]
+    made_with = {**engine_versions(), "pango": "1.0.0"}
+    monkeypatch.setattr("monitor.workflow.certificate_checks.engine_versions", lambda: made_with)
+    assert f"it was made with pango {engine_versions()['pango']} (here 1.0.0);" in remake(db, "G-1")["why"]
     with Database(tmp_path / "empty.duckdb"):
         pass
     assert main(["--db", str(tmp_path / "empty.duckdb"), "certificate", "show", "--remake", "x.pdf"]) == 2

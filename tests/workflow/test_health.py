@@ -16,12 +16,13 @@ import matplotlib.image
 import numpy as np
 import pypdf
 import pytest
+from by_path import load
 
 from monitor.cli import main
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.reporting.documents import from_document, to_document
-from monitor.reporting.health import STATES, MachineHealth
+from monitor.reporting.health import STATES, Change, MachineHealth
 from monitor.reporting.health_render import health_html, health_pdf
 from monitor.reporting.health_words import in_words
 from monitor.store import Database, import_campaign, record_event
@@ -340,8 +341,11 @@ def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_pa
         )
         for place in range(30)
     )
+    between = Change(
+        "change", datetime(2026, 3, 4, 9), datetime(2026, 3, 5, 8), "EB0C stepped by +15 µrad", 1e-4, True
+    )
     crowded = dataclasses.replace(
-        one, machine=name, location="Οδός " + "x" * 55, parameters=many, changed="y" * 200
+        one, machine=name, location="Οδός " + "x" * 55, parameters=many, changed="y" * 200, changes=(between,)
     )
     first = date(2026, 3, 2)
     fleet_page = Fleet(
@@ -355,11 +359,14 @@ def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_pa
     assert name in "".join(health_html(fleet_page, [crowded]))
     if shutil.which("pdftoppm") is None:
         pytest.skip("poppler's pdftoppm draws the pages")
+    # Looked at with the eyes of the certificates' tests: the days of that change once stood on its words.
+    look = load("page_pictures", Path(__file__).resolve().parents[1] / "reporting" / "test_page_pictures.py")
+    assert [one for one in look.faults_of(pdf, tmp_path) if "stands on" in one] == []
     (tmp_path / "h.pdf").write_bytes(pdf)
     subprocess.run(
         ["pdftoppm", "-r", "60", "-png", "-gray", str(tmp_path / "h.pdf"), str(tmp_path / "p")], check=True
     )
-    for page in sorted(tmp_path.glob("p*.png")):
+    for page in sorted(tmp_path.glob("p-*.png")):
         ink = matplotlib.image.imread(page) < 0.9
         edge = int(16 / 25.4 * 60)
         assert ink[:, edge:-edge].any()
