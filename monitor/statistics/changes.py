@@ -17,6 +17,7 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
+from monitor.statistics.day_evidence import shows_wide_days
 from monitor.statistics.scan import Scan, Scanner
 from monitor.statistics.scan_candidates import EDGE, Base, Kind
 from monitor.statistics.sums import label_groups
@@ -142,6 +143,7 @@ class _Search:
 
     def __init__(self, rng: np.random.Generator, trials: int) -> None:
         self.rng, self.trials = rng, trials
+        self.wide: set[str] = set()
         self._kept: dict[tuple[object, ...], Scanner] = {}
 
     def scanner(self, series: _Series, base: Base) -> Scanner:
@@ -161,8 +163,21 @@ class _Search:
         for scanner, values in together.values():
             scanner.look(values)
 
+    def wide_days(self, every: Sequence[_Series]) -> set[str]:
+        """Names of the parameters for which wide day components are allowed for, by what all pieces of all show."""
+        support: dict[str, Array] = {}
+        for series in every:
+            own = self.scanner(series, "constant").day_support(series.y) if series.searched else None
+            if own is not None:
+                support[series.name] = support.get(series.name, 0.0) + own
+        if not support:
+            return set()
+        wide = shows_wide_days(np.array(list(support.values())))
+        return {name for name, shown in zip(support, wide, strict=True) if shown}
+
     def scan(self, series: _Series, base: Base, level: float) -> Scan:
-        return self.scanner(series, base).scan(series.y, self.rng, self.trials, level)
+        wide = series.name in self.wide
+        return self.scanner(series, base).scan(series.y, self.rng, self.trials, level, wide)
 
     def piece(self, series: _Series, offset: int, level: float) -> tuple[list[Change], list[Change]]:
         """Changes and trends of one piece of history, split again at every step found."""
@@ -214,11 +229,12 @@ def find_changes(
     change at an event is no finding. ``u`` (name to (n,)) weighs the runs; ``days`` (n,) are labels whose runs
     may share a component. ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
     holds for whatever dependence among them; inside a piece every step that is found splits it again at the
-    same level. It holds for runs whose neighbours correlate by up to 0.7 and for day components up to
-    the scatter of a run: whatever of these a series does not refute is allowed for (see ``scan``), so for
-    independent runs the rate is below it. Measured rates and power: docs/trials-statistics.md. Pieces of fewer
-    than 6 runs are not searched. Raises ``DataError`` for times that fall, unknown names in ``u``, trials that
-    cannot reach the level, or non-finite values.
+    same level. It holds for runs whose neighbours correlate by up to 0.7 and for day components up to the
+    scatter of a run, up to four times of it where several parameters show such: whatever of these a series
+    does not refute is allowed for (see ``scan`` and ``day_evidence``), so for independent runs the rate is
+    below it. Measured rates and power: docs/trials-statistics.md. Pieces of fewer than 6 runs are not
+    searched. Raises ``DataError`` for times that fall, unknown names in ``u``, trials that cannot reach the
+    level, or non-finite values.
     """
     t = as_vector(times, "times", least=2 * EDGE + 2)
     if (np.diff(t) < 0.0).any():
@@ -254,6 +270,7 @@ def find_changes(
         series = _Series(name, y, t, own, _repeated(day))
         parts += [(series.part(start, stop), start) for start, stop in pieces]
     search.look([part for part, _ in parts])
+    search.wide = search.wide_days([part for part, _ in parts])
     for part, start in parts:
         found, slopes = search.piece(part, start, level)
         changes += found

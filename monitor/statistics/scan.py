@@ -25,9 +25,10 @@ from monitor.statistics.serial import DayComponent, FirstOrder, Shape
 GRID = np.arange(0.0, 0.91, 0.1)
 #: Beyond this correlation no level is claimed: some dozens of such runs have no constant mean to change from.
 HIGHEST = 0.7
-#: Day components of which the likelihood is computed, in standard deviations of a run. Beyond the last no level is
-#: claimed: four days of which the last differs would then say nothing, however much it differs.
-DAY_GRID = (0.5, 1.0)
+#: Day components of which the likelihood is computed, in standard deviations of a run; and those that are allowed for
+#: where other parameters show such (``day_evidence``): four days of which the last differs would else say nothing,
+#: however much it differs.
+DAY_GRID, WIDE_DAYS = (0.5, 1.0), (2.0, 4.0)
 #: A correlation is refuted where the logarithm of its likelihood is so far below the highest: one-sided 97.7 % for
 #: a normal estimate. Chosen by measured rates (docs/trials-statistics.md): 1 leaves 6 % false alarms of 20 runs.
 REFUTED = 2.0
@@ -105,11 +106,13 @@ class Scanner:
         self.scaled = (times - times[0]) / max(float(np.ptp(times)), 1e-300)
         self.smooth = self.columns[:, : len(self.kinds) - len(self.at)] if base == "constant" else None
         shapes: list[Shape] = [FirstOrder(float(r)) for r in GRID]
-        # Places of the shapes of each family, the weakest first: that of independent runs is in both.
+        # Places of the shapes of each family, the weakest first: that of independent runs is in all. By days: the
+        # usual, then with the wide ones.
         self.families = [tuple(range(len(GRID)))]
         if days is not None:
-            self.families.append((0, *range(len(GRID), len(GRID) + len(DAY_GRID))))
-            shapes += [DayComponent(ratio, days, self.root) for ratio in DAY_GRID]
+            shapes += [DayComponent(ratio, days, self.root) for ratio in (*DAY_GRID, *WIDE_DAYS)]
+            wide = (0, *range(len(GRID), len(shapes)))
+            self.families += [wide[: -len(WIDE_DAYS)], wide]
         self.prepared = [self._prepare(shape, basis) for shape in shapes]
         # Places of the shapes for which the level is claimed.
         self._claimed = {i for i in range(len(shapes)) if i >= len(GRID) or GRID[i] <= HIGHEST + 1e-9}
@@ -224,17 +227,26 @@ class Scanner:
             done = upto
         return (1 + exceeding) / (trials + 1)
 
-    def _not_refuted(self, best: Array) -> list[tuple[int, int]]:
+    def _not_refuted(self, best: Array, numbers: Sequence[int]) -> list[tuple[int, int]]:
         """Each family that the deviances (s,) allow, with the place of its strongest shape that they allow.
 
         The stronger the correlation, the larger the gains without a change: a weaker one has the smaller p-value.
         """
-        likely = best - best.min() <= 2.0 * REFUTED
-        return [
-            (number, min(max(i for i in family if likely[i]), max(self._claimed & set(family))))
-            for number, family in enumerate(self.families)
-            if likely[list(family)].any()
-        ]
+        least = min(best[i] for number in numbers for i in self.families[number])
+        found = []
+        for number in numbers:
+            family = self.families[number]
+            likely = [i for i in family if best[i] - least <= 2.0 * REFUTED]
+            if likely:
+                found.append((number, min(max(likely), max(self._claimed & set(family)))))
+        return found
+
+    def day_support(self, y: Array) -> Array | None:
+        """Log-likelihood of each day component, none first, with the best change of ``y`` (n,) taken off; None
+        without days."""
+        if len(self.families) == 1:
+            return None
+        return -0.5 * self._deviances_of(y)[1][list(self.families[-1]), 0]
 
     def look(self, every: Sequence[Array]) -> None:
         """Prepare the scan of several series (n,) at once: parameters of one plan cost little more than one."""
@@ -243,19 +255,30 @@ class Scanner:
         for i, y in enumerate(every):
             self._known[y.tobytes()] = plain[:, [i]], best[:, [i]]
 
-    def scan(self, y: Array, rng: np.random.Generator, trials: int, level: float) -> Scan:
-        """The best candidate for ``y`` (n,) and its p-value from ``trials`` simulated series a shape."""
-        weighted = (self.root * (y - y.mean()))[:, np.newaxis]
+    def _deviances_of(self, y: Array) -> tuple[Array, Array]:
         if y.tobytes() not in self._known:
             self.look([y])
-        plain, best = self._known[y.tobytes()]
-        gains = [float(plain[list(own)].min() - best[list(own)].min()) for own in self.families]
+        return self._known[y.tobytes()]
+
+    def scan(
+        self, y: Array, rng: np.random.Generator, trials: int, level: float, wide_days: bool = False
+    ) -> Scan:
+        """The best candidate for ``y`` (n,) and its p-value from ``trials`` simulated series a shape.
+
+        ``wide_days``: whether day components of up to four times the scatter of a run are allowed for, too.
+        """
+        weighted = (self.root * (y - y.mean()))[:, np.newaxis]
+        plain, best = self._deviances_of(y)
+        numbers = [0] if len(self.families) == 1 else [0, 2 if wide_days else 1]
         p = 0.0
-        for family, place in self._not_refuted(best[:, 0]):
-            p = max(p, self._p_value(gains[family], family, place, level, rng, trials))
+        for family, place in self._not_refuted(best[:, 0], numbers):
+            own = list(self.families[family])
+            gain = float(plain[own].min() - best[own].min())
+            p = max(p, self._p_value(gain, family, place, level, rng, trials))
             if p > level:
                 break
-        likeliest = self.prepared[int(best[:, 0].argmin())]
+        places = sorted({i for number in numbers for i in self.families[number]})
+        likeliest = self.prepared[min(places, key=lambda i: best[i, 0])]
         total, taken = self._residual(likeliest, self._sums(weighted))
         left = np.maximum(total - taken, 1e-15 * total + 1e-300)[:, 0]
         chosen = int((left * likeliest.weight).argmin())

@@ -125,16 +125,25 @@ def processes(workers: int) -> Iterator[Processes]:
 
 @contextmanager
 def _deaf_to_ctrl_c() -> Iterator[None]:
-    """A process started meanwhile is born with SIGINT blocked: Ctrl-C while it imports leaves no traceback of it."""
+    """A process started meanwhile is born with SIGINT blocked, and its start is not broken off: Ctrl-C while it imports
+    leaves no traceback of it. It is heard afterwards."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
     resource_tracker.ensure_running()  # else the start begins it, which unblocks the signal
+    # What is blocked here another thread may receive, and Python would raise it here.
+    heard: list[int] = []
+    own = threading.current_thread() is threading.main_thread()
+    handler = signal.signal(signal.SIGINT, lambda number, _: heard.append(number)) if own else None
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
+        if own:
+            signal.signal(signal.SIGINT, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if heard:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _serve(connection: Connection) -> None:

@@ -78,13 +78,16 @@ def _relative(u: Array) -> Array:
 
 
 class _Plan(NamedTuple):
-    """What is searched at once; ``days`` are None where the values are means of days."""
+    """What is searched at once; ``days`` are None where the values are means of days.
+
+    ``u`` are of the parameters whose runs weigh differently.
+    """
 
     t: Array
     begins: Array
-    u: Array | None
     days: npt.NDArray[Any] | None
     values: dict[str, Array]
+    u: dict[str, Array]
 
 
 def search_changes(
@@ -93,7 +96,7 @@ def search_changes(
     """Steps, bends and transients of each parameter; or why none were sought.
 
     ``events`` are times of known changes, in the unit of ``t``. Parameters measured at the same times share one
-    search, and with it the simulated null distribution. Which search a parameter is in does not change its
+    search, and those weighed alike the simulated null distribution. Which search a parameter is in does not change its
     share of ``false_alarm``, the probability of any finding where there is nothing to find. The ``at`` of a
     change is the start of its run, or of the first run of its day.
     """
@@ -106,16 +109,19 @@ def search_changes(
             t, y, begins, u = series.t, series.values, series.t, weights_of(series)
             u = _relative(u) if u is not None and u.max() > ALIKE * u.min() else None
             days = series.days
-        key = tuple(b"" if one is None else one.tobytes() for one in (t, u, days))
-        searches.setdefault(key, _Plan(t, begins, u, days, {})).values[series.name] = y
+        key = tuple(b"" if one is None else one.tobytes() for one in (t, days))
+        plan = searches.setdefault(key, _Plan(t, begins, days, {}, {}))
+        plan.values[series.name] = y
+        if u is not None:
+            plan.u[series.name] = u
     found: dict[str, tuple[History | None, str | None]] = {}
     for plan in searches.values():
-        t, values, u = plan.t, plan.values, plan.u
+        t, values = plan.t, plan.values
         pieces = len({0, *np.searchsorted(t, np.asarray(events, dtype=np.float64)).tolist()} - {len(t)})
         try:
             history = find_changes(
                 values, t, rng=np.random.default_rng([seed, len(t)]), events=sorted(events),
-                u=None if u is None else dict.fromkeys(values, u), days=plan.days,
+                u=plan.u, days=plan.days,
                 false_alarm=false_alarm * len(values) / len(every),
                 # Five times as many trials as the level of one parameter in one piece needs at least.
                 trials=max(TRIALS, ceil(5 * len(every) * pieces / false_alarm)),

@@ -11,6 +11,7 @@ from monitor.statistics import (
     anova,
     backtest_longest,
     bartlett,
+    find_changes,
     kruskal_wallis,
     levene,
     mann_kendall,
@@ -155,6 +156,39 @@ def day_steps(rng: np.random.Generator) -> None:
     table("A step between days that are alike otherwise, in standard deviations of a run", head, rows)
 
 
+def shared_days(rng: np.random.Generator) -> None:
+    """Histories of 13 parameters: share with any finding where only the days differ, and with the step found."""
+    rows = []
+    for days, runs in ((4, 5), (5, 4), (10, 4)):
+        n, day = days * runs, np.repeat(np.arange(days), runs)
+        for text, wide, component in (
+            ("none", 0, 0.0),
+            ("1 in all", 13, 1.0),
+            ("2 in all", 13, 2.0),
+            ("4 in all", 13, 4.0),
+            ("2 in six", 6, 2.0),
+            ("2 in one", 1, 2.0),
+        ):
+            for height, stepping in ((0.0, 0), (10.0, 1), (10.0, 13)):
+                if height and component > 1.0:
+                    continue
+                hits = 0
+                for _ in range(200):
+                    y = rng.normal(size=(n, 13)) + height * (
+                        (day >= days - 2)[:, None] & (np.arange(13) < stepping)
+                    )
+                    y[:, :wide] += component * rng.normal(size=(days, wide))[day]
+                    found = find_changes(
+                        {str(i): y[:, i] for i in range(13)}, np.arange(n, dtype=float), days=day, rng=rng
+                    )
+                    names = {one.parameter for one in (*found.changes, *found.trends)}
+                    hits += "0" in names if height else bool(names)
+                step = f"{height:g} in {stepping}, two days before the end" if height else "none"
+                rows.append([f"{days} days of {runs}", text, step, hits / 200])
+    head = ["history", "day component", "step", "called (of a step: in the first parameter)"]
+    table("Thirteen parameters together, nominal 5 %, in standard deviations of a run", head, rows)
+
+
 def volumetric(rng: np.random.Generator) -> None:
     """Held-out days of the longest of eight vectors of six drifting parameters in their 95 % interval."""
     rows = []
@@ -202,6 +236,7 @@ if __name__ == "__main__":
         false_alarms,
         day_alarms,
         day_steps,
+        shared_days,
         volumetric,
         changes,
     ):

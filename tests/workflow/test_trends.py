@@ -340,10 +340,14 @@ def test_parameters_that_were_measured_together_share_one_search(monkeypatch: py
     asked = []
 
     def counted(values, *args, **options):
-        asked.append(sorted(values))
+        asked.append((sorted(values), {name: u.tobytes() for name, u in options["u"].items()}))
         return find_changes(values, *args, **options)
 
     monkeypatch.setattr("monitor.workflow.change_search.find_changes", counted)
     found = search_changes(every, [], false_alarm=0.05, seed=1)
-    assert asked == [["A", "B"], ["C"]]
+    ((names, weights),) = asked
+    assert names == ["A", "B", "C"]
+    # Runs that weigh alike are simulated once; those of C all weigh the same.
+    assert sorted(weights) == ["A", "B"]
+    assert weights["A"] == weights["B"]
     assert list(found) == ["A", "B", "C"]
