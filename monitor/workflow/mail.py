@@ -72,7 +72,7 @@ def read_mail_settings(path: Path) -> MailSettings:
         """A file named in the configuration, which has to be there before the work and not only after it."""
         if key not in found:
             return None
-        place = path.parent / found[key]
+        place = path.parent / str(found[key])
         try:
             place.read_bytes()
         except OSError as error:
