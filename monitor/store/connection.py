@@ -220,11 +220,17 @@ def _bound_without_pandas() -> Iterator[None]:
         del sys.modules["pandas"]
 
 
+#: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:
+#: a quarter of DuckDB's own size reads a fleet's machine in half the time, and a small file is a third as large.
+BLOCK_SIZE = 65536
+
+
 def _connect(path: str, read_only: bool, threads: int | None) -> duckdb.DuckDBPyConnection:
     # Nothing is fetched from the network behind the user's back.
     config: dict[str, str | bool | int | float | list[str]] = {
         "autoinstall_known_extensions": "false",
         "autoload_known_extensions": "false",
+        "default_block_size": str(BLOCK_SIZE),
     }
     if threads is not None:
         config["threads"] = str(threads)
