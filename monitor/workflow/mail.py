@@ -69,7 +69,15 @@ def read_mail_settings(path: Path) -> MailSettings:
     security = found.get("security", "starttls")
 
     def beside(key: str) -> Path | None:
-        return path.parent / found[key] if key in found else None
+        """A file named in the configuration, which has to be there before the work and not only after it."""
+        if key not in found:
+            return None
+        place = path.parent / str(found[key])
+        try:
+            place.read_bytes()
+        except OSError as error:
+            raise InputError(f"{key} of {path}: {place} cannot be read: {error.strerror or error}") from error
+        return place
 
     return MailSettings(
         server=found["server"],

@@ -1,8 +1,7 @@
 """Uncertainty of one run's geometric errors after JCGM 102:2011: GUM framework, Monte Carlo, validation.
 
 The inputs are the readings and the calibrated quantities: for touched balls those of the linear axes at every probing
-and the length of the bar, else what every row tells. The covariance of the readings is pooled by day from the repeated
-runs where there are enough of them, else all runs together, else the stated standard uncertainty, uncorrelated.
+and the length of the bar, else what every row tells (``uncertainty_inputs``).
 """
 
 from __future__ import annotations
@@ -12,10 +11,8 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor.discovery import Fit, fit
-from monitor.discovery.compare import lack_of_fit
 from monitor.discovery.model_uncertainty import model_uncertainty as model_uncertainty_of
 from monitor.discovery.variants import variants_of
 from monitor.effects.catalogue import catalogue
@@ -34,14 +31,9 @@ from monitor.uncertainty import (
     adaptive_monte_carlo,
     gum_framework,
     joined,
-    overall,
-    pooled_by_day,
-    uncorrelated,
     validate,
 )
-from monitor.uncertainty.linear_axes import row_covariances
-from monitor.uncertainty.row_problem import repeated_readings, run_problem
-from monitor.uncertainty.run_problem import OneRun, RunProblem
+from monitor.uncertainty.row_problem import run_problem
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
@@ -50,17 +42,19 @@ from monitor.workflow.models import as_model, resolve
 from monitor.workflow.selections import selected_readings
 from monitor.workflow.spreading import trials_of
 from monitor.workflow.uncertainty_documents import document, save_uncertainty
+from monitor.workflow.uncertainty_inputs import (
+    SelectedReadings,
+    calibrated_inputs,
+    left_out,
+    reading_inputs,
+    with_linear_axes,
+)
 
 Document = dict[str, Any]
 
 # A validation compares within a numerical tolerance, so the Monte Carlo result has to be steadier than that. JCGM 101
 # 8.2 recommends a fifth; two fifths need a sixth of the trials, and `validate` says "undecided" where that shows.
 VALIDATION_TIGHTENING = 2.5
-READINGS = "readings"
-BAR = "scale bar"
-CALIBRATED = "calibrated quantities"
-# A covariance from fewer degrees of freedom than this says little about itself; then the next choice is taken.
-FEWEST_DEGREES_OF_FREEDOM = 8
 
 
 @dataclass(frozen=True)
@@ -87,69 +81,6 @@ class Evaluated:
 
 # A covariance of 4 000 readings takes 128 MB and some copies; 10 000 trials of 1 000 readings some ten minutes.
 MOST_READINGS, MOST_READINGS_MCM = 4000, 1200
-
-
-@dataclass(frozen=True)
-class SelectedReadings:
-    """Readings (runs, 3n) in mm of the runs of the stored selection ``name``, and the day of each."""
-
-    name: str
-    values: Array
-    days: npt.NDArray[np.int64]
-
-
-def _reading_inputs(
-    found: Fit, campaign: Campaign, one: OneRun, chosen: SelectedReadings | None
-) -> tuple[Inputs, str]:
-    """Inputs of the readings of a run, and in words where their covariance is from: all runs, or a stored selection."""
-    problem, names = found.problem, one.reading_names
-    count = len(names)
-    units = ("mm",) * count
-    days = {run.run: run.day for run in campaign.runs}
-    labels = np.array([days[int(run)] for run in problem.runs])
-    if chosen is not None:
-        values, labels = chosen.values, chosen.days
-        if len(labels) - 1 < FEWEST_DEGREES_OF_FREEDOM:
-            raise DataError(
-                f"--select {chosen.name}: {len(labels)} runs leave {len(labels) - 1} degrees of freedom for a "
-                f"covariance; at least {FEWEST_DEGREES_OF_FREEDOM} are needed"
-            )
-    else:
-        try:
-            values = repeated_readings(problem)
-        except DataError:
-            values = np.zeros((0, count))
-    runs = len(labels)
-    stated = campaign.probe.standard_uncertainty
-    if len(values) and runs - len(np.unique(labels)) >= FEWEST_DEGREES_OF_FREEDOM:
-        inputs = pooled_by_day(values, labels, names, units, source=READINGS)
-        words = f"repeated runs, pooled by day, {runs - len(np.unique(labels))} degrees of freedom"
-    elif len(values) and runs - 1 >= FEWEST_DEGREES_OF_FREEDOM:
-        inputs = overall(values, names, units, source=READINGS)
-        words = f"all {runs} runs, {runs - 1} degrees of freedom"
-    else:
-        repeatability = lack_of_fit(found)[1]
-        u = max(stated, repeatability or 0.0)
-        inputs = uncorrelated(names, units, one.inputs[:count], one.stated * (u / stated), source=READINGS)
-        words = f"the probe's stated standard uncertainty of {stated * 1e3:g} µm; too few repeated runs of one plan"
-        if u > stated:
-            words = f"the repeatability of {u * 1e3:.2g} µm, which exceeds the probe's statement; too few runs for more"
-    if chosen is not None:
-        words = f"selection {chosen.name}: {words}"
-    # The estimate is that of the run itself: its results are stated.
-    own = Inputs(
-        inputs.names, inputs.units, one.inputs[:count], inputs.covariance, inputs.sources, inputs.dof
-    )
-    return own, words
-
-
-def _calibrated_inputs(one: OneRun) -> Inputs | None:
-    names, unit, u = one.calibrated
-    if not names:
-        return None
-    count = len(one.reading_names)
-    source = BAR if isinstance(one, RunProblem) else CALIBRATED
-    return uncorrelated(names, (unit,) * len(names), one.inputs[count:], u, source=source)
 
 
 def _lack_of_fit(
@@ -227,8 +158,8 @@ def evaluate_fit(
     fixed, coefficients = found.problem.resolved(found.solution.common)
     one = run_problem(fixed, number, coefficients)
     _refuse_too_many(len(one.reading_names), method)
-    readings, words = _reading_inputs(found, loaded, one, chosen)
-    calibrated = _calibrated_inputs(one)
+    readings, words = reading_inputs(found, loaded, one, chosen)
+    calibrated = calibrated_inputs(one)
     inputs = joined(readings, calibrated) if calibrated is not None else readings
     place = int(np.flatnonzero(found.problem.runs == number)[0])
     at = sensitivity_of(one, start=found.solution.local[place])
@@ -247,10 +178,10 @@ def evaluate_fit(
     contributions = [] if extra is None else [extra]
     readings_only = inputs
     if linear_axes is not None:
-        inputs, of_axes = _with_linear_axes(one, inputs, at, names, linear_axes)
+        inputs, of_axes = with_linear_axes(one, inputs, at, names, linear_axes)
         words += "; and the errors of the linear axes as stated"
         contributions = [*of_axes, *contributions]
-    words += _left_out(getattr(method_named(loaded.method), "TAKEN_AS_KNOWN", ()), linear_axes is not None)
+    words += left_out(getattr(method_named(loaded.method), "TAKEN_AS_KNOWN", ()), linear_axes is not None)
     framework = _framework(at, readings_only, names, units, p, contributions)
     mcm = validation = None
     if method != "guf":
@@ -307,34 +238,6 @@ def _refuse_too_many(readings: int, method: str) -> None:
             f"a Monte Carlo of {readings} readings would take hours (up to {MOST_READINGS_MCM} are done here); write "
             "--method guf: errors of 1 mrad leave products of 1 µrad, so that first order is as good"
         )
-
-
-def _left_out(known: tuple[str, ...], axes_stated: bool) -> str:
-    """What a method takes as known and nobody stated the errors of, for people who read u."""
-    left = [what for what in known if not (axes_stated and what == "the linear axes")]
-    if not left:
-        return ""
-    return f"; errors of {' and '.join(left)} are no part of u: the method takes them as known"
-
-
-def _with_linear_axes(
-    one: OneRun, inputs: Inputs, at: Sensitivity, names: tuple[str, ...], axes: LinearAxes
-) -> tuple[Inputs, list[OutputContribution]]:
-    """The inputs with what errors of the linear axes do to them, and the same by source as lines of the budget."""
-    if isinstance(one, RunProblem):
-        raise InputError(
-            "--linear-axes is for methods that take the linear axes as known, such as rotary-probing; this method "
-            "identifies errors of the linear axes itself"
-        )
-    count, rows = len(one.reading_names), at.rows(names)[:, : len(one.reading_names)]
-    covariance = inputs.covariance.copy()
-    lines = []
-    for source, of_rows in row_covariances(one, at.unknowns, axes).items():
-        covariance[:count, :count] += of_rows
-        of_outputs = rows @ of_rows @ rows.T
-        lines.append(OutputContribution(source, 0.5 * (of_outputs + of_outputs.T)))
-    whole = Inputs(inputs.names, inputs.units, inputs.estimate, covariance, inputs.sources, inputs.dof)
-    return whole, lines
 
 
 def _units(found: Fit, names: tuple[str, ...]) -> tuple[Unit, ...]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pypdf
 import pytest
+from by_path import load
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate import CertificateRecord
@@ -84,6 +85,23 @@ def test_signing_keeps_pdf_a_and_attachments(plain: bytes, signed: bytes) -> Non
     for name in ("/Metadata", "/OutputIntents", "/MarkInfo"):
         assert name in after.root_object
     assert 'pdfaid:part="3"' in after.root_object["/Metadata"].get_object().get_data().decode("utf-8")
+
+
+def test_iso_19005_3_6_3_the_field_of_the_signature_is_one_that_pdf_a_allows(
+    signed: bytes, tmp_path: Path
+) -> None:
+    """Printed, not hidden, of no size: such a widget needs no appearance (6.3.3), which part 1 asked for (5.3.1)."""
+    looked = load("pdf_a", Path(__file__).with_name("test_pdf_a.py"))
+    (widget,) = (one.get_object() for one in pypdf.PdfReader(io.BytesIO(signed)).pages[0]["/Annots"])
+    assert list(widget["/Rect"]) == [0, 0, 0, 0]
+    printed, forbidden = 1 << 2, 1 << 0 | 1 << 1 | 1 << 5 | 1 << 8  # ISO 32000-1, table 165
+    assert widget["/F"] & printed
+    assert not widget["/F"] & forbidden
+    if looked.needs_preflight.args[0]:
+        pytest.skip(looked.needs_preflight.kwargs["reason"])
+    file = tmp_path / "signed.pdf"
+    file.write_bytes(signed)
+    assert set(looked.preflight(file)) - set(looked.LIFTED) == {"5.3.1"}
 
 
 def test_an_altered_attachment_is_seen_and_named_as_altered(plain: bytes, signed: bytes) -> None:

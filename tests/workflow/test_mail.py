@@ -6,10 +6,14 @@ import asyncio
 import base64
 import email
 import email.policy
+import ipaddress
 import re
+import ssl
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
 from email.message import EmailMessage
 from pathlib import Path
 from typing import Any
@@ -24,12 +28,20 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 @dataclass
 class Inbox:
-    """A small SMTP server (RFC 5321, AUTH PLAIN of RFC 4954) and what it took; addresses with 'no' are refused."""
+    """A small SMTP server (RFC 5321, AUTH PLAIN of RFC 4954, STARTTLS of RFC 3207) and what it took.
+
+    Addresses with 'no' are refused. ``context`` is its key and certificate, ``hidden`` says of every login whether the
+    line was encrypted by then; one that ``breaks`` hangs up in the middle of a message.
+    """
 
     port: int = 0
     messages: list[bytes] = field(default_factory=list)
     recipients: list[str] = field(default_factory=list)
     logins: list[tuple[str, str]] = field(default_factory=list)
+    context: ssl.SSLContext | None = None
+    at_once: bool = False
+    breaks: bool = False
+    hidden: list[bool] = field(default_factory=list)
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         async def say(text: str) -> None:
@@ -40,10 +52,19 @@ class Inbox:
         while line := (await reader.readline()).decode().strip():
             verb = line.upper()
             if verb.startswith("EHLO"):
-                await say("250-loopback\r\n250 AUTH PLAIN")
+                plain = self.context is not None and writer.get_extra_info("ssl_object") is None
+                await say("250-loopback\r\n" + ("250-STARTTLS\r\n" if plain else "") + "250 AUTH PLAIN")
+            elif verb == "STARTTLS":
+                await say("220 go on")
+                assert self.context is not None
+                try:
+                    await writer.start_tls(self.context)
+                except (OSError, ssl.SSLError):
+                    return  # the other side did not like what it saw
             elif verb.startswith("AUTH PLAIN"):
                 _, user, password = base64.b64decode(line.split()[2]).decode().split("\0")
                 self.logins.append((user, password))
+                self.hidden.append(writer.get_extra_info("ssl_object") is not None)
                 await say("235 good" if password == "secret" else "535 wrong password")
             elif verb.startswith("RCPT"):
                 address = re.findall("<(.*?)>", line)[0]
@@ -54,6 +75,8 @@ class Inbox:
                     await say("250 ok")
             elif verb == "DATA":
                 await say("354 go on")
+                if self.breaks:
+                    break
                 lines = []
                 while (row := await reader.readline()) != b".\r\n":
                     lines.append(row.removeprefix(b".") if row.startswith(b"..") else row)
@@ -67,13 +90,15 @@ class Inbox:
         writer.close()
 
 
-@pytest.fixture
-def inbox() -> Iterator[Inbox]:
-    made = Inbox()
+@contextmanager
+def opened(made: Inbox) -> Iterator[Inbox]:
+    """The server at work in a thread, on a port of its own."""
     ready, loop = threading.Event(), asyncio.new_event_loop()
 
     async def run() -> None:
-        server = await asyncio.start_server(made.serve, "127.0.0.1", 0)
+        server = await asyncio.start_server(
+            made.serve, "127.0.0.1", 0, ssl=made.context if made.at_once else None
+        )
         made.port = server.sockets[0].getsockname()[1]
         ready.set()
         async with server:
@@ -87,6 +112,48 @@ def inbox() -> Iterator[Inbox]:
     loop.call_soon_threadsafe(stop.set)
     thread.join(10)
     loop.close()
+
+
+@pytest.fixture
+def inbox() -> Iterator[Inbox]:
+    with opened(Inbox()) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def server_key(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Key and certificate of a server at an address, in one PEM file that is its own authority."""
+    pytest.importorskip("cryptography", reason="the extra [sign] is not installed")
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.asymmetric import ec
+    from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+
+    def make(address: str) -> Path:
+        key, now = ec.generate_private_key(ec.SECP256R1()), datetime.now(UTC)
+        name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "made-up mail server")])
+        alternative = x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address(address))])
+        made = (
+            x509.CertificateBuilder().subject_name(name).issuer_name(name).public_key(key.public_key()).serial_number(1)
+            .not_valid_before(now - timedelta(days=1)).not_valid_after(now + timedelta(days=9))
+            .add_extension(alternative, critical=False)
+            .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+            .sign(key, hashes.SHA256())
+        )  # fmt: skip
+        file = tmp_path_factory.mktemp("server") / "server.pem"
+        file.write_bytes(
+            key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+            + made.public_bytes(Encoding.PEM)
+        )
+        return file
+
+    return make
+
+
+def with_key(file: Path, at_once: bool) -> Inbox:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(file)
+    return Inbox(context=context, at_once=at_once)
 
 
 @pytest.fixture
@@ -173,6 +240,48 @@ def test_what_the_server_refuses_is_said(inbox: Inbox, document: Callable[..., A
         mail_report(path, document([]))
 
 
+@pytest.mark.parametrize("security", ["tls", "starttls"])
+def test_rfc3207_and_8314_password_and_message_go_encrypted_to_a_server_that_is_who_it_says(
+    security: str, server_key: Callable[[str], Path], document: Callable[..., Any], tmp_path: Path
+) -> None:
+    (tmp_path / "password").write_text("secret\n")
+    own, other = server_key("127.0.0.1"), server_key("127.0.0.2")
+    login = {"security": f'"{security}"', "user": '"monitor"', "password_file": '"password"'}
+    with opened(with_key(own, security == "tls")) as inbox:
+        mail_report(settings(tmp_path, inbox.port, ca_file=f'"{own}"', **login), document(["HU40-T"]))
+        assert (inbox.logins, inbox.hidden, len(inbox.messages)) == ([("monitor", "secret")], [True], 1)
+        # An authority that nobody named, and another's: nothing is told to the server.
+        for more in ({}, {"ca_file": f'"{other}"'}):
+            with pytest.raises(InputError, match=r"could not be used: .*certificate verify failed"):
+                mail_report(settings(tmp_path, inbox.port, **login, **more), document([]))
+        assert len(inbox.logins) == 1
+    with opened(with_key(other, security == "tls")) as inbox:
+        with pytest.raises(
+            InputError, match=r"could not be used: .*certificate is not valid for '127\.0\.0\.1'"
+        ):
+            mail_report(settings(tmp_path, inbox.port, ca_file=f'"{other}"', **login), document([]))
+        assert inbox.logins == []
+
+
+@pytest.mark.parametrize("key", ["password_file", "ca_file"])
+def test_a_file_of_the_configuration_that_is_not_there_is_told_before_the_work(
+    tmp_path: Path, key: str
+) -> None:
+    (tmp_path / "password").write_text("secret")
+    names = {"user": '"monitor"', "password_file": '"password"', key: '"nowhere"'}
+    with pytest.raises(InputError, match=rf"{key} of .*mail\.toml: .*nowhere cannot be read: No such file"):
+        read_mail_settings(settings(tmp_path, 25, **names))
+
+
+def test_a_server_that_hangs_up_in_the_middle_is_told(document: Callable[..., Any], tmp_path: Path) -> None:
+    with opened(Inbox(breaks=True)) as inbox:
+        with pytest.raises(
+            InputError, match=rf"the mail server 127\.0\.0\.1:{inbox.port} could not be used: "
+        ):
+            mail_report(settings(tmp_path, inbox.port), document([]))
+        assert inbox.messages == []
+
+
 def test_a_file_too_large_for_servers_is_named_instead_of_attached(
     document: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -206,10 +315,13 @@ def test_settings_are_refused_with_every_fault(tmp_path: Path) -> None:
         read_mail_settings(path)
 
 
-def test_the_example_is_a_configuration_and_the_units_type_verbs_that_exist() -> None:
+def test_the_example_is_a_configuration_and_the_units_type_verbs_that_exist(tmp_path: Path) -> None:
     from monitor.cli.parser import parse
 
-    found = read_mail_settings(EXAMPLES / "mail.toml")
+    example = tmp_path / "mail.toml"
+    example.write_bytes((EXAMPLES / "mail.toml").read_bytes())
+    (tmp_path / "mail-password").write_text("secret")
+    found = read_mail_settings(example)
     assert (found.security, found.port) == ("starttls", 587)
     for file in ("systemd/monitor-report.service", "cron/monitor-report"):
         text = (EXAMPLES / file).read_text(encoding="utf-8")
