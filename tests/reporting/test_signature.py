@@ -90,7 +90,7 @@ def test_signing_keeps_pdf_a_and_attachments(plain: bytes, signed: bytes) -> Non
 def test_iso_19005_3_6_3_the_field_of_the_signature_is_one_that_pdf_a_allows(
     signed: bytes, tmp_path: Path
 ) -> None:
-    """Printed, not hidden, and of no size: such a widget needs no appearance (6.3.3), which part 1 asked for (5.3.1)."""
+    """Printed, not hidden, of no size: such a widget needs no appearance (6.3.3), which part 1 asked for (5.3.1)."""
     looked = load("pdf_a", Path(__file__).with_name("test_pdf_a.py"))
     (widget,) = (one.get_object() for one in pypdf.PdfReader(io.BytesIO(signed)).pages[0]["/Annots"])
     assert list(widget["/Rect"]) == [0, 0, 0, 0]
