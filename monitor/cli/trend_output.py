@@ -135,6 +135,8 @@ def _charts(found: dict[str, Any]) -> None:
         f"{control['average_run_length']:g} {control['points']}"
     )
     vector = control["vector"]
+    if len(found["parameters"]) == 1:
+        return
     if vector["why"] is not None:
         output.say(vector["why"])
         return

@@ -62,12 +62,13 @@ def _rank(
         sd = np.sqrt(np.maximum(squares, 0.0) / (k - 2.0) * (1.0 + 1.0 / (k - 1.0)))
         z = np.abs(sums.latest - others) / np.where(k >= 6.0, sd, np.nan)
         ratio = cells.between / cells.sd_pooled
+        steepness = np.abs(drift.slope / drift.u)
     drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
     kind = np.where(sums.groups < 2.0, 6, 5)
     measure = np.nan_to_num(ratio, nan=0.0, posinf=0.0)
     for number, holds, size in (
         (4, ratio > DAYS_OVER_RUNS, ratio),
-        (3, drifting, np.abs(drift.slope / drift.u)),
+        (3, drifting, steepness),
         (2, z > STANDS_OUT, z),
         (1, drifting & (years >= 0.0) & (years < SOON_YEARS), -years),
         (0, share >= 1.0, share),

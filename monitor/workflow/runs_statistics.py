@@ -192,6 +192,11 @@ def stats(
         "parameter_order": names,
         "correlation_all": _rows(pooled.covariance_all.correlation),
         "correlation_pooled": _rows(pooled.covariance_pooled.correlation),
+        "correlation_by_group": {
+            label: {"degrees_of_freedom": one.dof, "correlation": _rows(one.correlation)}
+            for label, one in zip(pooled.labels, pooled.covariance_by_group, strict=True)
+            if one is not None
+        },
         "degrees_of_freedom_all": pooled.dof_all,
         "degrees_of_freedom_pooled": pooled.dof_pooled,
         "seed": SEED,
@@ -233,6 +238,11 @@ def _coordinates(campaign: Campaign, runs: list[int], groups: list[str]) -> Docu
         "names": names,
         "u_all_um": (pooled.u_all * 1e3).tolist(),
         "u_pooled_um": (pooled.u_pooled * 1e3).tolist(),
+        "u_by_day_um": {
+            label: (u * 1e3).tolist()
+            for label, u in zip(pooled.labels, pooled.u_by_group, strict=True)
+            if np.isfinite(u).all()
+        },
         "bartlett_p": p_values["bartlett"],
         "anova_p": p_values["anova"],
         "normality_p": normal_scatter(values, groups),

@@ -102,6 +102,9 @@ class Charts:
         """T² and MEWMA of all parameters together; the shares say which of them raise the latest point."""
         whole = np.isfinite(self.points.values)
         kept = whole.mean(axis=0) > 0.9
+        # What never varies in the reference period has no limits, and no part in the vector.
+        known = np.where(whole & self.inside[:, np.newaxis], self.points.values, np.nan)
+        kept &= np.nanmax(known, axis=0, initial=-np.inf) > np.nanmin(known, axis=0, initial=np.inf)
         rows = whole[:, kept].all(axis=1)
         used = [name for name, keep in zip(names, kept, strict=True) if keep]
         values = self.points.values[:, kept]

@@ -118,6 +118,8 @@ def drift(series: Series, since: float) -> tuple[Document, Trend | None]:
     span = float(np.ptp(piece.t)) if len(piece.t) else 0.0
     if span < SHORTEST_DAYS:
         return {**empty, "why": too_short(span, bool(np.isfinite(since)))}, None
+    if np.ptp(piece.values) == 0.0:
+        return {**empty, "why": f"no drift of {series.name}: it has the same value in every run"}, None
     try:
         line = trend(piece.values, piece.t, u=piece.weights(), days=piece.days)
     except DataError as error:

@@ -16,7 +16,14 @@ from monitor.cli import main
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.statistics import find_changes
-from monitor.store import Database, import_campaign, load_analysis, machine_history, record_event
+from monitor.store import (
+    Database,
+    import_campaign,
+    load_analysis,
+    load_identification,
+    machine_history,
+    record_event,
+)
 from monitor.store.identified_values import gather_values
 from monitor.workflow.change_search import search_changes
 from monitor.workflow.fleet import fleet
@@ -287,6 +294,13 @@ def test_five_days_components_histogram_and_the_vector(campaigns: Database) -> N
     assert 0.0 < found["parameters"]["EB0C"]["normality_p"] <= 1.0
     assert found["vector"]["box_m"]["why"].startswith("group 1 has 4 runs for 13 parameters")
     assert found["vector"]["manova"]["p_value"] < 1e-3
+    fourth = found["correlation_by_group"]["4"]
+    assert fourth["degrees_of_freedom"] == 3
+    runs = load_identification(campaigns, "five-days", "samba", 1)
+    values = np.array([one.estimate for one in runs.runs if one.run in (13, 14, 15, 16)])
+    assert found["parameter_order"] == list(runs.parameters)
+    assert fourth["correlation"] == pytest.approx(np.corrcoef(values.T), abs=1e-9)
+    assert len(found["coordinates"]["u_by_day_um"]["4"]) == 186
     bins = found["coordinates"]["histograms"]["anova"]
     assert sum(bins["counts"]) == found["coordinates"]["n"] == 186
     assert bins["counts"][0] > 5 * bins["expected"]
@@ -372,6 +386,25 @@ def test_charts_of_the_vector_and_what_they_are_compared_with_are_told(
     assert main(["--db", str(path), "trend", "C", "--reference", "2030-01-01..2031-01-01"]) == 0
     said = capsys.readouterr().out
     assert "no chart: no run of the history lies in the reference period" in said
+
+
+def test_a_parameter_that_never_varies_has_no_drift_and_no_part_in_the_vector(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(2)
+    values = {name: rng.normal(size=(30, RUNS)) for name in ("EX0C", "EY0C")} | {
+        "EX0B": np.full((30, RUNS), 3.0)
+    }
+    with Database(tmp_path / "still.duckdb") as db:
+        add_machine(db, "S", values)
+        document = trends(db, "S").document
+        table = {row["parameter"]: row for row in fleet(db)["table"]}
+    assert document["parameters"]["EX0B"]["slope_per_year"] is None
+    assert document["parameters"]["EX0B"]["why"] == "no drift of EX0B: it has the same value in every run"
+    assert document["control"]["vector"]["parameters"] == ["EX0C", "EY0C"]
+    assert table["EX0B"]["attention"] == "as usual"
+    assert main(["--db", str(tmp_path / "still.duckdb"), "trend", "S", "--parameter", "EX0C"]) == 0
+    assert "together" not in capsys.readouterr().out
 
 
 def test_a_headline_states_the_uncertainty_by_name_and_no_power_of_ten() -> None:
