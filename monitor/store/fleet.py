@@ -75,6 +75,24 @@ FROM (
 GROUP BY identification_id, machine_no, heading, day
 """
 
+# A recorded event splits the history of a machine, as in `monitor trend`: groups that began before the last event count
+# no more. An event after the last group splits nothing yet.
+_SINCE = """
+CREATE OR REPLACE TEMP TABLE fleet_since AS
+WITH happened AS (
+    SELECT machine_no, epoch(happened_at) / 86400.0 AS at_d FROM event JOIN fleet_machine USING (machine)
+), last AS (
+    SELECT machine_no, max(began_d) AS last_d FROM fleet_group SEMI JOIN happened USING (machine_no) GROUP BY machine_no
+)
+SELECT machine_no, max(at_d) AS since_d FROM happened JOIN last USING (machine_no) WHERE at_d <= last_d
+GROUP BY machine_no
+"""
+
+_ENDED = """
+DELETE FROM fleet_group USING fleet_since
+WHERE fleet_group.machine_no = fleet_since.machine_no AND fleet_group.began_d < fleet_since.since_d
+"""
+
 # A cell is a machine and a parameter: its number is made of both.
 _PARAMETER_BITS = 20
 
@@ -158,16 +176,17 @@ WITH shown AS (
 )
 SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.* EXCLUDE (cell),
        CASE WHEN l.latest_n > 0 THEN l.last_d ELSE 'nan' END AS last_d, coalesce(l.latest, 'nan') AS latest,
-       coalesce(l.latest_n, 0) AS latest_n
+       coalesce(l.latest_n, 0) AS latest_n, coalesce(e.since_d, 'nan') AS since_d
 FROM summed AS p
 JOIN fleet_machine AS m ON m.machine_no = p.cell >> {_PARAMETER_BITS}
 JOIN fleet_origin AS o USING (cell)
 LEFT JOIN latest AS l USING (cell)
+LEFT JOIN fleet_since AS e ON e.machine_no = m.machine_no
 JOIN shown AS s ON s.k = p.cell & ((1 << {_PARAMETER_BITS}) - 1)
 ORDER BY m.machine, s.parameter
 """
 
-_TABLES = ("machine", "heading", "chosen", "group", "latest", "origin", "part")
+_TABLES = ("machine", "heading", "chosen", "group", "since", "latest", "origin", "part")
 
 
 @dataclass(frozen=True)
@@ -181,7 +200,8 @@ class FleetSums:
     1 / (n_j - 1) over them. ``sum_t`` to ``sum_tm`` are sums over the groups of t, t², m, m² and t m, with t in days
     since ``epoch_d`` and m the mean of the group less the origin. ``last_d`` is when the machine's last day began
     (days since 1970), ``latest`` the mean of that day less the origin, ``latest_runs`` its runs; NaN, NaN and 0 where
-    the parameter was refused there.
+    the parameter was refused there. ``since_d`` is the last recorded event before that day (days since 1970, NaN:
+    none); groups before it are left out.
     """
 
     machine: npt.NDArray[np.str_]
@@ -206,11 +226,13 @@ class FleetSums:
     last_d: Array
     latest: Array
     latest_runs: Array
+    since_d: Array
 
 
 def fleet_sums(db: Database, model: str | None = None, version: int | None = None) -> FleetSums:
     """Sums of all machines and parameters, of the latest identification of every campaign under one model.
 
+    Of each machine since its last recorded event, where runs followed it (a day counts whole, by its first run).
     Without ``model`` the method's own. A parameter that a machine refused both in its first campaign and on its last
     day has zero for its origin and loses 2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the
     last bits from one time to the next. Raises NotFoundError where nothing was identified.
@@ -222,7 +244,7 @@ def fleet_sums(db: Database, model: str | None = None, version: int | None = Non
     if epoch_d is None:
         of = "" if model is None else f" with model {model}"
         raise NotFoundError(f"no campaign was identified{of} yet; type `monitor identify`")
-    for statement in (_GROUPS, _LATEST, _ORIGINS):
+    for statement in (_GROUPS, _SINCE, _ENDED, _LATEST, _ORIGINS):
         db.execute(statement)
     db.execute(_PARTS, {"epoch_d": epoch_d})
     found = {name: np.ma.getdata(column) for name, column in db.arrays(_TOGETHER).items()}
@@ -263,4 +285,5 @@ def _sums(found: Mapping[str, npt.NDArray[np.generic]], epoch_d: float) -> Fleet
         last_d=number["last_d"],
         latest=number["latest"] / f,
         latest_runs=number["latest_n"],
+        since_d=number["since_d"],
     )

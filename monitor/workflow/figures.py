@@ -207,7 +207,8 @@ def statistics_figure(
     factors = np.array([found.units[place].factor for place in places])
     estimate = np.array([run.estimate[places] for run in found.runs]) / factors
     u = np.sqrt(np.array([np.diag(run.covariance)[places] for run in found.runs])) / factors
-    moved = [name for name in names if (document["parameters"][name]["anova_q"] or 1.0) < 0.001]
+    q = {name: document["parameters"][name]["anova_q"] for name in names}
+    moved = [name for name in names if q[name] is not None and q[name] < 0.001]
     said = f"differ between days: {', '.join(moved)}" if moved else "no parameter differs between days"
     figure = parameters_by_run(
         [run.run for run in found.runs],

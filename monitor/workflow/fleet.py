@@ -63,7 +63,7 @@ def _rank(
         z = np.abs(sums.latest - others) / np.where(k >= 6.0, sd, np.nan)
         ratio = cells.between / cells.sd_pooled
     drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
-    kind = np.full(len(share), 5)
+    kind = np.where(sums.groups < 2.0, 6, 5)
     measure = np.nan_to_num(ratio, nan=0.0, posinf=0.0)
     for number, holds, size in (
         (4, ratio > DAYS_OVER_RUNS, ratio),
@@ -84,6 +84,7 @@ WORDS = (
     "drifts",
     "days differ much more than runs",
     "as usual",
+    "one day only, nothing to compare it with",
 )
 
 
@@ -153,6 +154,7 @@ def fleet(db: Database, model: str | None = None, top: int | None = 20) -> Docum
             "drift_q": _number(q["drift"][i]),
             "latest": _number(sums.origin[i] + sums.latest[i]),
             "latest_at": _date(float(sums.last_d[i])),
+            "since": _date(float(sums.since_d[i])),
             "limit": _number(limit[i]),
             "years_to_limit": _number(years[i]) if kind[i] == 1 else None,
         }

@@ -54,6 +54,8 @@ def group_labels(columns: dict[str, Array], by: str) -> list[str]:
         return [str(int(value)) for value in values]
     if np.isnan(values).any():
         raise DataError(f"--by {by}: {int(np.isnan(values).sum())} runs have no value of it")
+    if np.ptp(values) == 0.0:
+        raise DataError(f"--by {by}: it is {values[0]:g} in every run; there is nothing to group by")
     # A measured condition is cut at its terciles: three groups of like size.
     low, high = np.quantile(values, [1 / 3, 2 / 3])
     names = (f"below {low:g}", f"{low:g} to {high:g}", f"above {high:g}")

@@ -30,7 +30,7 @@ from monitor.store import (
 from monitor.uncertainty.row_problem import repeated_readings
 from monitor.workflow.campaigns import records
 from monitor.workflow.models import as_model
-from monitor.workflow.run_columns import run_columns, selected
+from monitor.workflow.run_columns import campaign_columns, selected
 
 Document = dict[str, Any]
 
@@ -38,12 +38,18 @@ Document = dict[str, Any]
 def select(db: Database, campaign: str, name: str, where: str) -> Document:
     """Name the runs of a campaign that meet a condition; the selection is stored.
 
-    Raises InputError for a name that a campaign has, a condition that cannot be read, or one that no run meets.
+    Raises InputError for a name that a campaign or a column of the runs has, a condition that cannot be read, or
+    one that no run meets.
     """
     loaded = load_campaign(db, campaign)
     if name in set(list_campaigns(db)["campaign"]):
         raise InputError(f"--name {name}: a campaign has that name; a selection needs another")
-    keep = selected(run_columns(loaded.runs), where, len(loaded.runs))
+    columns = campaign_columns(loaded)
+    if name in columns:
+        raise InputError(
+            f"--name {name}: runs are grouped by a column of that name (`stats --by {name}`); a selection needs another"
+        )
+    keep = selected(columns, where, len(loaded.runs))
     runs = [run.run for run, kept in zip(loaded.runs, keep, strict=True) if kept]
     if not runs:
         raise InputError(f"--where {where}: no run of campaign {campaign} meets it; nothing was kept")
@@ -113,7 +119,9 @@ def side_by_side(db: Database, names: Sequence[str], model: str | None = None, p
     """Scatter of the runs and expanded uncertainty of a calibration for several selections or campaigns.
 
     The expanded uncertainty is that of one calibration whose readings scatter as the selection's do (GUM framework,
-    U = k_q u for all parameters together with probability ``p``). Raises InputError for fewer than two names.
+    U = k_q u for all parameters together with probability ``p``, k_q with the degrees of freedom as `monitor
+    uncertainty` states it; ``k_q`` is that of JCGM 102 for a known covariance). Raises InputError for fewer than two
+    names.
     """
     # These two come back to this module for the selections.
     from monitor.workflow.runs_statistics import stats
@@ -137,11 +145,13 @@ def side_by_side(db: Database, names: Sequence[str], model: str | None = None, p
             "runs": int(sum(scatter["groups"].values())),
             "input_covariance": result["input_covariance"],
             "k_q": guf["k_q"],
+            "k_q_with_degrees_of_freedom": guf["k_q_with_degrees_of_freedom"],
+            "degrees_of_freedom": guf["degrees_of_freedom"],
             "units": result["units"],
             "mean": {name: one["mean"] for name, one in scatter["parameters"].items()},
             "u_all": {name: one["u_all"] for name, one in scatter["parameters"].items()},
             "u": guf["u"],
-            "expanded": {name: guf["k_q"] * u for name, u in guf["u"].items()},
+            "expanded": guf["expanded"],
         }
     return {"p": p, "selections": found}
 

@@ -75,6 +75,8 @@ class Charts:
         known = self.points.values[own & self.inside, column]
         new = own & ~self.inside
         values, t = self.points.values[new, column], self.points.t[new]
+        if not len(known):
+            return {"why": "no chart: no run of the history lies in the reference period"}
         try:
             reference = reference_period(known)
         except DataError as error:
@@ -107,7 +109,8 @@ class Charts:
         if len(new) == 0 or len(known) < len(used) + 2:
             return {
                 "why": f"no chart of the vector: {len(known)} {self.points.what} in the reference period and "
-                f"{len(new)} after it for {len(used)} parameters; at least {len(used) + 2} and one are needed"
+                f"{len(new)} after it for {len(used)} parameters; at least {len(used) + 2} and one are needed "
+                "(--reference FROM..TO)"
             }  # fmt: skip
         t = self.points.t[rows & ~self.inside]
         try:

@@ -19,6 +19,7 @@ from monitor.records import Campaign
 from monitor.statistics import anova, bartlett, pool, trend
 from monitor.statistics.sufficient import GroupSums, cells_from_sums, drift_from_sums
 from monitor.store import Database, FleetSums, fleet_sums, machine_history
+from monitor.store.events import record_event
 from monitor.store.identified_values import gather_values
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd"
@@ -195,6 +196,44 @@ def test_groups_that_never_vary_or_stand_alone_say_nothing(db: Database) -> None
     assert np.isnan(found.anova_f[0])
     assert np.isnan(found.bartlett_p).all()
     assert found.anova_f[1] == pytest.approx(1.0)
+
+
+def test_of_each_machine_the_days_since_its_last_event_count(db: Database) -> None:
+    rng = np.random.default_rng(8)
+    days = {
+        name: [rng.normal(size=3).tolist() for _ in range(6)] for name in ("crashed", "repaired", "quiet")
+    }
+    for name, values in days.items():
+        for number, day in enumerate(values):
+            keep(db, name, [day], f"{name}-{number}")
+    everything = fleet_sums(db)
+    assert np.isnan(everything.since_d).all()
+    (began,) = zip(
+        *db.rows(
+            "SELECT min(started_at) FROM run JOIN campaign USING (campaign_id) WHERE machine = 'repaired' "
+            "GROUP BY campaign_id ORDER BY 1"
+        ),
+        strict=True,
+    )
+    at = began[4].replace(tzinfo=UTC)
+    record_event(db, "repaired", began[1].replace(tzinfo=UTC), "crash", "into the table")
+    # At the very start of a run: that run follows it.
+    record_event(db, "repaired", at, "repair", "ball screw changed")
+    # Nothing was measured since: nothing is split yet.
+    record_event(db, "crashed", began[5].replace(tzinfo=UTC) + timedelta(days=99), "crash", "into the table")
+    sums = fleet_sums(db)
+    assert sums.machine.tolist() == ["crashed", "quiet", "repaired"]
+    assert sums.groups.tolist() == [6.0, 6.0, 2.0]
+    assert np.isnan(sums.since_d[:2]).all()
+    assert sums.since_d[2] == pytest.approx(at.timestamp() / 86400.0, abs=1e-9)
+    own = np.array(days["repaired"][4:]).ravel()[:, np.newaxis]
+    labels = np.repeat([0, 1], 3)
+    found = cells(sums)
+    assert found.anova_f[2] == pytest.approx(anova(own, labels).statistic[0], rel=1e-10)
+    assert sums.origin[2] + found.mean[2] == pytest.approx(own.mean(), rel=1e-12)
+    assert sums.origin[2] + sums.latest[2] == pytest.approx(own[3:].mean(), rel=1e-12)
+    for name in ("squares", "within", "log_variances", "sum_t", "sum_m", "latest"):
+        assert getattr(sums, name)[:2] == pytest.approx(getattr(everything, name)[:2], rel=1e-12)
 
 
 def test_nothing_identified_is_said(db: Database) -> None:

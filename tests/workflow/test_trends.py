@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,14 @@ import pandas as pd
 import pytest
 
 from monitor.cli import main
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.statistics import find_changes
 from monitor.store import Database, import_campaign, load_analysis, machine_history, record_event
 from monitor.store.identified_values import gather_values
 from monitor.workflow.change_search import search_changes
 from monitor.workflow.fleet import fleet
+from monitor.workflow.run_columns import group_labels
 from monitor.workflow.runs_statistics import stats
 from monitor.workflow.selections import select, side_by_side
 from monitor.workflow.trend_figures import headline, trend_figures
@@ -212,6 +214,8 @@ def test_fleet_ranks_what_needs_attention(made: Database) -> None:
     assert abs(table["M", "EX0B"]["slope_per_year"] - 0.2 / 7 * 365.25) < 4 * table["M", "EX0B"]["u_slope"]
     assert table["M", "EY0C"]["attention"] == "as usual"
     assert table["M", "EX0B"]["n"] == WEEKS * RUNS
+    assert table["M", "EX0B"]["since"] is None
+    assert table["small", "EX0B"]["attention"] == "one day only, nothing to compare it with"
     assert sum(found["attention"].values()) == found["rows"] == len(found["table"])
     assert len(fleet(made, top=2)["table"]) == 2
 
@@ -234,6 +238,10 @@ def test_los_2017_figure_4_6_without_its_first_hours_the_hot_machine_is_like_the
     # The thesis states k_q = 2.9 for its eleven parameters.
     assert all(abs(one["k_q"] - 2.9) < 0.1 for one in found.values())
     hot, star, cold = (found[name]["expanded"] for name in ("hot-cold", "hot-cold-star", "cold-cold"))
+    # What a calibration with these readings states: so few runs ask for a larger factor.
+    own = uncertainty(campaigns, "hot-cold", method="guf", select="hot-cold-star", model_uncertainty=False)
+    assert star == pytest.approx(own["guf"]["expanded"], rel=1e-12)
+    assert 3.0 < found["hot-cold-star"]["k_q_with_degrees_of_freedom"] < 3.1
     for name in ("EXX", "EYY", "EZZ", "EX0C"):
         assert hot[name] > 1.2 * star[name]
         assert hot[name] > 1.2 * cold[name]
@@ -257,8 +265,18 @@ def test_a_selection_is_a_group_and_feeds_the_uncertainty(campaigns: Database) -
         uncertainty(campaigns, "hot-cold", method="guf", select="five-days")
     with pytest.raises(InputError, match="--name cold-cold: a campaign has that name"):
         select(campaigns, "hot-cold", "cold-cold", "hours > 6")
+    with pytest.raises(InputError, match="--name day: runs are grouped by a column of that name"):
+        select(campaigns, "hot-cold", "day", "hours > 6")
+    # Channels recorded with each probing are conditions of the runs here as in `stats`.
+    warm = select(campaigns, "five-days", "warm-axis", "x_axis_degC > 22")["runs"]
+    assert len(warm) == sum(stats(campaigns, "five-days", where="x_axis_degC > 22")["groups"].values()) == 13
     with pytest.raises(InputError, match="no run of campaign hot-cold meets it"):
         select(campaigns, "hot-cold", "late", "hours > 99")
+
+
+def test_a_condition_that_never_varies_makes_no_groups() -> None:
+    with pytest.raises(DataError, match="--by oil_degC: it is 20 in every run; there is nothing to group by"):
+        group_labels({"oil_degC": np.full(4, 20.0)}, "oil_degC")
 
 
 def test_five_days_components_histogram_and_the_vector(campaigns: Database) -> None:
@@ -317,6 +335,43 @@ def test_no_run_and_one_run_are_sentences_with_exit_status_0(made: Database, tmp
     assert main(["--db", str(path), "trend", "single"]) == 0
     (said,) = capsys.readouterr().out.splitlines()
     assert said == "single: 1 run of 1 campaign, of 2024-01-01 09:00; a history begins with the second run"
+
+
+def test_findings_beyond_any_doubt_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A q-value of exactly zero is the smallest, not a missing one."""
+    rng = np.random.default_rng(3)
+    ambient = 20.0 + rng.normal(size=(60, 6))
+    with Database(tmp_path / "sure.duckdb") as db:
+        values = {"EX0B": 900.0 * (ambient - 20.0), "EY0C": np.zeros_like(ambient)}
+        add_machine(
+            db, "sure", {name: x + 1e-3 * rng.normal(size=x.shape) for name, x in values.items()}, ambient
+        )
+        (found,) = trends(db, "sure").document["parameters"]["EX0B"]["conditions"]
+    assert found["q_value"] == 0.0
+    assert main(["--db", str(tmp_path / "sure.duckdb"), "trend", "sure"]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"EX0B: (900\.0|899\.9)\d* µm/K \(u = ", said)
+
+
+def test_charts_of_the_vector_and_what_they_are_compared_with_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "charts.duckdb"
+    rng = np.random.default_rng(6)
+    values = {name: rng.normal(size=(30, RUNS)) for name in ("EX0B", "EX0C")}
+    values["EX0C"][-1] += 50.0
+    with Database(path) as db:
+        add_machine(db, "C", values)
+    assert main(["--db", str(path), "trend", "C"]) == 0
+    said = capsys.readouterr().out
+    assert (
+        "charts: reference period 2024-01-01 to 2024-03-04, 10 days; a false alarm once in 370 days" in said
+    )
+    assert "T² of 2 parameters together: alarm, mostly of EX0C, EX0B (" in said
+    assert "MEWMA of 2 parameters together: alarm, mostly of EX0C, EX0B (" in said
+    assert main(["--db", str(path), "trend", "C", "--reference", "2030-01-01..2031-01-01"]) == 0
+    said = capsys.readouterr().out
+    assert "no chart: no run of the history lies in the reference period" in said
 
 
 def test_a_headline_states_the_uncertainty_by_name_and_no_power_of_ten() -> None:

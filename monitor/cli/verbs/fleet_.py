@@ -1,6 +1,7 @@
 """All machines at once: every parameter of every machine, what needs attention first.
 
 Means, pooled variances, Bartlett, ANOVA and drift are computed from sums that the database makes; nothing is stored.
+Of each machine the days since its last recorded event count (`monitor event`).
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(found)
         return 0
+    machines = f"{found['machines']} machine{'' if found['machines'] == 1 else 's'}"
     rows = [
         [
             str(one["rank"]), one["machine"], one["parameter"], one["attention"], one["unit"],
@@ -45,7 +47,7 @@ def run(options: Namespace) -> int:
         for one in found["table"]
     ]  # fmt: skip
     output.table(
-        f"{found['machines']} machines, {found['values']} values; q: false discovery rate over all rows",
+        f"{machines}, {found['values']} values; q: false discovery rate over all rows",
         ["rank", "machine", "parameter", "attention", "unit", "latest", "mean", "s runs", "s days", "a year", "limit",
          "Bartlett q", "ANOVA q", "drift q"],
         rows, left=5,

@@ -66,7 +66,11 @@ def run(options: Namespace) -> int:
         rows,
         left=2,
     )
-    moved = [name for name, one in found["parameters"].items() if (one["anova_q"] or 1.0) < 0.001]
+    moved = [
+        name
+        for name, one in found["parameters"].items()
+        if one["anova_q"] is not None and one["anova_q"] < 0.001
+    ]
     if moved:
         output.say(f"the groups differ in {', '.join(moved)} (ANOVA, false discovery rate q below 0.001)")
     for name in ("box_m", "manova"):
@@ -84,9 +88,10 @@ def run(options: Namespace) -> int:
             f"{name} drifts within the day: {output.rounded(one['per_hour'], one['u'])} {one['unit']} "
             f"(u = {output.two_digits(one['u'])} {one['unit']}, q = {output.probability(one['q_value'])})"
         )
-    below = sum(p is not None and p < 0.05 for p in found["coordinates"]["anova_p"])
-    if found["coordinates"]["n"]:
-        output.say(f"probed coordinates: {found['coordinates']['n']}; ANOVA p below 0.05 in {below} of them")
+    tested = [p for p in found["coordinates"]["anova_p"] if p is not None]
+    if tested:
+        below = sum(p < 0.05 for p in tested)
+        output.say(f"probed coordinates: {len(tested)}; ANOVA p below 0.05 in {below} of them")
     for file in found.get("figures", []):
         output.say(file)
     return 0

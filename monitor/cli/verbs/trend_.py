@@ -10,13 +10,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
-from monitor.cli import output
+from monitor.cli import output, trend_output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow import agreement
 from monitor.workflow.trends import Choice, trends
 
 EXAMPLE = "monitor trend HU40-T --since 2025-01-01 --figures figures"
@@ -92,160 +90,5 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(found)
         return 0
-    _tables(found)
+    trend_output.say(found)
     return 0
-
-
-def _three(value: float) -> str:
-    """Three digits, never in powers of ten."""
-    return f"{float(f'{value:.3g}'):.10g}"
-
-
-def _latest(one: dict[str, Any]) -> tuple[str, str, str]:
-    """The mean of the last day with its standard uncertainty and the number of its runs."""
-    value, u = one["latest"], one["latest_u"]
-    if not u:
-        return _three(value), "-", str(one["latest_runs"])
-    return output.rounded(value, u), output.two_digits(u), str(one["latest_runs"])
-
-
-def _tables(found: dict[str, Any]) -> None:
-    for note in found["notes"]:
-        output.say(f"note: {note}")
-    for pair in found["agreement"]:
-        output.say(agreement.sentence(pair))
-    if found["why"] is not None:
-        output.say(found["why"])
-        return
-    runs, campaigns = found["runs"], len(found["campaigns"])
-    held = f"{runs} run{'s' if runs > 1 else ''} of {campaigns} campaign{'s' if campaigns > 1 else ''}"
-    if runs == 1:
-        latest = next(iter(found["parameters"].values()))["latest_at"]
-        output.say(
-            f"{found['machine']}: {held}, of {latest[:16].replace('T', ' ')}; a history begins with the second run"
-        )
-        return
-    rows = []
-    for name, one in found["parameters"].items():
-        slope = one["slope_per_year"]
-        charts = one["control"]
-        alarms = [
-            kind for kind in ("shewhart", "ewma", "cusum") if charts.get(kind, {}).get("state") == "alarm"
-        ]
-        rows.append(
-            [
-                name, one["unit"], *_latest(one),
-                "-" if slope is None else output.rounded(slope, one["u_slope"]),
-                "-" if slope is None else output.two_digits(one['u_slope']), output.probability(one["p_value"]),
-                "-" if one["robust_slope_per_year"] is None else _three(one["robust_slope_per_year"]),
-                "-" if one["limit"] is None else f"{one['limit']:g}",
-                (one["crosses_limit_at"] or "-")[:10],
-                output.probability(one["in_tolerance_at_next_check"]),
-                "-" if charts["why"] else ", ".join(alarms) or "in control",
-            ]
-        )  # fmt: skip
-    names = ["parameter", "unit", "latest", "u", "n", "slope", "u", "p", "Theil-Sen", "limit", "crosses",
-             "in tolerance next", "charts"]  # fmt: skip
-    # A column that has nothing for any parameter is left out; the sentences below say why.
-    told = [place for place in range(len(names)) if any(row[place] != "-" for row in rows)]
-    output.table(
-        f"{found['machine']}: {held}" + ("; slopes a year" if names.index("slope") in told else ""),
-        [names[place] for place in told],
-        [[row[place] for place in told] for row in rows],
-        left=2,
-    )
-    for name, one in found["parameters"].items():
-        for change in one["changes"]:
-            output.say(
-                f"{name}: {change['kind']} of {output.rounded(change['size'], change['u'])} {change['unit']} "
-                f"(u = {output.two_digits(change['u'])} {change['unit']}) at "
-                f"{change['at'][:16].replace('T', ' ')} (between {change['interval'][0][:10]} and "
-                f"{change['interval'][1][:10]}, p = {output.probability(change['p_value'])})"
-            )
-    for name, one in found["parameters"].items():
-        for condition in one["conditions"]:
-            if (condition["q_value"] or 1.0) < 0.05:
-                beside = (
-                    f"; not told from {', '.join(condition['moves_with'])}" if condition["moves_with"] else ""
-                )
-                output.say(
-                    f"{name}: {output.rounded(condition['coefficient'], condition['u'])} {condition['unit']} "
-                    f"(u = {output.two_digits(condition['u'])} {condition['unit']}) with "
-                    f"{condition['channel']}{beside}"
-                )
-        warm = one["warm_up"]
-        if warm is not None and warm["p_value"] < 0.05 and warm["stable_after_h"] is not None:
-            output.say(
-                f"{name}: warms up by {warm['amplitude']:.3g} {warm['unit']} with a time constant of "
-                f"{warm['tau_h']:.2g} h; stable after {warm['stable_after_h']:.2g} h"
-            )
-    _forecasts(found)
-    for sentence in dict.fromkeys(one["why"] for one in found["parameters"].values() if one["why"]):
-        output.say(sentence)
-    for event in found["events"]:
-        output.say(f"event {event['at'][:10]}: {event['kind']}, {event['description']}")
-    for file in found.get("figures", []):
-        output.say(file)
-
-
-def _forecasts(found: dict[str, Any]) -> None:
-    """The volumetric error ahead, how good the forecasts were, and when the machine is best checked again."""
-    ahead = found.get("volumetric_error")
-    if ahead is not None and ahead["why"] is None:
-        low, high = ahead["predicted_interval_um"]
-        crosses = "does not reach its limit" if ahead["crosses_limit_at"] is None else (
-            f"reaches its limit on {ahead['crosses_limit_at'][:10]}"
-        )  # fmt: skip
-        between = _between(ahead["crosses_limit_interval"])
-        output.say(
-            f"volumetric error: {_three(ahead['latest_um'])} µm by the drifts of all parameters together, limit "
-            f"{_three(ahead['limit_um'])} µm; {crosses}{between}"
-        )
-        output.say(
-            f"  at the next check, {ahead['next_check'][:10]}: {_three(ahead['predicted_um'])} µm "
-            f"({_three(low)} to {_three(high)} µm with 95 %), in tolerance with "
-            f"{output.probability(ahead['in_tolerance_at_next_check'])}; check within "
-            f"{ahead['recommended_interval_days']:.0f} days"
-        )
-        tested = ahead["backtest"]
-        if tested is not None:
-            output.say(
-                f"  {tested['inside']} of {tested['made']} past days, each foretold by the days before it, lay in the "
-                f"interval ({_three(tested['rms_um'])} µm off, root mean square)"
-            )
-    elif ahead is not None and ahead["limit_um"] is not None:
-        output.say(ahead["why"])
-    intervals = {
-        name: one["recommended_interval_days"]
-        for name, one in found["parameters"].items()
-        if one["recommended_interval_days"] is not None
-    }
-    if intervals:
-        first = min(intervals, key=lambda name: intervals[name])
-        output.say(
-            f"check within {intervals[first]:.0f} days, for {first} ({found['parameters'][first]['recommended_by']})"
-        )
-    tested = {
-        name: one["backtest"] for name, one in found["parameters"].items() if one["backtest"] is not None
-    }
-    if tested:
-        made, inside = (sum(one[key] for one in tested.values()) for key in ("made", "inside"))
-        worst = min(tested, key=lambda name: tested[name]["share_inside"])
-        output.say(
-            f"backtest, every day foretold by the days before it: {inside} of {made} later values "
-            f"({100 * inside / made:.0f} %) inside the 95 % forecast interval; least for {worst}, "
-            f"{tested[worst]['inside']} of {tested[worst]['made']}"
-        )
-
-
-def _between(interval: list[str | None] | None) -> str:
-    if interval is None:
-        return ""
-    low, high = interval
-    if low is None:
-        return f" (95 %: by {high[:10]})" if high is not None else ""
-    return (
-        f" (95 %: {low[:10]} or later, perhaps never)"
-        if high is None
-        else f" (95 %: {low[:10]} to {high[:10]})"
-    )
