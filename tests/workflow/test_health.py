@@ -390,7 +390,7 @@ def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_wi
     found = report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
     again = stored(fleet, "B-stepped")
     assert again.map == told
-    page = text_of(found["files"][1])[1]
+    page = " ".join(text_of(found["files"][1])[1:3])
     assert "Volumetric error, run 16" in page
     # And drawn: the words of its scale stand in the picture.
     assert [one.across for one in told.slices] == ["Z", "Y", "X"]
@@ -404,7 +404,7 @@ def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_wi
     assert again.model.runs in Path(found["files"][0]).read_text(encoding="utf-8")
     assert "run 20" not in page
     later = report(fleet, "2026-W11", "B-stepped", tmp_path, made_at=MADE)
-    assert "Volumetric error, run 20" in text_of(later["files"][1])[1]
+    assert "Volumetric error, run 20" in text_of(later["files"][1])[2]
 
 
 def test_a_report_made_late_says_what_one_made_on_monday_said(
