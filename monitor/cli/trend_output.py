@@ -189,6 +189,11 @@ def _forecasts(found: dict[str, Any]) -> None:
         output.say(
             f"check within {intervals[first]:.0f} days, for {first} ({found['parameters'][first]['recommended_by']})"
         )
+        span = found["parameters"][first]["span_days"]
+        if intervals[first] > span:
+            output.say(
+                f"  its drift was seen over {span:.0f} days only; that it goes on for longer is a supposition"
+            )
     tested = {
         name: one["backtest"] for name, one in found["parameters"].items() if one["backtest"] is not None
     }

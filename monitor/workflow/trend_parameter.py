@@ -109,13 +109,13 @@ def too_short(span: float, split: bool) -> str:
 def drift(series: Series, since: float) -> tuple[Document, Trend | None]:
     """Slope of the piece since ``since`` (days since 1970), per year; none where the piece is too short for that."""
     piece = series.part(series.t >= since)
+    span = float(np.ptp(piece.t)) if len(piece.t) else 0.0
     empty: Document = {
         "slope_per_year": None, "u_slope": None, "slope_interval": None, "p_value": None, "robust_slope_per_year": None,
         "robust_interval": None, "monotone_p": None, "autocorrelation": None, "between_days": None, "within_days": None,
         "since": None if not len(piece.t) else date(float(piece.t[0]), series.offset),
-        "n": len(piece.t), "days": piece.day_count, "why": None,
+        "n": len(piece.t), "days": piece.day_count, "span_days": span, "why": None,
     }  # fmt: skip
-    span = float(np.ptp(piece.t)) if len(piece.t) else 0.0
     if span < SHORTEST_DAYS:
         return {**empty, "why": too_short(span, bool(np.isfinite(since)))}, None
     if np.ptp(piece.values) == 0.0:

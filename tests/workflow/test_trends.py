@@ -404,7 +404,11 @@ def test_a_parameter_that_never_varies_has_no_drift_and_no_part_in_the_vector(
     assert document["control"]["vector"]["parameters"] == ["EX0C", "EY0C"]
     assert table["EX0B"]["attention"] == "as usual"
     assert main(["--db", str(tmp_path / "still.duckdb"), "trend", "S", "--parameter", "EX0C"]) == 0
-    assert "together" not in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "together" not in said
+    # The recommended interval is far beyond the 29 weeks that were seen.
+    assert int(re.findall(r"check within (\d+) days, for EX0C", said)[0]) > 203
+    assert "its drift was seen over 203 days only" in said
 
 
 def test_a_headline_states_the_uncertainty_by_name_and_no_power_of_ten() -> None:
