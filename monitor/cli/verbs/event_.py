@@ -1,4 +1,8 @@
-"""Record what happened to a machine (crash, repair, compensation, another probe), or list what was recorded."""
+"""Record what happened to a machine (crash, repair, compensation, another probe), or list what was recorded.
+
+An event of any kind splits the history of all parameters: `trend` and `fleet` follow the machine from its last event
+on. Record what may have changed the machine; an event cannot be undone.
+"""
 
 from __future__ import annotations
 
