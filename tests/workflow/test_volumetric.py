@@ -1,6 +1,5 @@
 """What the workflow tells the map of a machine: parameters of the run, shared effects, and how both hang together."""
 
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -46,8 +45,7 @@ def test_two_ways_covariance_with_shared_effects_is_that_of_all_unknowns_at_once
     alone[:names, :names] = (np.linalg.inv((own / unit).T @ (own / unit)) / unit[:, None] / unit)[
         :names, :names
     ]
-    found = SimpleNamespace(fit=shared, run=int(shared.problem.runs[place]))
-    added = _of_shared(found, list(range(names)), list(range(common))) / shared.scale**2
+    added = _of_shared(shared, place, list(range(names)), list(range(common))) / shared.scale**2
     size = np.sqrt(np.diag(whole))
     np.testing.assert_allclose(
         (alone + added) / np.outer(size, size), whole / np.outer(size, size), atol=1e-7
