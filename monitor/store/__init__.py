@@ -34,7 +34,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.events import list_events, machine_events, record_event
+from monitor.store.events import NOTE, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
@@ -54,6 +54,7 @@ from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
 __all__ = [
+    "NOTE",
     "Backup",
     "Database",
     "FleetSums",

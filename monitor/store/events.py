@@ -13,6 +13,9 @@ from monitor.store.connection import Database, utc_now
 if TYPE_CHECKING:
     import pandas as pd
 
+#: A note is shown beside the history. An event of any other kind may have changed the machine, and splits it.
+NOTE = "note"
+
 
 def record_event(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> int:
     """Keep an event of a machine; its number. ``happened_at`` has an offset from UTC.

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from monitor.exceptions import NotFoundError
 from monitor.records import Array
 from monitor.store.connection import Database
+from monitor.store.events import NOTE
 
 _MACHINES = """
 CREATE OR REPLACE TEMP TABLE fleet_machine AS
@@ -76,11 +77,12 @@ GROUP BY identification_id, machine_no, heading, day
 """
 
 # A recorded event splits the history of a machine, as in `monitor trend`: groups that began before the last event count
-# no more. An event after the last group splits nothing yet.
-_SINCE = """
+# no more. An event after the last group splits nothing yet, a note never.
+_SINCE = f"""
 CREATE OR REPLACE TEMP TABLE fleet_since AS
 WITH happened AS (
     SELECT machine_no, epoch(happened_at) / 86400.0 AS at_d FROM event JOIN fleet_machine USING (machine)
+    WHERE kind <> '{NOTE}'
 ), last AS (
     SELECT machine_no, max(began_d) AS last_d FROM fleet_group SEMI JOIN happened USING (machine_no) GROUP BY machine_no
 )

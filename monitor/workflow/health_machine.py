@@ -8,7 +8,7 @@ from datetime import datetime
 import numpy as np
 
 from monitor.reporting.health import ALARMS, DataQuality, MachineHealth, RefusedImport
-from monitor.store import Database, StoredModel, stored_analyses
+from monitor.store import NOTE, Database, StoredModel, stored_analyses
 from monitor.workflow.health_facts import (
     changes_noted,
     conditions_of,
@@ -124,11 +124,12 @@ def machine_health(db: Database, past: Begun, done: Done) -> MachineHealth:
     evaluated, explained = results.uncertainty, results.explanation
     series = series_of(db, machine, model, runs)
     origin = runs[0].at
-    changes = changes_of(series, events, origin)
+    splitting = [event for event in events if event.kind != NOTE]
+    changes = changes_of(series, splitting, origin)
     limits = tolerances_of(db, last.campaign)
     judged = judged_by(evaluated, limits)
     now = (last.at - origin).total_seconds() / 86400.0
-    split = [(event.at - origin).total_seconds() / 86400.0 for event in events]
+    split = [(event.at - origin).total_seconds() / 86400.0 for event in splitting]
     parameters, drifts = [], {}
     for name, one in series.items():
         if evaluated is None or name not in evaluated["guf"]["u"]:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.statistics import Change, History, Trend, control_false_discoveries
 from monitor.store import (
+    NOTE,
     Database,
     MachineHistory,
     machine_events,
@@ -202,6 +203,7 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
     choice = choice or Choice()
     history = _history(db, machine, choice)
     happened = machine_events(db, machine)
+    splitting = [one for one in happened if one[1] != NOTE]
     known = [{"at": at.isoformat(), "kind": kind, "description": text} for at, kind, text in happened]
     head: Document = {
         "machine": machine,
@@ -210,7 +212,7 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         "campaigns": list(dict.fromkeys(history.campaign.tolist())),
         "methods": list(dict.fromkeys(history.method.tolist())),
         "agreement": agreement(
-            db, history, [Moment(at.timestamp(), kind, text) for at, kind, text in happened]
+            db, history, [Moment(at.timestamp(), kind, text) for at, kind, text in splitting]
         ),
         "events": known,
         "notes": same_hours(history),
@@ -223,7 +225,7 @@ def trends(db: Database, machine: str, choice: Choice | None = None) -> Trends:
         why = f"machine {machine} has no identified run{of} {when}"
         return Trends({**head, "why": why, "parameters": {}}, (), {})
     series = all_series(history)
-    events = [_days(at) for at, _, _ in happened]
+    events = [_days(at) for at, _, _ in splitting]
     reference = None if choice.reference is None else (_days(choice.reference[0]), _days(choice.reference[1]))
     charts = Charts(points_of(history, series), reference)
     check = _next_check(history, choice)

@@ -219,6 +219,8 @@ def test_of_each_machine_the_days_since_its_last_event_count(db: Database) -> No
     record_event(db, "repaired", began[1].replace(tzinfo=UTC), "crash", "into the table")
     # At the very start of a run: that run follows it.
     record_event(db, "repaired", at, "repair", "ball screw changed")
+    # A note splits nothing.
+    record_event(db, "quiet", began[3].replace(tzinfo=UTC), "note", "looked at")
     # Nothing was measured since: nothing is split yet.
     record_event(db, "crashed", began[5].replace(tzinfo=UTC) + timedelta(days=99), "crash", "into the table")
     sums = fleet_sums(db)

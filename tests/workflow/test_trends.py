@@ -183,14 +183,16 @@ def test_an_event_splits_the_history_and_is_no_finding(made: Database) -> None:
     )
     at = (START + timedelta(days=67)).replace(tzinfo=UTC)
     assert len(trends(made, "split").document["parameters"]["EX0B"]["changes"]) == 1
+    record_event(made, "split", at, "note", "ball screw inspected")
+    assert len(trends(made, "split").document["parameters"]["EX0B"]["changes"]) == 1
     record_event(made, "split", at, "repair", "ball screw changed")
     document = trends(made, "split").document
     found = document["parameters"]["EX0B"]
     assert found["changes"] == []
     assert found["days"] == 10
-    assert document["events"] == [
-        {"at": at.isoformat(), "kind": "repair", "description": "ball screw changed"}
-    ]
+    at_once = sorted((one["kind"], one["description"]) for one in document["events"])
+    assert at_once == [("note", "ball screw inspected"), ("repair", "ball screw changed")]
+    assert {one["at"] for one in document["events"]} == {at.isoformat()}
 
 
 def test_choices_and_their_refusals(made: Database) -> None:

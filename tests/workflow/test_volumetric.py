@@ -1,6 +1,5 @@
 """What the workflow tells the map of a machine: parameters of the run, shared effects, and how both hang together."""
 
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,7 @@
 """Record what happened to a machine (crash, repair, compensation, another probe), or list what was recorded.
 
-An event of any kind splits the history of all parameters: `trend` and `fleet` follow the machine from its last event
-on. Record what may have changed the machine; an event cannot be undone.
+An event splits the history of all parameters: `trend`, `fleet` and the health report follow the machine from its
+last event on. A note is only shown with the history. Neither can be undone.
 """
 
 from __future__ import annotations
@@ -25,7 +25,11 @@ def options(parser: ArgumentParser) -> None:
         "text", nargs="?", metavar="TEXT", help="what happened; without it the events are listed"
     )
     parser.add_argument("--at", metavar="TIME", help="ISO 8601 with an offset")
-    parser.add_argument("--kind", default="note", help="a word: crash, repair, compensation, probe, note")
+    parser.add_argument(
+        "--kind",
+        default="note",
+        help="a word: crash, repair, compensation, probe; note (the default) where nothing changed the machine",
+    )
 
 
 def run(options: Namespace) -> int:
