@@ -3,6 +3,7 @@ probed coordinate by probed coordinate."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from monitor.store import (
 )
 from monitor.units import DEGREE
 from monitor.workflow.identification import identify
+from monitor.workflow.matrix_files import write_matrices
 from monitor.workflow.models import resolve
 from monitor.workflow.run_columns import campaign_columns, group_labels, selected
 from monitor.workflow.run_tests import SEED, components, histogram, normal_scatter, vector_tests
@@ -64,7 +66,7 @@ def coordinates(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] 
     names = []
     for place, (target, *angles) in enumerate(plan, start=1):
         where = " ".join(
-            f"{axis.lower()}{angle / DEGREE.factor:g}" for axis, angle in zip(turning, angles, strict=True)
+            f"{axis.lower()}={angle / DEGREE.factor:g}" for axis, angle in zip(turning, angles, strict=True)
         )
         names += [f"{place} ball {target} {where} {axis.lower()}" for axis in linear]
     values = np.array(
@@ -153,9 +155,11 @@ def stats(
     where: str | None = None,
     model: str | None = None,
     select: str | None = None,
+    matrices: Path | None = None,
 ) -> Document:
     """Statistics of a campaign's runs, grouped ``by`` a column or a stored selection, restricted to runs ``where`` a
-    condition holds and to those of the stored selection ``select``.
+    condition holds and to those of the stored selection ``select``. Covariance and correlation matrices of the
+    parameters and of the probed coordinates go into CSV files in the folder ``matrices``.
 
     Identifies the campaign first where that has not been done. Raises InputError for a column, condition or selection
     that the runs do not have, DataError for fewer than two runs.
@@ -205,6 +209,14 @@ def stats(
         db, "statistics", document, method=f"by {by}", campaign=campaign,
         model=found.model, model_version=found.model_version, seed=SEED,
     )  # fmt: skip
+    if matrices is not None:
+        document["matrices"] = write_matrices(matrices, "parameters", pooled, [unit.name for unit in units])
+        probed = _probed(loaded, runs)
+        if not isinstance(probed, str):
+            of_probed = _statistics(1e3 * probed[1], groups, probed[0])[0]
+            document["matrices"] += write_matrices(
+                matrices, "coordinates", of_probed, ["µm"] * len(probed[0])
+            )
     return document
 
 
@@ -215,14 +227,20 @@ def _statistics(values: Array, groups: list[str], names: list[str]) -> tuple[Poo
     return pooled, None if alike else homogeneity(values, groups, names)
 
 
-def _coordinates(campaign: Campaign, runs: list[int], groups: list[str]) -> Document:
+def _probed(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | str:
+    """Names and values (R, 3 m), mm, of the probed coordinates, or why there are none."""
     # What a tracker sees stands in a frame of its own in every run: there are no coordinates to put side by side.
-    outside = campaign.method == tracker.NAME
-    found = None if outside else coordinates(campaign, runs)
-    if found is None:
+    if campaign.method == tracker.NAME:
+        return OWN_FRAMES
+    return coordinates(campaign, runs) or "the runs do not follow one plan"
+
+
+def _coordinates(campaign: Campaign, runs: list[int], groups: list[str]) -> Document:
+    found = _probed(campaign, runs)
+    if isinstance(found, str):
         return {
             "n": 0,
-            "why": OWN_FRAMES if outside else "the runs do not follow one plan",
+            "why": found,
             "bartlett_p": [],
             "anova_p": [],
             "histograms": {},

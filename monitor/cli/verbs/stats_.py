@@ -28,13 +28,18 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument("--where", metavar="CONDITION", help="only runs for which it holds")
     parser.add_argument("--select", metavar="NAME", help="only the runs of this stored selection")
     parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--matrices", type=Path, metavar="DIR", help="write covariance and correlation matrices as CSV files"
+    )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw the parameters over the runs")
 
 
 def run(options: Namespace) -> int:
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options, threads=1) as db, output.working("computing"), db.transaction():
-        found = stats(db, options.campaign, options.by, options.where, options.model, options.select)
+        found = stats(
+            db, options.campaign, options.by, options.where, options.model, options.select, options.matrices
+        )
         if options.figures is not None:
             from monitor.workflow.figures import statistics_figure
 
@@ -92,6 +97,6 @@ def run(options: Namespace) -> int:
     if tested:
         below = sum(p < 0.05 for p in tested)
         output.say(f"probed coordinates: {len(tested)}; ANOVA p below 0.05 in {below} of them")
-    for file in found.get("figures", []):
+    for file in (*found.get("matrices", []), *found.get("figures", [])):
         output.say(file)
     return 0
