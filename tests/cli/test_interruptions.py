@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +141,7 @@ def test_ctrl_c_ends_with_one_line_and_nothing_stored(started: Any, db: Path) ->
     deadline = time.monotonic() + 30
     while time.monotonic() < deadline and process.poll() is None:
         time.sleep(0.3)
-        if in_use(db):
+        if held_by(process, db):
             break
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
@@ -153,6 +154,19 @@ def test_ctrl_c_ends_with_one_line_and_nothing_stored(started: Any, db: Path) ->
     with Database(db) as opened:
         assert opened.rows("SELECT count(*) FROM analysis") == before
         assert verify_audit(opened).ok
+
+
+def held_by(process: Any, path: Path) -> bool:
+    """Whether a process has the file open. To open it oneself, even for a moment, may keep the process from it."""
+    opened = Path(f"/proc/{process.pid}/fd")
+    if not opened.is_dir():
+        return in_use(path)
+    for link in opened.iterdir():
+        # A file may be closed meanwhile.
+        with suppress(OSError):
+            if link.readlink() == path:
+                return True
+    return False
 
 
 def in_use(path: Path) -> bool:
