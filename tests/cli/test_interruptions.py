@@ -164,7 +164,7 @@ def held_by(process: Any, path: Path) -> bool:
     for link in opened.iterdir():
         # A file may be closed meanwhile.
         with suppress(OSError):
-            if link.readlink() == path:
+            if link.resolve() == path.resolve():
                 return True
     return False
 
