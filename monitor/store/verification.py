@@ -21,6 +21,7 @@ from monitor.store.connection import Database
 from monitor.store.events import event_content
 from monitor.store.identifications import stored_identification_content
 from monitor.store.import_notes import notes_content
+from monitor.store.indexes import index_faults
 from monitor.store.models import all_models, model_content, model_key
 from monitor.store.refusals import cleared_content, refusal_content
 from monitor.store.selections import selection_content
@@ -43,7 +44,13 @@ class Verification:
 
 def verify_audit(db: Database) -> Verification:
     """Hash everything anew and hold it against the audit; takes as long as reading the whole database."""
-    faults = [*audit.chain_faults(db), *certificate_faults(db), *_file_faults(db), *_machine_faults(db)]
+    faults = [
+        *audit.chain_faults(db),
+        *certificate_faults(db),
+        *_file_faults(db),
+        *_machine_faults(db),
+        *index_faults(db),
+    ]
     told = {}
     imports: Counter[str] = Counter()
     for subject, key, content in db.rows("SELECT subject, key, content_sha256 FROM audit ORDER BY entry"):

@@ -84,8 +84,3 @@ def test_a_database_of_before_is_filled_by_portions(monkeypatch: pytest.MonkeyPa
         (i, [2, 7], [[i + 0.02 + z, i + 0.07 + z], [i + 0.02 + a, None]], [[i / 10] * 2] * 2)
         for i in (1, 2, 4, 5)
     ]
-
-
-def test_the_history_of_a_machine_is_found_by_indices(db: Database) -> None:
-    names = {name for (name,) in db.rows("SELECT index_name FROM duckdb_indexes()")}
-    assert {"imported_campaign_of_machine", "run_of_campaign", "identification_of_campaign"} <= names
