@@ -12,7 +12,8 @@ import sys
 from datetime import date
 from pathlib import Path
 
-from monitor.reporting.certificate import (
+from monitor.reporting.certificate.dcc import dcc_xml
+from monitor.reporting.certificate.record import (
     CertificateRecord,
     Condition,
     Item,
@@ -22,8 +23,7 @@ from monitor.reporting.certificate import (
     Person,
     Reference,
 )
-from monitor.reporting.dcc import dcc_xml
-from monitor.reporting.results import result_set
+from monitor.reporting.certificate.results import result_set
 from monitor.units import MICROMETRE, MICRORADIAN
 
 # Estimates and covariance in mm and rad; U and the regions follow from k_q and k_p (JCGM 102:2011, 6.5).

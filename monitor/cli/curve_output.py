@@ -8,8 +8,8 @@ from typing import Any
 
 from monitor.cli import output
 from monitor.store import Database
-from monitor.workflow import curves
-from monitor.workflow.curve_answer import correlation
+from monitor.workflow.explain import curves
+from monitor.workflow.explain.curve_answer import correlation
 
 Document = dict[str, Any]
 
@@ -37,7 +37,7 @@ def compare(db: Database, options: Namespace) -> int:
     """The verb `compare` for a curve."""
     found, fitted = curves.compare(db, options.campaign, options.model)
     if options.figures is not None:
-        from monitor.workflow.curve_figures import curve_figures
+        from monitor.workflow.explain.curve_figures import curve_figures
 
         found["figures"] = curve_figures(fitted, None, options.figures)
     if options.json:
@@ -83,7 +83,7 @@ def explain(db: Database, options: Namespace) -> int:
     """The verb `explain` for a curve."""
     found, explanation = curves.explain(db, options.campaign, options.model, options.rate)
     if options.figures is not None:
-        from monitor.workflow.curve_figures import curve_figures
+        from monitor.workflow.explain.curve_figures import curve_figures
 
         found["figures"] = curve_figures(explanation.first, explanation, options.figures)
     if options.json:

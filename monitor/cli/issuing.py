@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.reporting.signing import FileKey, Key, TokenKey
-from monitor.workflow.certificate_results import METHODS
-from monitor.workflow.conformity import RULES
+from monitor.reporting.signature.signing import FileKey, Key, TokenKey
+from monitor.workflow.certificate.conformity import RULES
+from monitor.workflow.certificate.results import METHODS
 
 #: The environment variable with a token's PIN, unless --pin-from names another; an argument could be seen by others.
 PIN = "MONITOR_TOKEN_PIN"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from monitor.cli import output
-from monitor.workflow import agreement
+from monitor.workflow.history import agreement
 
 #: From so many runs on it is said why there are no charts.
 FEWEST_RUNS = 10

@@ -4,12 +4,12 @@
 apart from bad points, balls that moved and steps between runs.
 """
 
-from monitor.discovery.compare import Comparison, compare
-from monitor.discovery.explain import Explanation, explain
-from monitor.discovery.fit import Fit, fit
-from monitor.discovery.missing import Missing
-from monitor.discovery.mistakes import Mistake, find_mistakes, is_gross
-from monitor.discovery.version_error import VersionError, version_error
+from monitor.discovery.machine.compare import Comparison, compare
+from monitor.discovery.machine.explain import Explanation, explain
+from monitor.discovery.machine.fit import Fit, fit
+from monitor.discovery.machine.missing import Missing
+from monitor.discovery.machine.mistakes import Mistake, find_mistakes, is_gross
+from monitor.discovery.machine.version_error import VersionError, version_error
 
 __all__ = [
     "Comparison",

@@ -10,7 +10,11 @@ from __future__ import annotations
 from types import ModuleType
 
 from monitor.exceptions import DataError
-from monitor.methods import free_form, l_shape, rotary_probing, samba, tracker
+from monitor.methods.free_form import method as free_form
+from monitor.methods.l_shape import method as l_shape
+from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.samba import method as samba
+from monitor.methods.tracker import method as tracker
 
 METHODS: dict[str, ModuleType] = {
     module.NAME: module for module in (samba, rotary_probing, free_form, tracker, l_shape)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
 from monitor.exceptions import EffectError
 from monitor.machine import Chain, chain_of_axes, parse_topology
-from monitor.methods.base_effects import base_effects
+from monitor.methods.chain.base_effects import base_effects
 from monitor.records import Machine
 
 

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError
-from monitor.methods.least_squares import Linearisation
-from monitor.methods.problem import ChainProblem
-from monitor.methods.touch import TouchProblem
+from monitor.methods.chain.least_squares import Linearisation
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
 from monitor.uncertainty.run_problem import OneRun, rows_of, same_plan, touch_run
 

@@ -17,9 +17,9 @@ import numpy.typing as npt
 
 from monitor.effects import Context
 from monitor.exceptions import DataError
-from monitor.methods.least_squares import Linearisation, solve
-from monitor.methods.problem import ChainProblem
-from monitor.methods.touch import TouchProblem
+from monitor.methods.chain.least_squares import Linearisation, solve
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
 
 #: Trials that are solved at once by the plain Gauss-Newton: 62 probings of 200 trials take some 100 MB.

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError
-from monitor.methods.least_squares import MEMBER_SHARE, RANK_TOLERANCE
+from monitor.methods.chain.least_squares import MEMBER_SHARE, RANK_TOLERANCE
 from monitor.records import Array
 from monitor.uncertainty.expansion import expansion_of
 from monitor.uncertainty.program import compile_program

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from monitor.discovery.curve_candidates import catalogue as curve_catalogue
+from monitor.discovery.curve.candidates import catalogue as curve_catalogue
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
 from monitor.effects.curve import SEARCHED
@@ -15,10 +15,10 @@ from monitor.effects.curve_words import describe_curve
 from monitor.effects.words import Words, describe
 from monitor.machine import parse_topology
 from monitor.methods import method_named
-from monitor.methods.base_effects import base_effects
-from monitor.methods.curve import fit
-from monitor.methods.curve_problem import grid
-from monitor.methods.curve_problem import problem_of as curve_problem_of
+from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.curve.method import fit
+from monitor.methods.curve.problem import grid
+from monitor.methods.curve.problem import problem_of as curve_problem_of
 from monitor.readers import read_campaign
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, is_curve, load_campaign, load_curve

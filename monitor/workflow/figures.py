@@ -11,17 +11,17 @@ from monitor.discovery import Explanation, Fit
 from monitor.effects import ChainEffect
 from monitor.exceptions import DataError, InputError
 from monitor.records import Array
-from monitor.reporting.figure_style import save
-from monitor.reporting.figures_drivers import predicted_against_measured, residual_against_driver
-from monitor.reporting.figures_models import error_falling, ranked_effects
-from monitor.reporting.figures_parameters import parameters_by_run
-from monitor.reporting.figures_residuals import residual_bars, residual_vectors
+from monitor.reporting.figures.drivers import predicted_against_measured, residual_against_driver
+from monitor.reporting.figures.models import error_falling, ranked_effects
+from monitor.reporting.figures.parameters import parameters_by_run
+from monitor.reporting.figures.residuals import residual_bars, residual_vectors
+from monitor.reporting.figures.style import save
 from monitor.reporting.numbers import round_result
 from monitor.store import StoredIdentification
 from monitor.units import MICROMETRE
-from monitor.workflow.residuals import drivers_followed, in_machine_frame, mean_over_runs
-from monitor.workflow.residuals_against import against_effect
-from monitor.workflow.shape import shape_figure
+from monitor.workflow.explain.residuals import drivers_followed, in_machine_frame, mean_over_runs
+from monitor.workflow.explain.residuals_against import against_effect
+from monitor.workflow.explain.shape import shape_figure
 
 Document = dict[str, Any]
 ENDINGS = (".svg", ".png")

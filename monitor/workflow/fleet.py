@@ -12,7 +12,7 @@ from monitor.statistics import control_false_discoveries
 from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
 from monitor.store import Database, FleetSums, fleet_sums, latest_tolerances
 from monitor.workflow.models import resolve
-from monitor.workflow.trend_parameter import DAYS_PER_YEAR, SHORTEST_DAYS
+from monitor.workflow.trend.parameter import DAYS_PER_YEAR, SHORTEST_DAYS
 
 Document = dict[str, Any]
 

@@ -17,7 +17,7 @@ from monitor.store import (
     take_backup,
     verify_audit,
 )
-from monitor.workflow.campaigns import records
+from monitor.workflow.intake.campaigns import records
 
 Document = dict[str, Any]
 

@@ -15,9 +15,9 @@ from monitor.effects.words import describe
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods import METHODS
-from monitor.methods.base_effects import base_effects
-from monitor.methods.curve_problem import NAME as CURVE
-from monitor.methods.curve_problem import problem_of
+from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.curve.problem import NAME as CURVE
+from monitor.methods.curve.problem import problem_of
 from monitor.methods.model import Model, chain_of
 from monitor.store import (
     Database,

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.methods import method_named
-from monitor.methods.problem import ChainProblem
+from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 from monitor.store import (
     Database,
@@ -28,9 +28,9 @@ from monitor.store import (
     save_selection,
 )
 from monitor.uncertainty.row_problem import repeated_readings
-from monitor.workflow.campaigns import records
+from monitor.workflow.intake.campaigns import records
 from monitor.workflow.models import as_model
-from monitor.workflow.run_columns import campaign_columns, selected
+from monitor.workflow.run_statistics.columns import campaign_columns, selected
 
 Document = dict[str, Any]
 
@@ -124,9 +124,9 @@ def side_by_side(db: Database, names: Sequence[str], model: str | None = None, p
     names.
     """
     # These two come back to this module for the selections.
-    from monitor.workflow.runs_statistics import stats
-    from monitor.workflow.uncertainty import evaluate
-    from monitor.workflow.uncertainty_documents import document
+    from monitor.workflow.run_statistics.statistics import stats
+    from monitor.workflow.uncertainty.documents import document
+    from monitor.workflow.uncertainty.evaluation import evaluate
 
     if len(dict.fromkeys(names)) < 2:
         raise InputError("name at least two selections or campaigns to set side by side")
@@ -159,8 +159,8 @@ def side_by_side(db: Database, names: Sequence[str], model: str | None = None, p
 def side_by_side_figure(document: Document, folder: Path) -> list[str]:
     """The expanded uncertainties of the selections, bars side by side."""
     # The drawing library takes longer to load than most commands to run.
-    from monitor.reporting.figure_style import save
-    from monitor.reporting.figures_trend import selections_side_by_side
+    from monitor.reporting.figures.style import save
+    from monitor.reporting.figures.trend import selections_side_by_side
     from monitor.workflow.figures import ENDINGS, make_folder
 
     make_folder(folder)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from monitor.exceptions import InputError
-from monitor.methods.virtual import virtual_campaign
-from monitor.methods.virtual_robot import virtual_robot
+from monitor.methods.samba.virtual import virtual_campaign
+from monitor.methods.tracker.virtual import virtual_robot
 from monitor.readers import write_campaign
 from monitor.units import MICROMETRE
 

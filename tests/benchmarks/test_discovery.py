@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import explain, fit
-from monitor.discovery.scan import scan
-from monitor.discovery.variants import variants_of
-from monitor.discovery.visible import see
+from monitor.discovery.machine.scan import scan
+from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.visible import see
 from monitor.effects.catalogue import catalogue, drivers_of
-from monitor.methods.samba import problem_of
+from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -22,7 +22,7 @@ from scipy import stats
 from monitor.store import Database, fleet_sums
 from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import cell_tests
-from monitor.workflow.trends import trends
+from monitor.workflow.trend.trends import trends
 
 WEEKS, RUNS = 260, 4
 NAMES = [

@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from monitor.methods import METHODS, free_form, rotary_probing, samba
+from monitor.methods import METHODS
+from monitor.methods.free_form import method as free_form
 from monitor.methods.model import Model
+from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.samba import method as samba
 from monitor.readers import read_campaign
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from monitor.methods.samba import problem_of
+from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
 from monitor.uncertainty import (
     BlockSampler,

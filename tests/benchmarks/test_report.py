@@ -17,8 +17,8 @@ import time
 from pathlib import Path
 
 from monitor.store import Database
-from monitor.workflow.campaigns import import_folders
-from monitor.workflow.health import report
+from monitor.workflow.health.report import report
+from monitor.workflow.intake.campaigns import import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 QUIET = "nothing-hidden"

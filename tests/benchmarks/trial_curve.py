@@ -17,8 +17,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from monitor.discovery.curve_explain import explain_curve
-from monitor.methods.curve_problem import problem_of
+from monitor.discovery.curve.explain import explain_curve
+from monitor.methods.curve.problem import problem_of
 from monitor.records import CurveCampaign, Instrument
 
 Rows = np.ndarray

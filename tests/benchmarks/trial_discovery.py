@@ -36,7 +36,7 @@ from by_path import simulator as simulator_of
 
 from monitor.discovery import Explanation, Missing, explain, fit
 from monitor.effects.catalogue import catalogue, drivers_of
-from monitor.methods.samba import problem_of
+from monitor.methods.samba.method import problem_of
 from monitor.records import Campaign
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -45,7 +45,7 @@ Typed = Callable[..., Answer]
 def clock() -> Iterator[None]:
     """Certificates are issued on a day of ours, whatever the clock of the computer says."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("monitor.workflow.certificates.today", lambda: date(2027, 6, 1))
+        patch.setattr("monitor.workflow.certificate.issue.today", lambda: date(2027, 6, 1))
         yield
 
 

@@ -28,8 +28,8 @@ _DIE_AFTER_COMMIT = """
 import os, signal, sys
 from pathlib import Path
 from monitor.store import Database
-from monitor.workflow.campaigns import import_folders
-from monitor.workflow.identification import identify
+from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.identify.identification import identify
 db = Database(sys.argv[1])
 import_folders(db, [Path(sys.argv[2])])
 identify(db, Path(sys.argv[2]).name, None, None)

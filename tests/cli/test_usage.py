@@ -155,7 +155,7 @@ def test_a_fault_of_the_software_is_no_traceback(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr("monitor.workflow.campaigns.campaigns", broken)
+    monkeypatch.setattr("monitor.workflow.intake.campaigns.campaigns", broken)
     answer = typed("campaigns", db=filled)
     assert (answer.status, answer.out) == (3, "")
     assert answer.err.count("\n") == 1

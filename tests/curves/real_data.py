@@ -20,12 +20,13 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from nist import Series, series, write
 
-from monitor.reporting.figure_style import png
+from monitor.reporting.figures.style import png
 from monitor.statistics.means import anova
 from monitor.store import Database
-from monitor.workflow import comparison, curves, models
-from monitor.workflow.campaigns import import_folders
-from monitor.workflow.curve_figures import residual_figure
+from monitor.workflow import models
+from monitor.workflow.explain import comparison, curves
+from monitor.workflow.explain.curve_figures import residual_figure
+from monitor.workflow.intake.campaigns import import_folders
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "real-data.md"

@@ -11,10 +11,10 @@ import pytest
 from scipy import linalg
 
 from monitor.cli import main
-from monitor.discovery.curve_explain import explain_curve
+from monitor.discovery.curve.explain import explain_curve
 from monitor.effects.curve import Inputs, parse_base, parse_curve_effect
 from monitor.exceptions import CampaignError, EffectError
-from monitor.methods.curve_problem import problem_of
+from monitor.methods.curve.problem import problem_of
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign, Instrument
 from monitor.statistics.noise import Noise, assess, p_value_in_noise

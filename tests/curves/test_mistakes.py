@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.discovery.compare import EXPLAINED, SOMETHING_IS_MISSING
-from monitor.discovery.curve_compare import compare_curve
-from monitor.discovery.curve_explain import explain_curve
+from monitor.discovery.curve.compare import compare_curve
+from monitor.discovery.curve.explain import explain_curve
+from monitor.discovery.machine.compare import EXPLAINED, SOMETHING_IS_MISSING
 from monitor.exceptions import CampaignError
-from monitor.methods.curve import fit
-from monitor.methods.curve_problem import problem_of
+from monitor.methods.curve.method import fit
+from monitor.methods.curve.problem import problem_of
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign, Instrument
-from monitor.workflow.curve_documents import explanation_document
+from monitor.workflow.explain.curve_documents import explanation_document
 
 HOURS = np.arange(240.0)
 

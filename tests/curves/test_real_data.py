@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from monitor.methods.curve import fit
-from monitor.methods.curve_problem import problem_of
+from monitor.methods.curve.method import fit
+from monitor.methods.curve.problem import problem_of
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign

@@ -12,7 +12,7 @@ import pytest
 from by_path import load
 
 from monitor.discovery import Explanation, explain
-from monitor.methods.samba import problem_of
+from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 

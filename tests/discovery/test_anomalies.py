@@ -7,8 +7,8 @@ import pytest
 from by_path import simulator
 
 from monitor.discovery import fit
-from monitor.discovery.anomalies import bad_points, ball_moves, plan_places
-from monitor.methods.samba import problem_of
+from monitor.discovery.machine.anomalies import bad_points, ball_moves, plan_places
+from monitor.methods.samba.method import problem_of
 
 
 def test_places_are_the_same_probing_of_every_run(virtual_campaigns):

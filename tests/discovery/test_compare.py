@@ -10,8 +10,8 @@ from by_path import simulator
 from scipy import stats
 
 from monitor.discovery import compare, fit
-from monitor.discovery.compare import lack_of_fit, split
-from monitor.methods.samba import problem_of
+from monitor.discovery.machine.compare import lack_of_fit, split
+from monitor.methods.samba.method import problem_of
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd" / "linear"
 

@@ -10,14 +10,14 @@ import statsmodels.api as sm
 from by_path import simulator
 
 from monitor.discovery import fit
-from monitor.discovery.evidence import Pool, weigh
-from monitor.discovery.held_out import held_out_rms
-from monitor.discovery.scan import amplitudes
-from monitor.discovery.variants import variants_of
-from monitor.discovery.version_error import version_error
-from monitor.discovery.visible import see
+from monitor.discovery.machine.evidence import Pool, weigh
+from monitor.discovery.machine.held_out import held_out_rms
+from monitor.discovery.machine.scan import amplitudes
+from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.version_error import version_error
+from monitor.discovery.machine.visible import see
 from monitor.effects import parse_effect
-from monitor.methods.samba import problem_of
+from monitor.methods.samba.method import problem_of
 
 
 @pytest.fixture(scope="module")

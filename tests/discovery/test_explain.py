@@ -11,7 +11,7 @@ from monitor.discovery import explain
 from monitor.effects.catalogue import catalogue, drivers_of
 from monitor.effects.words import describe
 from monitor.methods.model import Model
-from monitor.methods.samba import problem_of
+from monitor.methods.samba.method import problem_of
 
 
 def names(found):

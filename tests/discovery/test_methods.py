@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from by_path import load
 
-from monitor.methods import rotary_probing
-from monitor.methods.problem import solve_problem
+from monitor.methods.chain.problem import solve_problem
+from monitor.methods.rotary_probing import method as rotary_probing
 
 TESTS = Path(__file__).resolve().parents[1]
 

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 from monitor.discovery import find_mistakes, fit, is_gross
-from monitor.discovery.fit import Fit
-from monitor.discovery.variants import cycles_of_unknown_pitch, resolvable
+from monitor.discovery.machine.fit import Fit
+from monitor.discovery.machine.variants import cycles_of_unknown_pitch, resolvable
 from monitor.exceptions import DataError
 from monitor.methods import method_named
-from monitor.methods.problem import ChainProblem
+from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
 from monitor.records import Campaign, Probings
 from monitor.store import Database, import_campaign
 from monitor.workflow.campaign_parts import only_run
-from monitor.workflow.comparison import explain_campaign
+from monitor.workflow.explain.comparison import explain_campaign
 from monitor.workflow.models import as_model, resolve
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

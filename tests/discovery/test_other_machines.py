@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from by_path import simulator
 
-from monitor.methods.problem import solve_problem
-from monitor.methods.samba import problem_of
+from monitor.methods.chain.problem import solve_problem
+from monitor.methods.samba.method import problem_of
 
 MACHINES = ("trunnion", "tilting table on X", "head and table", "fork head", "one rotary table")
 

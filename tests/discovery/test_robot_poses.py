@@ -12,15 +12,15 @@ import pytest
 from by_path import simulator
 
 from monitor.discovery import Explanation, explain, fit
-from monitor.discovery.poses import poses_of_rows, widening
-from monitor.discovery.variants import variants_of
-from monitor.discovery.visible import see
+from monitor.discovery.machine.poses import poses_of_rows, widening
+from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.visible import see
 from monitor.effects import parse_effect
 from monitor.exceptions import DataError
-from monitor.methods import tracker
+from monitor.methods.tracker import method as tracker
 from monitor.readers import read_campaign
 from monitor.records import Campaign
-from monitor.workflow.identification_notes import note
+from monitor.workflow.identify.notes import note
 
 
 @pytest.fixture(scope="module")

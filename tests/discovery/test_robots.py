@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from monitor.discovery import Explanation, explain, fit
-from monitor.discovery.held_out import held_out_error, pose_parts
-from monitor.discovery.version_error import version_error
-from monitor.discovery.visible import see
-from monitor.methods import tracker
+from monitor.discovery.machine.held_out import held_out_error, pose_parts
+from monitor.discovery.machine.version_error import version_error
+from monitor.discovery.machine.visible import see
 from monitor.methods.model import Model
+from monitor.methods.tracker import method as tracker
 from monitor.readers import read_campaign
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from monitor.discovery import explain
 from monitor.methods.model import Model
-from monitor.methods.samba import problem_of
+from monitor.methods.samba.method import problem_of
 
 GRID = np.linspace(-300.0, 300.0, 25)
 

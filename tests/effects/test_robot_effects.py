@@ -17,7 +17,7 @@ from monitor.effects.catalogue import catalogue, of_balls, of_tracker
 from monitor.effects.words import describe
 from monitor.exceptions import EffectError
 from monitor.machine import Chain, chain_of_axes, parse_topology
-from monitor.methods.base_effects import base_effects
+from monitor.methods.chain.base_effects import base_effects
 from monitor.records import ChainAxis
 
 DRIVERS = ("warmup", "run_time", "ambient_degC")

@@ -16,7 +16,7 @@ from monitor.machine import (
     parse_topology,
     touching_positions,
 )
-from monitor.methods.base_effects import base_effects
+from monitor.methods.chain.base_effects import base_effects
 from monitor.records import Array, ChainAxis
 
 # In the order of the conventions, section What SAMBA identifies; EXX is the first-order term of its motion.

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from monitor.methods import free_form
-from monitor.methods.free_form_plan import candidates_of
+from monitor.methods.free_form import method as free_form
+from monitor.methods.free_form.plan import candidates_of
 
 K = 2.0  # the figures state k = 2
 

@@ -9,10 +9,10 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import DataError
-from monitor.methods.l_shape import base_of, identify, problem_of
-from monitor.methods.l_shape_stepwise import squareness, stepwise
+from monitor.methods.chain.problem import solve_problem
+from monitor.methods.l_shape.method import base_of, identify, problem_of
+from monitor.methods.l_shape.stepwise import squareness, stepwise
 from monitor.methods.model import chain_of
-from monitor.methods.problem import solve_problem
 from monitor.readers import read_campaign
 from monitor.records import Machine
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.methods.least_squares import RANK_TOLERANCE, Linearisation, eliminate, project_out, solve
+from monitor.methods.chain.least_squares import RANK_TOLERANCE, Linearisation, eliminate, project_out, solve
 from monitor.records import Array
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError, InputError
-from monitor.methods.expected import candidate_touches, planned_context, sums_of
-from monitor.methods.least_squares import solve
-from monitor.methods.planning import (
+from monitor.methods.chain.expected import candidate_touches, planned_context, sums_of
+from monitor.methods.chain.least_squares import solve
+from monitor.methods.chain.planning import (
     STEP_RAD,
     Candidates,
     TimeModel,
@@ -19,8 +19,8 @@ from monitor.methods.planning import (
     pose_grid,
     quickest_plan,
 )
-from monitor.methods.samba import problem_of
-from monitor.methods.virtual import BALLS, BAR_LENGTH, ERRORS, GAINS, INDEXATIONS, virtual_campaign
+from monitor.methods.samba.method import problem_of
+from monitor.methods.samba.virtual import BALLS, BAR_LENGTH, ERRORS, GAINS, INDEXATIONS, virtual_campaign
 
 BAR_ENDS = {"S1": (-150.0, BAR_LENGTH / 2, 60.0), "S2": (-150.0, -BAR_LENGTH / 2, 60.0)}
 # Los 2017, section 6.5: seven pairs of B and C, the spindle not turned.

@@ -15,11 +15,11 @@ from by_path import load
 
 from monitor.exceptions import DataError
 from monitor.machine import parse_topology
-from monitor.methods import rotary_probing
+from monitor.methods.chain.problem import solve_problem
 from monitor.methods.model import Model
-from monitor.methods.problem import solve_problem
-from monitor.methods.rotary_base import rotary_base
-from monitor.methods.rotary_patterns import PARAMETERS, SYMBOLS, Touches, closed_forms
+from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.rotary_probing.base import rotary_base
+from monitor.methods.rotary_probing.patterns import PARAMETERS, SYMBOLS, Touches, closed_forms
 
 campaigns = load("rotary_campaigns", Path(__file__).with_name("rotary_campaigns.py"))
 PAPER, TRUTH, location, touched = campaigns.PAPER, campaigns.TRUTH, campaigns.location, campaigns.touched

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.methods.rotary_patterns import PARAMETERS, SYMBOLS, Touches, closed_forms
+from monitor.methods.rotary_probing.patterns import PARAMETERS, SYMBOLS, Touches, closed_forms
 
 TABLES = json.loads((Path(__file__).parents[1] / "references/papers/ibaraki2012.json").read_text())
 MDEG = np.pi / 180e3

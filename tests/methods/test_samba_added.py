@@ -11,8 +11,8 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import EffectError
-from monitor.methods import samba
 from monitor.methods.model import Model
+from monitor.methods.samba import method as samba
 from monitor.records import Array
 
 Distance = Callable[[Array, Array], float]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.methods import samba
+from monitor.methods.samba import method as samba
 
 
 @pytest.mark.parametrize(

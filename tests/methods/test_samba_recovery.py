@@ -12,8 +12,8 @@ import pytest
 from scipy import stats
 
 from monitor.machine import parse_topology
-from monitor.methods import samba
-from monitor.methods.base_effects import base_effects
+from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.samba import method as samba
 from monitor.records import Array, Campaign
 
 Distance = Callable[[Array, Array], float]

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.methods import method_named, tracker
+from monitor.methods import method_named
+from monitor.methods.chain.problem import solve_problem
 from monitor.methods.model import chain_of
-from monitor.methods.problem import solve_problem
+from monitor.methods.tracker import method as tracker
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 

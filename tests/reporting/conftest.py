@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from monitor.records import Artefact, Ball, Campaign, Machine, Probe, Probings, Run, ScaleBar
-from monitor.reporting.assembly import certificate_record
-from monitor.reporting.certificate import CertificateRecord, NotApplicable, Party, Person
-from monitor.reporting.laboratory import LaboratoryFile
-from monitor.reporting.results import RefusedParameters, ResidualSummary, ResultSet, result_set
+from monitor.reporting.certificate.assembly import certificate_record
+from monitor.reporting.certificate.laboratory import LaboratoryFile
+from monitor.reporting.certificate.record import CertificateRecord, NotApplicable, Party, Person
+from monitor.reporting.certificate.results import RefusedParameters, ResidualSummary, ResultSet, result_set
+from monitor.reporting.certificate.volumetric_result import Length, VolumetricResult
 from monitor.reporting.texts import texts_of
-from monitor.reporting.volumetric_result import Length, VolumetricResult
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
 
 NAMES = [

@@ -11,17 +11,21 @@ import pytest
 
 from monitor.exceptions import DataError, NotFoundError
 from monitor.records import Campaign
-from monitor.reporting.assembly import certificate_record
-from monitor.reporting.certificate import (
+from monitor.reporting.certificate.assembly import certificate_record
+from monitor.reporting.certificate.completeness import (
+    IncompleteCertificateError,
+    check_complete,
+    missing_items,
+)
+from monitor.reporting.certificate.laboratory import LaboratoryFile
+from monitor.reporting.certificate.record import (
     ITEMS,
     CertificateRecord,
     NotApplicable,
     Replaced,
 )
-from monitor.reporting.completeness import IncompleteCertificateError, check_complete, missing_items
-from monitor.reporting.laboratory import LaboratoryFile
-from monitor.reporting.render import certificate_pdf
-from monitor.reporting.results import RefusedParameters, ResultSet, result_set
+from monitor.reporting.certificate.results import RefusedParameters, ResultSet, result_set
+from monitor.reporting.pdf.render import certificate_pdf
 from monitor.units import MICROMETRE, MICRORADIAN
 
 Make = Callable[..., CertificateRecord]

@@ -9,12 +9,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from monitor.reporting.certificate_drawings import TALLEST_MM, interval_drawings, residual_drawing
-from monitor.reporting.certificate_matrix import ROWS, correlation_blocks
-from monitor.reporting.letter_widths import BOLD, in_mm, in_units
-from monitor.reporting.map_slices import map_drawing, slices_of
+from monitor.reporting.certificate.drawings import TALLEST_MM, interval_drawings, residual_drawing
+from monitor.reporting.certificate.matrix import ROWS, correlation_blocks
+from monitor.reporting.certificate.results import ResidualSummary, ResultSet
 from monitor.reporting.numbers import written_correlation
-from monitor.reporting.results import ResidualSummary, ResultSet
+from monitor.reporting.svg.letter_widths import BOLD, in_mm, in_units
+from monitor.reporting.svg.map_slices import map_drawing, slices_of
 from monitor.reporting.texts import texts_of
 
 Make = Callable[..., ResultSet]

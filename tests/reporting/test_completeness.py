@@ -12,11 +12,11 @@ import pytest
 
 from monitor.exceptions import InputError
 from monitor.records import Campaign
-from monitor.reporting.assembly import certificate_record
-from monitor.reporting.certificate import ITEMS, CertificateRecord, NotApplicable, Replaced
-from monitor.reporting.completeness import check_complete, date_faults, missing_items
-from monitor.reporting.laboratory import read_laboratory
-from monitor.reporting.results import ResultSet
+from monitor.reporting.certificate.assembly import certificate_record
+from monitor.reporting.certificate.completeness import check_complete, date_faults, missing_items
+from monitor.reporting.certificate.laboratory import read_laboratory
+from monitor.reporting.certificate.record import ITEMS, CertificateRecord, NotApplicable, Replaced
+from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.texts import texts_of
 
 Make = Callable[..., CertificateRecord]

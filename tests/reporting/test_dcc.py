@@ -18,17 +18,17 @@ from by_path import load
 from scipy.stats import chi2, norm
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate import (
+from monitor.reporting.certificate.completeness import IncompleteCertificateError
+from monitor.reporting.certificate.dcc import dcc_xml
+from monitor.reporting.certificate.dcc_results import DCC, SI, unit_of
+from monitor.reporting.certificate.record import (
     CertificateRecord,
     ConformityStatement,
     ConformityVerdict,
     Replaced,
 )
-from monitor.reporting.completeness import IncompleteCertificateError
-from monitor.reporting.dcc import dcc_xml
-from monitor.reporting.dcc_results import DCC, SI, unit_of
-from monitor.reporting.render import certificate_pdf
-from monitor.reporting.results import RefusedParameters
+from monitor.reporting.certificate.results import RefusedParameters
+from monitor.reporting.pdf.render import certificate_pdf
 
 Make = Callable[..., CertificateRecord]
 SPACES = {"dcc": DCC, "si": SI}

@@ -10,11 +10,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError, InputError
-from monitor.reporting.figure_style import png, save, svg
-from monitor.reporting.figures_drivers import predicted_against_measured, residual_against_driver
-from monitor.reporting.figures_models import error_falling, ranked_effects
-from monitor.reporting.figures_parameters import parameters_by_run
-from monitor.reporting.figures_residuals import residual_bars, residual_vectors
+from monitor.reporting.figures.drivers import predicted_against_measured, residual_against_driver
+from monitor.reporting.figures.models import error_falling, ranked_effects
+from monitor.reporting.figures.parameters import parameters_by_run
+from monitor.reporting.figures.residuals import residual_bars, residual_vectors
+from monitor.reporting.figures.style import png, save, svg
 from monitor.reporting.palette import BLUE, INK, ORANGE
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.reporting.figure_style import svg
-from monitor.reporting.figures_volumetric import expected_uncertainties, volumetric_slices
+from monitor.reporting.figures.style import svg
+from monitor.reporting.figures.volumetric import expected_uncertainties, volumetric_slices
 
 GRID = np.array([[x, y, z] for x in (0.0, 50.0, 100.0) for y in (-20.0, 0.0, 20.0) for z in (0.0, 200.0)])
 VECTORS = np.column_stack([0.1 * GRID[:, 0], 0.0 * GRID[:, 0], -0.02 * GRID[:, 2]])

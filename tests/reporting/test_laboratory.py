@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate import NotApplicable, Person
-from monitor.reporting.laboratory import read_laboratory
+from monitor.reporting.certificate.laboratory import read_laboratory
+from monitor.reporting.certificate.record import NotApplicable, Person
 
 
 def written(folder: Path, text: str) -> Path:

@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 
 from monitor.records import Array
-from monitor.reporting.certificate import CertificateRecord, Person, Replaced
-from monitor.reporting.render import certificate_html, certificate_pdf, pdf_of
+from monitor.reporting.certificate.record import CertificateRecord, Person, Replaced
+from monitor.reporting.pdf.render import certificate_html, certificate_pdf, pdf_of
 
 pytestmark = pytest.mark.skipif(
     shutil.which("pdftoppm") is None or shutil.which("pdftotext") is None,

@@ -19,9 +19,9 @@ from pathlib import Path
 import pypdf
 import pytest
 
-from monitor.reporting.certificate import CertificateRecord
-from monitor.reporting.certificate_data import certificate_files
-from monitor.reporting.render import certificate_pdf
+from monitor.reporting.certificate.data import certificate_files
+from monitor.reporting.certificate.record import CertificateRecord
+from monitor.reporting.pdf.render import certificate_pdf
 
 Make = Callable[..., CertificateRecord]
 JAVA = Path("/usr/share/java")

@@ -12,8 +12,8 @@ import pytest
 from by_path import load
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate import CertificateRecord
-from monitor.reporting.render import certificate_pdf
+from monitor.reporting.certificate.record import CertificateRecord
+from monitor.reporting.pdf.render import certificate_pdf
 
 pytest.importorskip("pyhanko", reason="the extra [sign] is not installed")
 from cryptography import x509
@@ -22,8 +22,8 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import BestAvailableEncryption, Encoding, pkcs12
 from cryptography.x509.oid import NameOID
 
-from monitor.reporting.signature import check_signature
-from monitor.reporting.signing import FileKey, sign
+from monitor.reporting.signature.signature import check_signature
+from monitor.reporting.signature.signing import FileKey, sign
 
 
 @pytest.fixture(scope="module")

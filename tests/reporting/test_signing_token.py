@@ -14,8 +14,8 @@ import pypdf
 import pytest
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate import CertificateRecord
-from monitor.reporting.render import certificate_pdf
+from monitor.reporting.certificate.record import CertificateRecord
+from monitor.reporting.pdf.render import certificate_pdf
 
 pytest.importorskip("pyhanko", reason="the extra [sign] is not installed")
 pytest.importorskip("pkcs11", reason="the extra [token] is not installed")
@@ -25,8 +25,8 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
-from monitor.reporting.signature import check_signature
-from monitor.reporting.signing import TokenKey, sign
+from monitor.reporting.signature.signature import check_signature
+from monitor.reporting.signature.signing import TokenKey, sign
 
 LIBRARIES = [
     Path(folder) / "softhsm" / "libsofthsm2.so"

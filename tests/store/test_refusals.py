@@ -10,7 +10,7 @@ import pytest
 
 from monitor.exceptions import CampaignError, InputError
 from monitor.store import Database, record_refusal, refusals, verify_audit
-from monitor.workflow.campaigns import import_folders
+from monitor.workflow.intake.campaigns import import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MONDAY = datetime.fromisoformat("2026-03-02T23:30:00-05:00")

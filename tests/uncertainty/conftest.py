@@ -8,9 +8,9 @@ import pytest
 
 from monitor.effects import Context, parse_effect
 from monitor.machine import parse_topology, touching_positions
-from monitor.methods.base_effects import base_effects
-from monitor.methods.samba import problem_of
-from monitor.methods.touch import Distance, TouchProblem
+from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.chain.touch import Distance, TouchProblem
+from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
 from monitor.uncertainty import run_problem
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from monitor.store import Database
-from monitor.workflow.campaigns import import_folders
+from monitor.workflow.intake.campaigns import import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CAMPAIGNS = ("five-days", "cold-cold", "hidden-reversal-x")
@@ -20,7 +20,7 @@ CAMPAIGNS = ("five-days", "cold-cold", "hidden-reversal-x")
 def clock() -> Iterator[None]:
     """Certificates are issued on a day of ours, whatever the clock of the computer says."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("monitor.workflow.certificates.today", lambda: date(2027, 6, 1))
+        patch.setattr("monitor.workflow.certificate.issue.today", lambda: date(2027, 6, 1))
         yield
 
 

@@ -16,18 +16,18 @@ import pytest
 
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
-from monitor.reporting.certificate import CertificateRecord
+from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.documents import from_document
 from monitor.reporting.resources import font_bytes
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
-from monitor.workflow.certificate_checks import remake
-from monitor.workflow.certificate_results import results_of, stored_monte_carlo
-from monitor.workflow.certificates import issue
-from monitor.workflow.evaluations import Evaluation, evaluation_of
-from monitor.workflow.uncertainty import Evaluated, evaluate, uncertainty
-from monitor.workflow.uncertainty_documents import document
-from monitor.workflow.volumetric import volumetric_map
+from monitor.workflow.certificate.checks import remake
+from monitor.workflow.certificate.issue import issue
+from monitor.workflow.certificate.results import results_of, stored_monte_carlo
+from monitor.workflow.uncertainty.documents import document
+from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate, uncertainty
+from monitor.workflow.uncertainty.evaluations import Evaluation, evaluation_of
+from monitor.workflow.volumetric.volumetric import volumetric_map
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"

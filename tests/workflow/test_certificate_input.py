@@ -11,9 +11,9 @@ import pytest
 
 from monitor.exceptions import InputError
 from monitor.store import Database
-from monitor.workflow.campaigns import import_folders
-from monitor.workflow.certificate_files import prepared, why_not
-from monitor.workflow.certificates import issue
+from monitor.workflow.certificate.files import prepared, why_not
+from monitor.workflow.certificate.issue import issue
+from monitor.workflow.intake.campaigns import import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"

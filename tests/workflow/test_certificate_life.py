@@ -15,17 +15,17 @@ import pytest
 from monitor.exceptions import InputError
 from monitor.readers import read_campaign
 from monitor.records import Campaign
-from monitor.reporting.certificate import CertificateRecord, Replaced
-from monitor.reporting.dcc import dcc_xml
-from monitor.reporting.dcc_results import DCC
+from monitor.reporting.certificate.dcc import dcc_xml
+from monitor.reporting.certificate.dcc_results import DCC
+from monitor.reporting.certificate.record import CertificateRecord, Replaced
 from monitor.reporting.documents import from_document
-from monitor.reporting.render import certificate_pdf
-from monitor.reporting.signature import SignatureFinding, check_signature
-from monitor.reporting.signing import FileKey, sign
+from monitor.reporting.pdf.render import certificate_pdf
+from monitor.reporting.signature.signature import SignatureFinding, check_signature
+from monitor.reporting.signature.signing import FileKey, sign
 from monitor.store import Database, import_campaign, list_certificates, load_certificate
-from monitor.workflow import certificates
-from monitor.workflow.certificate_checks import remake, stored_file, verify
-from monitor.workflow.certificates import issue, withdraw
+from monitor.workflow.certificate import issue as certificates
+from monitor.workflow.certificate.checks import remake, stored_file, verify
+from monitor.workflow.certificate.issue import issue, withdraw
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -192,7 +192,7 @@ def test_a_signature_is_judged_on_the_day_on_which_the_database_received_it(
         asked.append(at)
         return check_signature(pdf, trusted, at)
 
-    monkeypatch.setattr("monitor.workflow.certificate_checks.check_signature", noted)
+    monkeypatch.setattr("monitor.workflow.certificate.checks.check_signature", noted)
     assert verify(db, file)["ok"] is True
     file.write_bytes(file.read_bytes() + b"x")
     assert verify(db, file)["ok"] is False

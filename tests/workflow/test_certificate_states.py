@@ -13,11 +13,11 @@ import pytest
 
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
-from monitor.reporting.certificate import CertificateRecord
+from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.documents import from_document
 from monitor.store import Database, import_campaign, load_certificate
-from monitor.workflow.certificate_checks import remake, verify
-from monitor.workflow.certificates import amend, issue
+from monitor.workflow.certificate.checks import remake, verify
+from monitor.workflow.certificate.issue import amend, issue
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"

@@ -18,18 +18,18 @@ import pytest
 from monitor.cli import main
 from monitor.exceptions import InputError
 from monitor.readers import read_campaign
-from monitor.reporting.certificate import CertificateRecord, ConformityStatement
+from monitor.reporting.certificate.record import CertificateRecord, ConformityStatement
 from monitor.reporting.documents import from_document, to_document
-from monitor.reporting.layout_engine import engine_versions
+from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
-from monitor.workflow.certificate_checks import digital, remake
-from monitor.workflow.certificate_results import results_of
-from monitor.workflow.certificates import issue
-from monitor.workflow.conformity import statement_of
-from monitor.workflow.evaluations import Evaluation, evaluation_of
-from monitor.workflow.uncertainty import Evaluated, evaluate
-from monitor.workflow.uncertainty_documents import document
+from monitor.workflow.certificate.checks import digital, remake
+from monitor.workflow.certificate.conformity import statement_of
+from monitor.workflow.certificate.issue import issue
+from monitor.workflow.certificate.results import results_of
+from monitor.workflow.uncertainty.documents import document
+from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate
+from monitor.workflow.uncertainty.evaluations import Evaluation, evaluation_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -195,13 +195,13 @@ def test_remake_says_when_the_stored_document_is_another(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        "monitor.workflow.certificate_checks.certificate_pdf", lambda record, fonts, inputs: b"other"
+        "monitor.workflow.certificate.checks.certificate_pdf", lambda record, fonts, inputs: b"other"
     )
     again = remake(db, "G-1")
     assert again["identical"] is False
     assert "it was made with the same" in again["why"]
     made_with = {**engine_versions(), "pango": "1.0.0"}
-    monkeypatch.setattr("monitor.workflow.certificate_checks.engine_versions", lambda: made_with)
+    monkeypatch.setattr("monitor.workflow.certificate.checks.engine_versions", lambda: made_with)
     assert f"it was made with pango {engine_versions()['pango']} (here 1.0.0);" in remake(db, "G-1")["why"]
     with Database(tmp_path / "empty.duckdb"):
         pass

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import CampaignError
-from monitor.methods.virtual import virtual_campaign
+from monitor.methods.samba.virtual import virtual_campaign
 from monitor.readers import write_campaign
 from monitor.store import Database, list_campaigns
-from monitor.workflow.campaigns import campaigns, import_folders, runs
+from monitor.workflow.intake.campaigns import campaigns, import_folders, runs
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

@@ -12,10 +12,10 @@ from monitor.exceptions import DataError, InputError
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.store import Database, import_campaign
-from monitor.workflow.certificates import issue
-from monitor.workflow.comparison import compare
+from monitor.workflow.certificate.issue import issue
+from monitor.workflow.explain.comparison import compare
 from monitor.workflow.models import add
-from monitor.workflow.uncertainty import evaluate
+from monitor.workflow.uncertainty.evaluation import evaluate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"

@@ -8,15 +8,15 @@ import pytest
 
 from monitor.discovery import fit
 from monitor.exceptions import InputError
-from monitor.methods import free_form
+from monitor.methods.free_form import method as free_form
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign, load_campaign
 from monitor.workflow import models
-from monitor.workflow.identification import identify
-from monitor.workflow.planning import plan
-from monitor.workflow.shape import shape_figure
-from monitor.workflow.uncertainty import uncertainty
-from monitor.workflow.volumetric import volumetric_map
+from monitor.workflow.explain.shape import shape_figure
+from monitor.workflow.identify.identification import identify
+from monitor.workflow.plan.planning import plan
+from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.volumetric.volumetric import volumetric_map
 
 POCKET = Path(__file__).parents[2] / "examples" / "free-form-pocket"
 

@@ -22,16 +22,16 @@ from monitor.cli import main
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.reporting.documents import from_document, to_document
-from monitor.reporting.health import STATES, Change, MachineHealth
-from monitor.reporting.health_render import health_html, health_pdf
-from monitor.reporting.health_words import in_words
+from monitor.reporting.health.records import STATES, Change, MachineHealth
+from monitor.reporting.health.render import health_html, health_pdf
+from monitor.reporting.health.words import in_words
 from monitor.store import Database, import_campaign, record_event
-from monitor.workflow.health import report, stored_health
-from monitor.workflow.health_machine import Settings
-from monitor.workflow.health_series import FALSE_ALARM, Series, changes_of, drift_of
-from monitor.workflow.uncertainty import uncertainty
-from monitor.workflow.volumetric import volumetric_map
-from monitor.workflow.weeks import week_before, week_named
+from monitor.workflow.health.machine import Settings
+from monitor.workflow.health.report import report, stored_health
+from monitor.workflow.health.weeks import week_before, week_named
+from monitor.workflow.history.health_series import FALSE_ALARM, Series, changes_of, drift_of
+from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.volumetric.volumetric import volumetric_map
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 WIDE = {"EA0B": 400, "EC0B": 400, "EX0C": 400, "EB0C": 400, "EXX": 600}
@@ -216,7 +216,7 @@ def test_a_stored_record_comes_back_to_the_last_bit(fleet: Database, week10: dic
 
 
 def test_parts_bound_what_is_laid_out_at_a_time(fleet: Database, week10: dict, monkeypatch) -> None:
-    monkeypatch.setattr("monitor.workflow.health.MACHINES_A_PART", 2)
+    monkeypatch.setattr("monitor.workflow.health.report.MACHINES_A_PART", 2)
     out = Path(str(week10["out"])) / "parts"
     found = report(fleet, "2026-W10", out=out, made_at=MADE)
     names = [Path(path).name for path in found["files"]]
@@ -331,7 +331,7 @@ def test_a_drift_is_forecast_no_further_than_the_history_is_long() -> None:
 def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_page(
     fleet: Database, week10: dict, tmp_path: Path
 ) -> None:
-    from monitor.reporting.health import Fleet, fleet_row
+    from monitor.reporting.health.records import Fleet, fleet_row
 
     one = stored(fleet, "B-stepped")
     name = "Обрабатывающий центр " + "W" * 39

@@ -16,13 +16,13 @@ import pytest
 
 from monitor.exceptions import CampaignError
 from monitor.readers import read_campaign
-from monitor.reporting.health import MachineHealth
-from monitor.reporting.health_pictures import against_driver, error_steps, where_it_fails
+from monitor.reporting.health.pictures import against_driver, error_steps, where_it_fails
+from monitor.reporting.health.records import MachineHealth
 from monitor.store import Database, import_campaign, record_refusal, refusals
 from monitor.workflow import models
-from monitor.workflow.campaigns import import_folders
-from monitor.workflow.health import report, stored_health
-from monitor.workflow.health_machine import Settings
+from monitor.workflow.health.machine import Settings
+from monitor.workflow.health.report import report, stored_health
+from monitor.workflow.intake.campaigns import import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MADE = datetime.fromisoformat("2026-03-09T06:00:00+00:00")

@@ -16,8 +16,8 @@ import pytest
 
 from monitor.exceptions import InputError
 from monitor.store import Database, verify_audit
-from monitor.workflow.campaigns import import_folders
-from monitor.workflow.health import report
+from monitor.workflow.health.report import report
+from monitor.workflow.intake.campaigns import import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MADE = datetime.fromisoformat("2026-03-09T06:00:00+00:00")
@@ -43,7 +43,7 @@ def test_one_process_and_two_write_the_same_bytes_and_store_the_same(
     fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Two parts, so that the PDF is spread too.
-    monkeypatch.setattr("monitor.workflow.health.MACHINES_A_PART", 2)
+    monkeypatch.setattr("monitor.workflow.health.report.MACHINES_A_PART", 2)
     files, stored = [], []
     for workers in (1, 2):
         path, out = tmp_path / f"{workers}.duckdb", tmp_path / f"by-{workers}"

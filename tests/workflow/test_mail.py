@@ -21,7 +21,7 @@ from typing import Any
 import pytest
 
 from monitor.exceptions import InputError
-from monitor.workflow.mail import LARGEST_BYTES, mail_report, message_of, read_mail_settings
+from monitor.workflow.health.mail import LARGEST_BYTES, mail_report, message_of, read_mail_settings
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

@@ -11,7 +11,7 @@ import pytest
 from monitor.cli import main
 from monitor.exceptions import InputError
 from monitor.statistics import pool
-from monitor.workflow.matrix_files import write_matrices
+from monitor.workflow.run_statistics.matrix_files import write_matrices
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "five-days"
 

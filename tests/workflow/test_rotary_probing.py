@@ -13,14 +13,15 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from monitor.methods.rotary_patterns import SYMBOLS
+from monitor.methods.rotary_probing.patterns import SYMBOLS
 from monitor.store import Database
-from monitor.workflow import campaigns, keeping
-from monitor.workflow.comparison import compare
-from monitor.workflow.identification import identify
-from monitor.workflow.runs_statistics import stats
-from monitor.workflow.trends import trends
-from monitor.workflow.uncertainty import uncertainty
+from monitor.workflow import keeping
+from monitor.workflow.explain.comparison import compare
+from monitor.workflow.identify.identification import identify
+from monitor.workflow.intake import campaigns
+from monitor.workflow.run_statistics.statistics import stats
+from monitor.workflow.trend.trends import trends
+from monitor.workflow.uncertainty.evaluation import uncertainty
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE_4 = json.loads((ROOT / "tests/references/papers/ibaraki2012.json").read_text(encoding="utf-8"))[

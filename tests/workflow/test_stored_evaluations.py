@@ -16,10 +16,10 @@ import pytest
 from monitor.exceptions import StoreError
 from monitor.readers import read_campaign, read_linear_axes
 from monitor.store import Database, import_campaign, load_analysis, load_campaign, load_certificate
-from monitor.workflow.certificates import issue
-from monitor.workflow.evaluations import evaluation_of, stored_evaluation
+from monitor.workflow.certificate.issue import issue
 from monitor.workflow.models import resolve
-from monitor.workflow.uncertainty import Evaluated, evaluate, uncertainty
+from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate, uncertainty
+from monitor.workflow.uncertainty.evaluations import evaluation_of, stored_evaluation
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -58,7 +58,7 @@ def test_from_a_stored_result_it_is_the_same_as_evaluated_for_it(
     def never(*_: object, **__: object) -> Evaluated:
         raise AssertionError("the stored result was not taken")
 
-    monkeypatch.setattr("monitor.workflow.uncertainty.evaluate", never)
+    monkeypatch.setattr("monitor.workflow.uncertainty.evaluation.evaluate", never)
     stored = issue(db, "five-days", 20, LABORATORY, out=tmp_path / "stored.pdf", number="N-1", draft=True,
                    issued_on=DAY, **wishes)  # fmt: skip
     assert load_certificate(db, "N-1").record["inputs"]["stored_result"] == number

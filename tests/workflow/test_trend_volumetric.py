@@ -16,13 +16,13 @@ from monitor.cli import main
 from monitor.store import Database
 from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
-from monitor.workflow.campaigns import import_folders
-from monitor.workflow.evaluations import evaluation_of
-from monitor.workflow.identification import identify
-from monitor.workflow.trends import Choice, trends
-from monitor.workflow.uncertainty import evaluate
-from monitor.workflow.uncertainty_documents import document
-from monitor.workflow.volumetric import geometric_errors, poses_of, ranges_of
+from monitor.workflow.identify.identification import identify
+from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.trend.trends import Choice, trends
+from monitor.workflow.uncertainty.documents import document
+from monitor.workflow.uncertainty.evaluation import evaluate
+from monitor.workflow.uncertainty.evaluations import evaluation_of
+from monitor.workflow.volumetric.volumetric import geometric_errors, poses_of, ranges_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 WEEKS, RUNS = 24, 3

@@ -25,15 +25,15 @@ from monitor.store import (
     record_event,
 )
 from monitor.store.identified_values import gather_values
-from monitor.workflow.change_search import search_changes
 from monitor.workflow.fleet import fleet
-from monitor.workflow.run_columns import group_labels
-from monitor.workflow.runs_statistics import stats
+from monitor.workflow.history.change_search import search_changes
+from monitor.workflow.run_statistics.columns import group_labels
+from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.selections import select, side_by_side
-from monitor.workflow.trend_figures import headline, trend_figures
-from monitor.workflow.trend_parameter import Series
-from monitor.workflow.trends import Choice, trends
-from monitor.workflow.uncertainty import uncertainty
+from monitor.workflow.trend.figures import headline, trend_figures
+from monitor.workflow.trend.parameter import Series
+from monitor.workflow.trend.trends import Choice, trends
+from monitor.workflow.uncertainty.evaluation import uncertainty
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 START = datetime(2024, 1, 1, 8)
@@ -437,7 +437,7 @@ def test_parameters_that_were_measured_together_share_one_search(monkeypatch: py
         asked.append((sorted(values), {name: u.tobytes() for name, u in options["u"].items()}))
         return find_changes(values, *args, **options)
 
-    monkeypatch.setattr("monitor.workflow.change_search.find_changes", counted)
+    monkeypatch.setattr("monitor.workflow.history.change_search.find_changes", counted)
     found = search_changes(every, [], false_alarm=0.05, seed=1)
     ((names, weights),) = asked
     assert names == ["A", "B", "C"]

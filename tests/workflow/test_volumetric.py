@@ -5,14 +5,14 @@ import pytest
 
 from monitor.discovery import fit
 from monitor.methods.model import Model
-from monitor.methods.samba import problem_of
-from monitor.methods.virtual import virtual_campaign
+from monitor.methods.samba.method import problem_of
+from monitor.methods.samba.virtual import virtual_campaign
 from monitor.store import Database
 from monitor.workflow import models
-from monitor.workflow.campaigns import import_folders
-from monitor.workflow.known_errors import _of_shared
+from monitor.workflow.intake.campaigns import import_folders
 from monitor.workflow.simulation import simulate
-from monitor.workflow.volumetric import at_zero, volumetric_map
+from monitor.workflow.volumetric.known_errors import _of_shared
+from monitor.workflow.volumetric.volumetric import at_zero, volumetric_map
 
 
 @pytest.fixture(scope="module")

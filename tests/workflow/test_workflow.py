@@ -11,12 +11,14 @@ import pytest
 from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import METHODS
 from monitor.store import Database, load_campaign, load_identification
-from monitor.workflow import campaigns, comparison, keeping, models
+from monitor.workflow import keeping, models
+from monitor.workflow.explain import comparison
 from monitor.workflow.figures import comparison_figures, explanation_figures
-from monitor.workflow.identification import identify
-from monitor.workflow.run_columns import run_columns
-from monitor.workflow.runs_statistics import coordinates, stats
-from monitor.workflow.uncertainty import evaluate
+from monitor.workflow.identify.identification import identify
+from monitor.workflow.intake import campaigns
+from monitor.workflow.run_statistics.columns import run_columns
+from monitor.workflow.run_statistics.statistics import coordinates, stats
+from monitor.workflow.uncertainty.evaluation import evaluate
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

@@ -11,7 +11,8 @@ from monitor.cli.database import opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, told
 from monitor.exceptions import InputError
-from monitor.workflow import certificate_checks, certificates
+from monitor.workflow.certificate import checks as certificate_checks
+from monitor.workflow.certificate import issue as certificates
 
 EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/laboratory.toml"
 

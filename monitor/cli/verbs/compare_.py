@@ -10,7 +10,7 @@ from monitor.cli import curve_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.store import is_curve
-from monitor.workflow.comparison import compare
+from monitor.workflow.explain.comparison import compare
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
 NOTHING_CHECKS_UM = 0.005

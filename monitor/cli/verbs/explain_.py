@@ -11,7 +11,7 @@ from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.cli.verbs.compare_ import summary
 from monitor.store import is_curve
-from monitor.workflow.comparison import explain_campaign, fitted
+from monitor.workflow.explain.comparison import explain_campaign, fitted
 
 EXAMPLE = "monitor explain hidden-spindle-growth --figures figures"
 

@@ -10,9 +10,10 @@ from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
 from monitor.store import is_curve
-from monitor.workflow import campaigns, curves
-from monitor.workflow.identification import identify
-from monitor.workflow.stepwise import steps
+from monitor.workflow.explain import curves
+from monitor.workflow.identify.identification import identify
+from monitor.workflow.identify.stepwise import steps
+from monitor.workflow.intake import campaigns
 
 EXAMPLE = "monitor identify five-days"
 # A screen holds so many runs beside the names of the parameters.

@@ -8,7 +8,7 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.workflow import campaigns
+from monitor.workflow.intake import campaigns
 
 EXAMPLE = "monitor import examples/five-days examples/cold-cold"
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.workflow.compensation import FORMATS, write_tables
-from monitor.workflow.volumetric import POINTS, map_figures, volumetric_map
+from monitor.workflow.volumetric.compensation import FORMATS, write_tables
+from monitor.workflow.volumetric.volumetric import POINTS, map_figures, volumetric_map
 
 EXAMPLE = "monitor map five-days --run 20 --figures figures --compensation positioning-csv"
 

@@ -9,7 +9,8 @@ from monitor.cli import curve_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common, told
 from monitor.exceptions import NotFoundError
-from monitor.workflow import comparison, models
+from monitor.workflow import models
+from monitor.workflow.explain import comparison
 
 EXAMPLE = 'monitor model add "EXX:reversal" --to samba --as with-reversal --campaign hidden-reversal-x'
 
@@ -141,7 +142,7 @@ def _history(options: Namespace) -> int:
     files = []
     if options.figures is not None:
         if steps[0].get("method") == "curve":
-            from monitor.workflow.curve_figures import curve_history_figure
+            from monitor.workflow.explain.curve_figures import curve_history_figure
 
             files = curve_history_figure(steps, options.figures)
         else:

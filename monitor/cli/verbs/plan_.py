@@ -11,7 +11,7 @@ from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.cli.verbs import plan_angles
 from monitor.exceptions import InputError
-from monitor.workflow.planning import plan, plan_figure
+from monitor.workflow.plan.planning import plan, plan_figure
 
 EXAMPLE = "monitor plan five-days --balls 4 --poses 10 --separate EBZ:poly2,EZZ:poly2"
 

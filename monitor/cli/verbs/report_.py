@@ -12,9 +12,9 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow.health import report
-from monitor.workflow.health_machine import Settings
-from monitor.workflow.mail import mail_report, read_mail_settings
+from monitor.workflow.health.machine import Settings
+from monitor.workflow.health.mail import mail_report, read_mail_settings
+from monitor.workflow.health.report import report
 
 EXAMPLE = "monitor report --week 2026-W10 --out reports-out --fail-on-alarm"
 

@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.workflow import campaigns
+from monitor.workflow.intake import campaigns
 
 EXAMPLE = "monitor runs five-days"
 

@@ -14,7 +14,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.store import load_campaign, load_identification
-from monitor.workflow.runs_statistics import stats
+from monitor.workflow.run_statistics.statistics import stats
 
 EXAMPLE = "monitor stats five-days --by day --figures figures"
 

@@ -15,7 +15,7 @@ from monitor.cli import output, trend_output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow.trends import Choice, trends
+from monitor.workflow.trend.trends import Choice, trends
 
 EXAMPLE = "monitor trend HU40-T --since 2025-01-01 --figures figures"
 
@@ -84,7 +84,7 @@ def run(options: Namespace) -> int:
         made = trends(db, options.machine, choice)
         found = made.document
         if options.figures is not None:
-            from monitor.workflow.trend_figures import trend_figures
+            from monitor.workflow.trend.figures import trend_figures
 
             found["figures"] = trend_figures(made, options.figures)
     if options.json:

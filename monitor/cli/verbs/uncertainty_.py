@@ -9,7 +9,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.readers import read_linear_axes
-from monitor.workflow.uncertainty import uncertainty
+from monitor.workflow.uncertainty.evaluation import uncertainty
 
 EXAMPLE = "monitor uncertainty five-days --run 20 --method guf"
 

@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.workflow.withdrawals import withdraw
+from monitor.workflow.intake.withdrawals import withdraw
 
 EXAMPLE = 'monitor withdraw five-days --reason "balls 3 and 5 were exchanged in the file"'
 

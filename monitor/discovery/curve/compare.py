@@ -1,0 +1,151 @@
+"""A curve's model against its rows: how large the residual is, how large it should be, and where it is too large.
+
+Rows with equal inputs are repeats: their scatter is pure error, and lack of fit is tested against it (Draper and
+Smith, Applied regression analysis, section 2.1; NIST/SEMATECH e-Handbook 4.6.1.5). Rows at different times whose
+scatter resembles that of their neighbours are none: the test rests on independent repeats. Where nothing speaks
+against the model, the search for a missing effect has the last word, so that `compare` and `explain` agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from monitor.discovery.curve.explain import explain_curve
+from monitor.discovery.curve.quality import noise_of
+from monitor.discovery.machine.compare import (
+    EXPLAINED,
+    LACK_OF_FIT_LEVEL,
+    SOMETHING_IS_MISSING,
+    STATEMENT_TOLERANCE,
+    LackOfFit,
+    Part,
+    split,
+)
+from monitor.effects.curve import SEQUENCE
+from monitor.methods.curve.method import CurveFit
+from monitor.statistics.noise import Assessed, assess
+
+# A breakdown by an input shows where it fails in so many parts of equal numbers of rows.
+PARTS = 5
+
+
+@dataclass(frozen=True)
+class CurveComparison:
+    """A model against a curve, everything in the unit of the response.
+
+    ``repeatability`` is the standard deviation of repeats (None without), ``expected_rms`` what the stated
+    uncertainty would leave (None without), ``noise`` how neighbouring rows resemble each other under the model.
+    """
+
+    fit: CurveFit
+    lack_of_fit: LackOfFit | None
+    repeatability: float | None
+    expected_rms: float | None
+    excess_p_value: float | None
+    noise: Assessed
+    verdict: str
+    by: Mapping[str, Mapping[str, Part]]
+
+
+def places_of(fit: CurveFit) -> npt.NDArray[np.int64]:
+    """The place (n,) of every row: the same number for rows that agree in every column that the model uses."""
+    inputs = fit.problem.inputs
+    used = {effect.column for effect in fit.effects}
+    if any(effect.shape == "formula" for effect in fit.effects):
+        used |= {name for name in inputs.numbers if name != SEQUENCE}
+    place = np.zeros(inputs.count, dtype=np.int64)
+    for name in sorted(used):
+        values = inputs.numbers.get(name, inputs.groups.get(name))
+        if values is not None:
+            own = np.unique(values, return_inverse=True)[1]
+            place = np.unique(place * (own.max() + 1) + own, return_inverse=True)[1]
+    return np.asarray(place, dtype=np.int64)
+
+
+def lack_of_fit(fit: CurveFit) -> tuple[LackOfFit | None, float | None]:
+    """F of lack of fit over pure error, and the repeatability; None where no row was repeated, or the model has no
+    input that could be equal, or the repeats lie at different times and drift between them."""
+    kept = ~fit.problem.left_out
+    if not fit.effects or fit.exact or _repeats_drift(fit):
+        return None, None
+    scatter, lack, repeated = split(fit.residual[kept, None], places_of(fit)[kept])
+    own = fit.degrees_of_freedom - repeated
+    if repeated < 1:
+        return None, None
+    repeatability = float(np.sqrt(scatter / repeated))
+    if own < 1 or scatter <= 0.0:
+        return None, repeatability
+    f = (lack / own) / (scatter / repeated)
+    return LackOfFit(
+        float(f), float(scipy.stats.f.sf(f, own, repeated)), float(own), float(repeated)
+    ), repeatability
+
+
+def _repeats_drift(fit: CurveFit) -> bool:
+    """Whether the deviations of repeats from their mean resemble those of the rows before them in time."""
+    clock, rows = fit.problem.curve.time, fit.problem.order
+    if clock is None or any(effect.column == clock for effect in fit.effects):
+        return False
+    _, place, count = np.unique(places_of(fit)[rows], return_inverse=True, return_counts=True)
+    residual = fit.residual[rows]
+    deviation = residual - (np.bincount(place, weights=residual) / count)[place]
+    deviation = deviation[count[place] > 1]
+    found = assess(deviation, np.ones((len(deviation), 1)))
+    return found.noticed and found.noise.lag_one > 0.0
+
+
+def _part(residual: npt.NDArray[np.float64]) -> Part:
+    return Part(float(np.sqrt(np.mean(residual**2))), float(np.abs(residual).max()), len(residual))
+
+
+def _breakdown(fit: CurveFit) -> dict[str, dict[str, Part]]:
+    kept, inputs = ~fit.problem.left_out, fit.problem.inputs
+    found: dict[str, dict[str, Part]] = {}
+    for name, values in inputs.numbers.items():
+        edges = np.unique(np.quantile(values[kept], np.linspace(0.0, 1.0, PARTS + 1)))
+        parts = {}
+        for number, (low, high) in enumerate(pairwise(edges)):
+            last = number == len(edges) - 2
+            inside = kept & (values >= low) & ((values <= high) if last else (values < high))
+            if inside.any():
+                parts[f"{low:.6g} to {high:.6g}"] = _part(fit.residual[inside])
+        if len(parts) > 1:
+            found[name] = parts
+    for name, labels in inputs.groups.items():
+        found[name] = {
+            str(label): _part(fit.residual[kept & (labels == label)])
+            for label in dict.fromkeys(labels[kept].tolist())
+        }
+    return found
+
+
+def compare_curve(fit: CurveFit, *, rate: float = 0.01, lacks: bool | None = None) -> CurveComparison:
+    """Compare a fitted model with its curve; ``lacks`` says whether a search has found a missing effect already."""
+    problem, rows = fit.problem, fit.problem.order
+    test, repeatability = lack_of_fit(fit)
+    stated = problem.curve.standard_uncertainty
+    expected = excess = None
+    if stated is not None:
+        expected = stated * float(np.sqrt(fit.degrees_of_freedom / len(rows)))
+        excess = float(scipy.stats.chi2.sf(fit.sum_of_squares / stated**2, fit.degrees_of_freedom))
+    missing = bool(lacks) or (test is not None and test.p_value < LACK_OF_FIT_LEVEL)
+    if stated is not None and excess is not None:
+        missing |= fit.deviation > STATEMENT_TOLERANCE * stated and excess < LACK_OF_FIT_LEVEL
+    if lacks is None and not missing:
+        missing = bool(explain_curve(problem, rate=rate).missing)
+    return CurveComparison(
+        fit=fit,
+        lack_of_fit=test,
+        repeatability=repeatability,
+        expected_rms=expected,
+        excess_p_value=excess,
+        noise=noise_of(fit),
+        verdict=SOMETHING_IS_MISSING if missing else EXPLAINED,
+        by=_breakdown(fit),
+    )

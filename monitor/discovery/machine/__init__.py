@@ -1,0 +1,1 @@
+"""Missing effects of a machine."""

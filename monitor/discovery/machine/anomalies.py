@@ -1,0 +1,228 @@
+"""Bad single points and balls that came loose: told as what they are, not as a law of physics.
+
+Both are seen as a deviation of one run from the others at the same place of the plan, so an effect that the
+model lacks in every run does not raise an alarm. A point is bad where the vector of its own deviation is too
+long; a ball has moved where all its later touches in that run are shifted by the same vector.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from monitor.discovery.machine.fit import Fit
+from monitor.machine import MOTION
+from monitor.methods.chain.least_squares import eliminate
+from monitor.records import Array
+
+# A ball that moved needs this many touches before and after, else it is a bad point.
+TOUCHES_EACH_SIDE = 2
+# Directions that a touch leaves unchecked (the run's own unknowns follow it) have eigenvalues of rounding.
+CHECKED = 1e-6
+
+
+@dataclass(frozen=True)
+class BadPoint:
+    """A probing that contradicts the same one of the other runs; ``size`` mm along the machine's ``axis``."""
+
+    row: int
+    run: int
+    sequence: int
+    target: str
+    axis: str
+    size: float
+    p_value: float
+    chi_square: float = 0.0
+
+
+@dataclass(frozen=True)
+class BallMove:
+    """A ball that stands elsewhere from a probing on; ``shift`` (3,) mm in the frame of the last work axis."""
+
+    target: str
+    run: int
+    sequence: int
+    shift: tuple[float, float, float]
+    p_value: float
+    chi_square: float = 0.0
+
+    @property
+    def size(self) -> float:
+        """Length of the shift in mm."""
+        return float(np.linalg.norm(self.shift))
+
+
+def plan_places(fit: Fit) -> npt.NDArray[np.int64]:
+    """Place in the plan (n,): the same number for the same target at the same pose, touch by touch."""
+    context = fit.problem.context
+    measured = fit.problem.measured_joints
+    posed = [place for place in range(len(context.chain.joints)) if place not in measured]
+    angles = np.round(context.positions[:, posed], 6) + 0.0
+    seen: dict[tuple[object, ...], int] = {}
+    numbers: dict[tuple[object, ...], int] = {}
+    found = np.empty(len(context), dtype=np.int64)
+    for row in range(len(context)):
+        key = (str(context.target[row]), *angles[row])
+        once = (int(context.run[row]), *key)
+        occurrence = seen[once] = seen.get(once, -1) + 1
+        found[row] = numbers.setdefault((*key, occurrence), len(numbers))
+    return found
+
+
+@dataclass(frozen=True)
+class _Deviations:
+    """Deviation (n, d) of every probing from the other runs', in standard uncertainties, and its spread."""
+
+    vectors: Array
+    inflation: Array  # (n,): variance of a deviation over that of a residual
+    rows: tuple[npt.NDArray[np.int64], ...]  # rows of every run
+    bases: Array  # (R, N, p)
+    scale: Array  # (n,): standard deviation of a coordinate in standard uncertainties
+
+    def of_run(self, run: int) -> Array:
+        """What the own unknowns of a run span, row by row (m, d, p)."""
+        rows, numbers = len(self.rows[run]), self.vectors.shape[1]
+        return self.bases[run, : numbers * rows].reshape(rows, numbers, -1)
+
+
+def _deviations(fit: Fit) -> _Deviations:
+    problem = fit.problem
+    white = np.where(fit.left_out[:, None], 0.0, fit.vectors / fit.problem.sigma)
+    places = plan_places(fit)
+    kept = ~fit.left_out
+    count = np.bincount(places, weights=kept)
+    total = np.stack([np.bincount(places, weights=white[:, axis]) for axis in range(white.shape[1])], axis=1)
+    others = count[places] - 1
+    enough = kept & (others >= 2)
+    mean = (total[places] - white) / np.where(enough, others, 1)[:, None]
+    vectors = np.where(enough[:, None], white - mean, white)
+    inflation = np.where(enough, 1.0 + 1.0 / np.where(enough, others, 1), 1.0)
+    rows = tuple(np.flatnonzero(problem.context.run == run) for run in problem.runs)
+    bases = eliminate(fit.solution.last.local).basis
+    # A few bad points must not hide themselves: the scale is taken from the median. A run that is noisier than
+    # the others as a whole has no bad points for that.
+    squares = np.sum(vectors**2, axis=1) / inflation
+    share = fit.degrees_of_freedom / (fit.readings + 1e-300)
+    usual = scipy.stats.chi2.median(white.shape[1]) * max(share, 1e-6)
+    scale = np.full(len(kept), np.median(squares[kept]) / usual)
+    for own in rows:
+        if kept[own].any():
+            scale[own] = np.maximum(scale[own], np.median(squares[own][kept[own]]) / usual)
+    scale = np.sqrt(scale)
+    return _Deviations(vectors, inflation, rows, bases, scale)
+
+
+def _statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], Array]:
+    """Explained squares (n,), ranks (n,) and coefficients (n, d) of columns with products ``onto`` (n, d) and
+    ``gram`` (n, d, d)."""
+    values, vectors = np.linalg.eigh(gram)
+    keep = values > CHECKED
+    along = np.einsum("nij,ni->nj", vectors, onto) * keep
+    inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
+    return (
+        np.sum(along**2 * inverse, axis=1),
+        keep.sum(axis=1),
+        np.einsum("nij,nj->ni", vectors, along * inverse),
+    )
+
+
+def _as_reading(fit: Fit, row: int, vector: Array) -> tuple[str, float]:
+    """The reading that explains most of a residual (d,), and by how much it is off, in mm."""
+    chain = fit.problem.context.chain
+    linear = fit.problem.measured_joints
+    if not linear:
+        most = int(np.abs(vector).argmax())
+        return fit.problem.components[most], float(vector[most])
+    directions = np.array(
+        [np.array(chain.joints[place].direction) * chain.joints[place].sign for place in linear]
+    )
+    shifts = np.einsum("nrac,ac->nra", fit.by_error[:, :, linear, MOTION, :3], directions)
+    off = np.linalg.pinv(fit.problem.observe(shifts)[row]) @ vector
+    most = int(np.abs(off).argmax())
+    return chain.joints[linear[most]].name.lower(), float(off[most])
+
+
+def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
+    """The worst point of every run that is too far off, at a false-alarm probability ``alpha`` a campaign."""
+    deviations = _deviations(fit)
+    context = fit.problem.context
+    tests = int((~fit.left_out).sum())
+    found = []
+    for run, rows in enumerate(deviations.rows):
+        basis = deviations.of_run(run)
+        gram = np.eye(basis.shape[1]) - basis @ np.swapaxes(basis, 1, 2)
+        square, rank, sizes = _statistic(deviations.vectors[rows], gram)
+        checked = (rank > 0) & ~fit.left_out[rows]
+        if not checked.any():
+            continue
+        # The worst by its chi-square: p-values of wrecks underflow and would tie.
+        chi_square = np.where(
+            checked, square / deviations.inflation[rows] / deviations.scale[rows] ** 2, -1.0
+        )
+        place = int(chi_square.argmax())
+        p = float(scipy.special.chdtrc(rank[place], chi_square[place]))
+        row, size = int(rows[place]), sizes[place]
+        if p * tests <= alpha:
+            axis, off = _as_reading(fit, row, size * fit.problem.sigma[row])
+            found.append(
+                BadPoint(
+                    row=row,
+                    run=int(context.run[row]),
+                    sequence=int(context.sequence[row]),
+                    target=str(context.target[row]),
+                    axis=axis,
+                    size=off,
+                    p_value=min(1.0, p * tests),
+                    chi_square=float(chi_square[place]),
+                )
+            )
+    return found
+
+
+def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
+    """For every run the ball that moved in it, if any, at a false-alarm probability ``alpha`` a campaign."""
+    deviations = _deviations(fit)
+    context = fit.problem.context
+    found = []
+    tests = 0
+    for run, rows in enumerate(deviations.rows):
+        basis = deviations.of_run(run)
+        best: BallMove | None = None
+        for target in np.intersect1d(context.target[rows], fit.problem.movable):
+            own = np.flatnonzero((context.target[rows] == target) & ~fit.left_out[rows])
+            first = np.arange(TOUCHES_EACH_SIDE, len(own) - TOUCHES_EACH_SIDE + 1)
+            if len(first) == 0:
+                continue
+            tests += len(first)
+            # Sums over all touches from each one on.
+            shared = np.cumsum(basis[own][::-1], axis=0)[::-1][first]
+            onto = np.cumsum(deviations.vectors[rows[own]][::-1], axis=0)[::-1][first]
+            touches = len(own) - first
+            gram = touches[:, None, None] * np.eye(3) - shared @ np.swapaxes(shared, 1, 2)
+            inflation = np.cumsum(deviations.inflation[rows[own]][::-1])[::-1][first] / touches
+            square, rank, shifts = _statistic(onto, gram)
+            chi_square = np.where(rank > 0, square / inflation / deviations.scale[rows[0]] ** 2, -1.0)
+            place = int(chi_square.argmax())
+            if chi_square[place] <= 0 or (best is not None and chi_square[place] <= best.chi_square):
+                continue
+            row = int(rows[own[first[place]]])
+            # The tip followed the ball, so the vector from where the ball was to the tip is its shift.
+            x, y, z = (float(part) for part in shifts[place] * fit.problem.sigma[row])
+            best = BallMove(
+                target=str(target),
+                run=int(context.run[row]),
+                sequence=int(context.sequence[row]),
+                shift=(x, y, z),
+                p_value=float(scipy.special.chdtrc(rank[place], chi_square[place])),
+                chi_square=float(chi_square[place]),
+            )
+        if best is not None:
+            found.append(best)
+    return [
+        replace(move, p_value=min(1.0, move.p_value * tests))
+        for move in found
+        if move.p_value * tests <= alpha
+    ]

@@ -1,0 +1,122 @@
+"""A model fitted to a campaign, with what comparison and scan read from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.effects import Basis
+from monitor.methods.chain.least_squares import Solution, eliminate, project_out
+from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.records import Array
+
+
+@dataclass(frozen=True)
+class Own:
+    """What belongs to single runs, and what several runs share.
+
+    ``basis`` (R, N, p) is orthonormal and spans what every run's own unknowns can do; ``shared`` (M, c) are the
+    whitened columns of the coefficients that several runs share, M rows of all runs, with that taken out.
+    """
+
+    basis: Array
+    shared: Array
+    shared_rank: int
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A problem and its least-squares point; ``left_out`` (n,) marks probings without weight."""
+
+    problem: ChainProblem
+    solution: Solution
+    left_out: npt.NDArray[np.bool_]
+
+    @cached_property
+    def vectors(self) -> Array:
+        """Residuals (n, d) in mm of all rows, those left out included."""
+        return self.problem.vectors(self.solution.local, self.solution.common)
+
+    @cached_property
+    def by_error(self) -> Array:
+        """Derivatives (n, 3, J, 2, 6) by every error of the chain of the vector that the rows tell (a part of)."""
+        seen = self.problem.evaluated(self.solution.local, self.solution.common, jacobian=True)
+        assert seen.by_error is not None
+        return seen.by_error
+
+    def moved_by(self, basis: Basis) -> Array:
+        """Change (n, d, k) of the residuals for each coefficient of an effect."""
+        return self.problem.observe(basis.displacement(self.by_error))
+
+    @property
+    def readings(self) -> int:
+        """How many numbers have weight, calibrated quantities aside."""
+        return int(self.vectors.shape[1]) * int((~self.left_out).sum())
+
+    @cached_property
+    def own(self) -> Own:
+        """A coefficient that acts in one run only (a ball that moved in it, an effect with another size in every
+        run) is that run's own: no other run predicts it."""
+        local, common = self.solution.last.local, self.solution.last.common
+        acts = np.any(common != 0.0, axis=1)
+        single = acts.sum(axis=0) == 1
+        most = int(acts[:, single].sum(axis=1).max(initial=0))
+        more = np.zeros((*local.shape[:2], most))
+        for run in range(len(local)):
+            columns = common[run][:, single & acts[run]]
+            more[run, :, : columns.shape[1]] = columns
+        basis = eliminate(np.concatenate([local, more], axis=2)).basis
+        shared = project_out(basis, common[:, :, ~single]).reshape(
+            len(local) * local.shape[1], int(np.sum(~single))
+        )
+        scale = np.linalg.norm(shared, axis=0)
+        rank = int(np.linalg.matrix_rank(shared / np.where(scale == 0, 1.0, scale))) if shared.size else 0
+        return Own(basis, shared, rank)
+
+    @cached_property
+    def degrees_of_freedom(self) -> int:
+        """Readings and calibrated quantities less what the model determines from them."""
+        readings = self.readings + len(self.problem.runs) * len(self.problem.extra_names)
+        return readings - int(self.solution.rank.sum()) - int(self.solution.common_free.sum())
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Of the whitened residuals; its expectation is the degrees of freedom where the model is right."""
+        return float(np.sum(self.solution.last.residual**2))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square in mm of the residuals that have weight."""
+        kept = self.vectors[~self.left_out]
+        return float(np.sqrt(np.mean(kept**2)))
+
+    @property
+    def sigma(self) -> float:
+        """Root mean square in mm of the stated standard uncertainty of a coordinate."""
+        return float(np.sqrt(np.mean(self.problem.sigma[~self.left_out] ** 2)))
+
+    @property
+    def scale(self) -> float:
+        """Residual standard deviation as a multiple of the stated standard uncertainty."""
+        return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
+
+
+def fit(
+    problem: ChainProblem, left_out: npt.NDArray[np.bool_] | None = None, start: Fit | None = None
+) -> Fit:
+    """The least-squares point of a problem; probings that are left out get no weight.
+
+    ``start`` is an earlier fit of the same runs with the same base, from which the search begins.
+    """
+    out = np.zeros(len(problem.context), dtype=bool) if left_out is None else left_out
+    weighted = replace(problem, sigma=np.where(out[:, None], np.inf, problem.sigma)) if out.any() else problem
+    if start is None:
+        return Fit(weighted, solve_problem(weighted), out)
+    common = weighted.common_start.copy()
+    known = start.problem.added_names
+    if known == weighted.added_names[: len(known)]:
+        common[: len(known)] = start.solution.common
+    return Fit(weighted, solve_problem(weighted, start.solution.local, common), out)

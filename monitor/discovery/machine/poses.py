@@ -1,0 +1,83 @@
+"""Readings of one pose share what the machine did there: the evidence for an effect counted by poses.
+
+A robot comes back to a pose to some hundredths of a millimetre, and all reflectors on its tool move with it, so that
+nine coordinates of a pose are not nine independent readings. What is the same in a pose is allowed for by a test
+whose variance is that of the poses' own sums (Liang and Zeger, Biometrika 73 (1986) 13; the clusters are the poses).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy import special
+
+from monitor.discovery.machine.evidence import orthonormal, without
+from monitor.discovery.machine.fit import Fit
+from monitor.discovery.machine.visible import Candidate, Visible
+from monitor.records import Array
+
+# The variance of fewer poses than this is too uncertain to be a yardstick.
+FEWEST_POSES = 30
+
+
+def poses_of_rows(fit: Fit) -> npt.NDArray[np.int64] | None:
+    """The pose (M,) of every whitened number, -1 for calibrated quantities and padding: rows of one run after another
+    at which no axis moved. None where hardly a pose has several rows, or there are few."""
+    problem = fit.problem
+    context = problem.context
+    moved = np.any(np.diff(context.positions, axis=0) != 0.0, axis=1) | (np.diff(context.run) != 0)
+    pose = np.concatenate([[0], np.cumsum(moved)])
+    poses = int(pose[-1]) + 1
+    if poses < FEWEST_POSES or 2 * poses > len(pose):
+        return None
+    numbers = np.repeat(pose, problem.sigma.shape[1]).reshape(problem.sigma.shape)
+    return problem.padded(numbers + 1.0).astype(np.int64).reshape(-1) - 1
+
+
+def p_value_by_poses(
+    found: Candidate, visible: Visible, others: Sequence[Candidate], pose: npt.NDArray[np.int64]
+) -> float:
+    """p-value of an effect beside others with every pose as one observation, what was searched paid for."""
+    basis = orthonormal(np.concatenate([visible.added, *(one.columns for one in others)], axis=1))
+    residual = without(basis, visible.residual[:, None])[:, 0]
+    own = orthonormal(without(basis, found.columns))
+    size = own.shape[1]
+    inside = pose >= 0
+    poses = len(np.unique(pose[inside]))
+    dof = visible.degrees_of_freedom - basis.shape[1] - size
+    if size == 0 or dof < 1 or poses <= size:
+        return 1.0
+    onto = own.T @ residual
+    left = residual - own @ onto
+    scores = _sums(own[inside] * left[inside, None], pose[inside])
+    # What the fit took out of the residual is missing from the sums.
+    meat = scores.T @ scores * (int(inside.sum()) / dof)
+    statistic = float(onto @ np.linalg.pinv(meat, hermitian=True) @ onto) / size
+    return float(min(1.0, special.fdtrc(size, poses - size, statistic) * found.variant.tries))
+
+
+def widening(visible: Visible, chosen: Sequence[Candidate], pose: npt.NDArray[np.int64]) -> Array:
+    """Factors (k,), 1 at least, by which what poses share widens the standard uncertainties of the chosen effects'
+    coefficients over those of independent readings."""
+    basis = orthonormal(visible.added)
+    residual = without(basis, visible.residual[:, None])[:, 0]
+    columns = without(basis, np.concatenate([one.columns for one in chosen], axis=1))
+    scale = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(scale == 0, 1.0, scale)
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-10, hermitian=True)
+    left = residual - columns @ (inverse @ (columns.T @ residual))
+    dof = max(visible.degrees_of_freedom - basis.shape[1] - columns.shape[1], 1)
+    inside = pose >= 0
+    scores = _sums(columns[inside] * left[inside, None], pose[inside])
+    shared = inverse @ (scores.T @ scores) @ inverse * (int(inside.sum()) / dof)
+    plain = inverse * float(left @ left) / dof
+    ratio = np.diag(shared) / np.maximum(np.diag(plain), 1e-300)
+    return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
+
+
+def _sums(rows: Array, pose: npt.NDArray[np.int64]) -> Array:
+    """Sums (P, k) of rows (m, k) over each pose."""
+    _, place = np.unique(pose, return_inverse=True)
+    return np.column_stack([np.bincount(place, weights=column) for column in rows.T])

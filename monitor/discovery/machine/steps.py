@@ -1,0 +1,125 @@
+"""Steps between runs: a parameter that jumped, a ball that stands elsewhere since some run.
+
+Told as what they are, with a stated false-alarm probability; the search itself is in ``statistics.changes``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.discovery.machine.fit import Fit
+from monitor.records import Array
+from monitor.statistics import find_changes
+
+# One false alarm in a hundred campaigns, half of it for the parameters and half for the balls.
+FALSE_ALARM = 0.01
+FEWEST_RUNS = 6
+# Where the runs happen to scatter less than their known uncertainty, that uncertainty counts: a step is told
+# from four standard deviations on, one in 16 000 by chance.
+STANDARD_DEVIATIONS = 4.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step from ``run`` on; ``size`` in internal units. ``parameter`` or ``target`` names what changed."""
+
+    parameter: str | None
+    target: str | None
+    run: int
+    size: float
+    u: float
+    p_value: float
+
+
+def _series(fit: Fit) -> dict[str, Array]:
+    count = len(fit.problem.base_names)
+    return {
+        name: fit.solution.local[:, place]
+        for place, name in enumerate(fit.problem.base_names[:count])
+        if fit.solution.local_free[:, place].all()
+    }
+
+
+def _balls(fit: Fit, left_out: frozenset[str], moved: frozenset[str]) -> dict[str, Array]:
+    """Coordinates of every ball less those of the ball set's middle, which a shift of the whole set leaves.
+
+    Balls of ``left_out`` are not wanted; those of ``moved`` neither, and do not count for the middle.
+    """
+    movable = fit.problem.movable
+    touched = [int(np.sum(fit.problem.context.target == target)) for target in movable]
+    # A ball touched once a run has nothing to check it, and moves with the readings.
+    often = [
+        place
+        for place, times in enumerate(touched)
+        if times >= 3 * len(fit.problem.runs) and movable[place] not in moved
+    ]
+    if len(often) < 3:
+        return {}
+    coordinates = np.array(
+        [[fit.problem.local_names.index(f"ball {name} {axis}") for axis in "xyz"] for name in movable]
+    )
+    places = fit.solution.local[:, coordinates[often]]
+    middle = np.median(places - places[:1], axis=1, keepdims=True)
+    relative = places - places[:1] - middle
+    return {
+        f"{movable[ball]}|{'xyz'[axis]}": relative[:, place, axis]
+        for place, ball in enumerate(often)
+        for axis in range(3)
+        if movable[ball] not in left_out
+    }
+
+
+def _known(fit: Fit, place: int, index: int) -> float:
+    """Standard uncertainty of the difference of the means before and after, from each run's own covariance."""
+    variance = fit.solution.local_covariance[:, place, place]
+    before, after = variance[:index], variance[index:]
+    return float(np.sqrt(before.mean() / len(before) + after.mean() / len(after)))
+
+
+def find_steps(
+    fit: Fit, started: Array, rng: np.random.Generator, moved_within: frozenset[str] = frozenset()
+) -> list[Step]:
+    """Steps of parameters and balls over the runs, which began at ``started`` (R,), in days, rising.
+
+    Balls that were seen to move inside a run (``moved_within``) are not told twice.
+    """
+    if len(fit.problem.runs) < FEWEST_RUNS:
+        return []
+    found = _search(fit, _series(fit), started, rng)
+    # A ball that moved shifts the middle a little; the others are looked at again without it.
+    moved: list[Step] = []
+    while True:
+        without = frozenset(str(step.target) for step in moved)
+        steps = _search(fit, _balls(fit, moved_within, without), started, rng)
+        if not steps:
+            return found + moved
+        largest = max(steps, key=lambda step: abs(step.size) / step.u)
+        moved += [step for step in steps if step.target == largest.target]
+
+
+def _search(fit: Fit, series: dict[str, Array], started: Array, rng: np.random.Generator) -> list[Step]:
+    """Steps of several series; of a ball's three coordinates the largest step at every run."""
+    if not series:
+        return []
+    # Twice as many trials as the level of one series needs at least.
+    level = FALSE_ALARM / 2.0
+    trials = int(2 * len(series) / level)
+    history = find_changes(series, started, rng=rng, false_alarm=level, trials=trials)
+    found: dict[tuple[str, int], Step] = {}
+    for change in history.changes:
+        if change.kind != "step":
+            continue
+        run = int(fit.problem.runs[change.index])
+        name, _, axis = change.parameter.partition("|")
+        place = fit.problem.local_names.index(f"ball {name} {axis}" if axis else name)
+        if abs(change.size) < STANDARD_DEVIATIONS * _known(fit, place, change.index):
+            continue
+        # The level is that of the whole search.
+        p_value = min(1.0, change.p_value * len(series))
+        step = Step(None if axis else name, name if axis else None, run, change.size, change.u, p_value)
+        before = found.get((name, run))
+        if before is None or abs(step.size) > abs(before.size):
+            found[(name, run)] = step
+    return list(found.values())

@@ -1,0 +1,1 @@
+"""Least squares on a kinematic chain: what the methods share."""

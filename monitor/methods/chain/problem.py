@@ -1,0 +1,367 @@
+"""The least-squares problem of runs on a kinematic chain: what is the same whatever the method measures.
+
+Something on the tool side is brought to, or seen from, something on the work side. The unknowns of a run are the
+coefficients of the model's base effects and those of its own that the method adds (balls, stylus tip, frames,
+faces); those common to the campaign are the coefficients of the effects that were added. A method says where the two
+ends of the chain are (``ends``), how they depend on its own unknowns (``by_own``), which part of the vector between
+them a reading tells (``observe``), and which calibrated quantities it has besides (``extras``).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.effects import Basis, ChainEffect, Context, Effect
+from monitor.effects.catalogue import of_balls
+from monitor.exceptions import DataError
+from monitor.machine import MOTION, Evaluation, evaluate
+from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
+from monitor.methods.chain.searched import STARTS_S, Added, added_in, resolved
+from monitor.records import Array
+
+# A wrong sign of an axis fits the readings perfectly with a gain of -2 and mirrored targets. A turn of 0.1 rad or
+# a gain of 100 mm/m is no error of a machine but another machine; real ones stay below a hundredth of that.
+LARGEST_ERROR = 0.1
+# The largest effect that a machine in use is likely to have: 50 µm at the tip, or an angle of 1 mrad. The
+# tolerances of geometric tests of machining centres (ISO 10791-1 to -3) are about 10 µm and 60 µrad. A plan that
+# leaves an uncertainty as large as that says nothing of the effect.
+LARGEST_DISPLACEMENT = 50e-3
+LARGEST_ANGLE = 1e-3
+
+
+@dataclass(frozen=True)
+class ChainProblem(ABC):
+    """Readings on a chain as a least-squares problem: n rows, R runs, d numbers a row.
+
+    ``base`` effects are free in every run, ``added`` ones common to all. ``sigma`` (n, d) is the standard
+    uncertainty of each number in mm; infinite where a row has no weight.
+    """
+
+    context: Context
+    base: tuple[Effect, ...]
+    added: tuple[Effect, ...]
+    sigma: Array
+
+    @property
+    @abstractmethod
+    def own_names(self) -> tuple[str, ...]:
+        """Names of a run's q own unknowns, after the coefficients of the base effects."""
+
+    @property
+    @abstractmethod
+    def own_start(self) -> Array:
+        """Where the search for the own unknowns begins (R, q)."""
+
+    @abstractmethod
+    def ends(self, own: Array) -> tuple[Array, Array]:
+        """Points (n, 3) mm at the work end, in the frame of the last work axis, and (n, 3) mm at the tool end, in
+        that of the last tool axis, for own unknowns (R, q). A fresh array each: effects shift the first in place."""
+
+    @abstractmethod
+    def by_own(self, own: Array, seen: Evaluation) -> Array:
+        """Derivatives (n, 3, q) of the vector from the work end to the tool end by the own unknowns."""
+
+    def observe(self, rows: Array) -> Array:
+        """What the readings tell (n, d, ...) of vectors or their derivatives (n, 3, ...): all three components."""
+        return rows
+
+    def as_vectors(self, rows: Array) -> Array:
+        """Residuals (n, d) as vectors (n, 3) mm in the frame of the last work axis: the shortest that tell the same."""
+        if self.components == ("x", "y", "z"):
+            return rows
+        seen = self.observe(np.tile(np.eye(3), (len(self.context), 1, 1)))
+        return np.asarray(np.einsum("nik,nk->ni", np.linalg.pinv(seen), rows))
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the d numbers of a row."""
+        return ("x", "y", "z")
+
+    @property
+    def measured_joints(self) -> tuple[int, ...]:
+        """Places of the joints whose readings are what is measured; the others stand where the plan says."""
+        return ()
+
+    def foreseen(self) -> Self:
+        """The problem with ``context.expected``, for effects that look at the measured joints.
+
+        Expected is where the base effects and the own unknowns, fitted to all readings, let a measured joint stop. Of
+        Gaussian noise the fitted values are independent of what the fit leaves, so no function of them explains it
+        better than chance (J. B. Ramsey, J. R. Stat. Soc. B 31 (1969) 350, tests models so). At the readings
+        themselves sin(2 pi x / 10 mm) at points 10 mm apart is the noise in another unit.
+        """
+        if self.context.expected is not None or not self.measured_joints:
+            return self
+        bare = replace(self, added=())
+        return replace(self, context=self.context.expecting(stops(bare, solve_problem(bare))))
+
+    def for_search(self) -> Self:
+        """The problem in which missing effects are looked for."""
+        return self.foreseen()
+
+    @property
+    def extra_names(self) -> tuple[str, ...]:
+        """Names of the e calibrated quantities that every run has besides its rows."""
+        return ()
+
+    def extras(self, own: Array) -> tuple[Array, Array]:
+        """Whitened residuals (R, e) of the calibrated quantities and derivatives (R, e, q) by the own unknowns."""
+        return np.zeros((len(self.runs), 0)), np.zeros((len(self.runs), 0, own.shape[1]))
+
+    @property
+    def movable(self) -> tuple[str, ...]:
+        """The targets that may come loose and stand elsewhere, each with three coordinates of its own."""
+        return ()
+
+    @property
+    def target_word(self) -> str:
+        """What a target is called."""
+        return "ball"
+
+    @property
+    def largest_effect(self) -> tuple[float, float]:
+        """Displacement (mm at the tool) and angle (rad) of the largest effect that such a machine is likely to hide."""
+        return LARGEST_DISPLACEMENT, LARGEST_ANGLE
+
+    def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
+        """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
+        return of_balls(drivers)
+
+    @property
+    def gross_times(self) -> float:
+        """A residual of so many stated standard uncertainties is first of all a mistake of the file."""
+        return 100.0
+
+    def contradiction(self, solution: Solution) -> str | None:
+        """Why the readings cannot come from this chain, in words; None where they may."""
+        return None
+
+    @property
+    def known_errors(self) -> tuple[tuple[ChainEffect, str], ...]:
+        """Errors of the machine that are own unknowns, because they were measured by other means: effect and name."""
+        return ()
+
+    @property
+    def largest_error(self) -> float:
+        """The location angle (rad) or gain from which on the readings contradict the machine file."""
+        return LARGEST_ERROR
+
+    @cached_property
+    def runs(self) -> npt.NDArray[np.int64]:
+        """The runs' numbers, in order."""
+        return np.unique(self.context.run)
+
+    @cached_property
+    def targets(self) -> tuple[str, ...]:
+        """The targets' names, in order."""
+        return tuple(str(name) for name in np.unique(self.context.target))
+
+    @cached_property
+    def _run(self) -> npt.NDArray[np.int64]:
+        return np.searchsorted(self.runs, self.context.run)
+
+    @cached_property
+    def _target(self) -> npt.NDArray[np.int64]:
+        return np.searchsorted(np.array(self.targets), self.context.target)
+
+    @cached_property
+    def _row(self) -> npt.NDArray[np.int64]:
+        """Place of every probing within its run."""
+        places = np.empty(len(self.context), dtype=np.int64)
+        for run in range(len(self.runs)):
+            rows = np.flatnonzero(self._run == run)
+            places[rows] = np.arange(len(rows))
+        return places
+
+    @cached_property
+    def _own(self) -> tuple[Basis, ...]:
+        return tuple(effect.basis(self.context) for effect in self.base)
+
+    @cached_property
+    def shared(self) -> tuple[Added, ...]:
+        """The added effects in this context, with their unknowns in the order of the common ones."""
+        return added_in(self.added, self.context)
+
+    @cached_property
+    def base_names(self) -> tuple[str, ...]:
+        """Names of the base effects' coefficients."""
+        return tuple(name for effect in self.base for name in effect.parameters(self.context))
+
+    @cached_property
+    def added_names(self) -> tuple[str, ...]:
+        """Names of the common unknowns: the added effects' coefficients and searched time constants."""
+        return tuple(name for added in self.shared for name in added.names())
+
+    @cached_property
+    def common_start(self) -> Array:
+        """Where the search for the common unknowns begins (c,)."""
+        return self.common_from(STARTS_S[0])
+
+    def common_from(self, time_constant_s: float) -> Array:
+        """No effect at all (c,), with every searched time constant at the given one."""
+        start = np.zeros(len(self.added_names))
+        place = 0
+        for added in self.shared:
+            place += added.unknowns
+            if added.searched:
+                start[place - 1] = np.log(time_constant_s)
+        return start
+
+    def resolved(self, common: Array) -> tuple[Self, Array]:
+        """The problem with every searched time constant fixed at ``common`` (c,), and the coefficients alone."""
+        effects, coefficients = resolved(self.shared, common)
+        return replace(self, added=effects), coefficients
+
+    @cached_property
+    def local_names(self) -> tuple[str, ...]:
+        """Names of all unknowns of a run."""
+        return (*self.base_names, *self.own_names)
+
+    @cached_property
+    def start(self) -> Array:
+        """Where the search begins (R, p): no errors, the own unknowns at their start."""
+        none = np.zeros((len(self.runs), len(self.base_names)))
+        return np.concatenate([none, self.own_start], axis=1)
+
+    def own_of(self, local: Array) -> Array:
+        """The own unknowns (R, q) of all unknowns (R, p)."""
+        return local[:, len(self.base_names) :]
+
+    def padded(self, rows: Array) -> Array:
+        """Rows (n, d, ...) as runs (R, d m, ...), m the longest run; the rest is zero."""
+        depth = int(self._row.max()) + 1
+        found = np.zeros((len(self.runs), depth, *rows.shape[1:]))
+        found[self._run, self._row] = rows
+        return found.reshape(len(self.runs), depth * rows.shape[1], *rows.shape[2:])
+
+    def state(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
+        """Errors (n, J, 2, 6), work ends (n, 3) and tool ends (n, 3) at (R, p) and (c,), in internal units."""
+        errors = np.zeros((len(self.context), len(self.context.chain.joints), 2, 6))
+        target, tip = self.ends(self.own_of(local))
+        place = 0
+        for basis in self._own:
+            basis.apply(local[self._run, place : place + basis.size], errors, target)
+            place += basis.size
+        place = 0
+        for added in self.shared:
+            unknowns = common[place : place + added.unknowns]
+            added.basis(unknowns).apply(unknowns[: added.size], errors, target)
+            place += added.unknowns
+        return errors, target, tip
+
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
+        """The chain at (R, p) and (c,): vectors (n, 3) in mm between its ends, and their derivatives if asked for."""
+        errors, target, tip = self.state(local, common)
+        return evaluate(self.context.chain, self.context.positions, errors, target, tip, jacobian=jacobian)
+
+    def vectors(self, local: Array, common: Array) -> Array:
+        """Residuals (n, d) in mm, in file order."""
+        return self.observe(self.evaluated(local, common).residual)
+
+    def linearise(self, local: Array, common: Array) -> Linearisation:
+        """Whitened residuals and derivatives at (R, p) and (c,)."""
+        seen = self.evaluated(local, common, jacobian=True)
+        assert seen.by_error is not None
+        own = self.own_of(local)
+        by_local = np.concatenate(
+            [*(basis.displacement(seen.by_error) for basis in self._own), self.by_own(own, seen)], axis=-1
+        )
+        by_common = np.zeros((len(self.context), seen.residual.shape[1], len(common)))
+        place = 0
+        for added in self.shared:
+            its = slice(place, place + added.unknowns)
+            place += added.unknowns
+            by_common[:, :, its] = added.displacement(common[its], seen.by_error)
+        extra, by_extra = self.extras(own)
+        count = len(self.base_names)
+        return Linearisation(
+            np.concatenate([self._white(seen.residual), extra], axis=1),
+            np.concatenate([self._white(by_local), np.pad(by_extra, ((0, 0), (0, 0), (count, 0)))], axis=1),
+            np.concatenate([self._white(by_common), np.zeros((*extra.shape, len(common)))], axis=1),
+        )
+
+    def _white(self, rows: Array) -> Array:
+        told = self.observe(rows)
+        return self.padded(told / self.sigma.reshape(self.sigma.shape + (1,) * (told.ndim - 2)))
+
+
+def stops(problem: ChainProblem, solution: Solution) -> Array:
+    """Where the measured joints stop (n, J) under a solution: the readings less the shortest move that would do away
+    with a row's residual."""
+    chain, measured = problem.context.chain, list(problem.measured_joints)
+    seen = problem.evaluated(solution.local, solution.common, jacobian=True)
+    assert seen.by_error is not None
+    along = np.array([chain.joints[place].direction for place in measured])
+    moved = problem.observe(np.einsum("nrac,ac->nra", seen.by_error[:, :, measured, MOTION, :3], along))
+    places = problem.context.positions.copy()
+    places[:, measured] -= np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(seen.residual))
+    return places
+
+
+#: What gives the solution of a problem: ``solve_problem``, or who has it already.
+Solver = Callable[[ChainProblem], Solution]
+
+
+def solve_problem(
+    problem: ChainProblem,
+    local: Array | None = None,
+    common: Array | None = None,
+    most: int = MOST_ITERATIONS,
+) -> Solution:
+    """The least-squares point of a problem, from ``local`` (R, p) and ``common`` (c,) or from no errors at all.
+
+    A searched time constant is begun from several values and the best end is taken, since the sum of squares
+    may have more than one minimum in it. Raises DataError where no start converges, or where the readings fit
+    only another machine. ``most`` bounds the steps where nothing is searched.
+    """
+    begin = problem.start if local is None else local
+    if common is not None or not any(added.searched for added in problem.shared):
+        solution = solve(problem.linearise, begin, problem.common_start if common is None else common, most)
+    else:
+        solution = _from_several_starts(problem, begin)
+    _refuse_another_machine(problem, solution)
+    return solution
+
+
+def _from_several_starts(problem: ChainProblem, begin: Array) -> Solution:
+    found: list[Solution] = []
+    fault: DataError | None = None
+    for start in STARTS_S:
+        try:
+            found.append(solve(problem.linearise, begin, problem.common_from(start)))
+        except DataError as error:
+            fault = error
+    if not found:
+        assert fault is not None
+        raise fault
+    return min(found, key=lambda one: float(np.sum(one.last.residual**2)))
+
+
+def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
+    """DataError where a location angle or a gain comes out too large to be an error, or too much is left."""
+    place = 0
+    for effect in problem.base:
+        names = effect.parameters(problem.context)
+        if isinstance(effect, ChainEffect) and (
+            effect.is_gain or (effect.term.is_rotation and effect.text == effect.term.symbol)
+        ):
+            found = np.where(solution.local_free[:, place], solution.local[:, place], 0.0)
+            worst = int(np.abs(found).argmax())
+            if abs(found[worst]) > problem.largest_error:
+                what = "mm/mm" if effect.is_gain else "rad"
+                raise DataError(
+                    f"run {problem.runs[worst]}: {names[0]} comes out at {found[worst]:.3g} {what}, which is no error "
+                    "of a machine: the readings contradict the machine file; check the axis signs, the topology, the "
+                    "units, the columns and the order of the targets"
+                )
+        place += len(names)
+    wrong = problem.contradiction(solution)
+    if wrong is not None:
+        raise DataError(f"the readings contradict the machine file: {wrong}")

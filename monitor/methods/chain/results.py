@@ -1,0 +1,114 @@
+"""What a solved problem reports: the numbers of every run, and what the plan cannot tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from monitor.methods.chain.identification import Identification, Refusal, RunIdentification
+from monitor.methods.chain.least_squares import MEMBER_SHARE, Solution
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.shared_effects import shared_parameters
+from monitor.methods.model import Model
+from monitor.records import Array, Campaign
+
+#: What a plan would have to do for parameters that one run cannot separate: problem, parameters, run to words.
+Advice = Callable[[ChainProblem, tuple[str, ...], int], str]
+
+#: So many places of one table are named one by one.
+MOST_PLACES = 3
+
+
+def _groups(null_space: Array, names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Unknowns that trade against each other: the blocks of the projector on the null space."""
+    projector = null_space.T @ null_space
+    # The same members as Solution.local_free refuses, so that no parameter stays without a number unnamed.
+    member = np.abs(null_space).max(axis=0) >= MEMBER_SHARE
+    size = np.sqrt(np.maximum(np.diag(projector), np.finfo(float).tiny))
+    linked = (np.abs(projector) > MEMBER_SHARE * np.outer(size, size)) & np.outer(member, member)
+    left = [int(place) for place in np.flatnonzero(member)]
+    groups = []
+    while left:
+        group, front = {left[0]}, [left[0]]
+        while front:
+            place = front.pop()
+            for other in np.flatnonzero(linked[place]):
+                if int(other) not in group:
+                    group.add(int(other))
+                    front.append(int(other))
+        left = [place for place in left if place not in group]
+        groups.append(tuple(names[place] for place in sorted(group)))
+    return groups
+
+
+def _told(names: Sequence[str]) -> str:
+    """Names in words; those of many places of one thing, ``EYX(-88)``, as one."""
+    heads = [name.partition("(")[0] if name.endswith(")") else name for name in names]
+    words = []
+    for head in dict.fromkeys(heads):
+        its = [name for name, own in zip(names, heads, strict=True) if own == head]
+        words += its if len(its) <= MOST_PLACES else [f"{head} at {len(its)} places"]
+    return " and ".join(words)
+
+
+def refusals(problem: ChainProblem, null_space: Array, run: int, advice: Advice) -> tuple[Refusal, ...]:
+    """What one run cannot separate, by its null space, the reported parameters first, and why."""
+    reported = problem.base_names
+    found = []
+    for group in _groups(null_space, problem.local_names):
+        inside = tuple(name for name in group if name in reported)
+        if not inside:
+            continue
+        others = [name for name in group if name not in inside]
+        with_what = f"{_told(inside)} cannot be told apart" if len(inside) > 1 else inside[0]
+        if others:
+            with_what += f"{' from' if len(inside) > 1 else ' cannot be told apart from'} {', '.join(others)}"
+        found.append(Refusal(inside, f"with this plan {with_what}{advice(problem, inside, run)}"))
+    return tuple(found)
+
+
+def identification(
+    campaign: Campaign, model: Model, problem: ChainProblem, solution: Solution, advice: Advice
+) -> Identification:
+    """The geometric errors of every run, with the covariance of the stated uncertainties."""
+    count = len(problem.base_names)
+    vectors = problem.vectors(solution.local, solution.common)
+    spatial = problem.as_vectors(vectors)
+    runs = []
+    for place, run in enumerate(problem.runs):
+        own = problem.context.run == run
+        residuals = vectors[own]
+        free = solution.local_free[place, :count]
+        both = free[:, None] & free
+        weighted = solution.last.residual[place]
+        runs.append(
+            RunIdentification(
+                run=int(run),
+                estimate=np.where(free, solution.local[place, :count], np.nan),
+                covariance=np.where(both, solution.local_covariance[place, :count, :count], np.nan),
+                unknowns=dict(
+                    zip(problem.local_names[count:], map(float, solution.local[place, count:]), strict=True)
+                ),
+                refused=refusals(problem, solution.null_space[place], int(run), advice),
+                residuals=spatial[own],
+                rms=float(np.sqrt(np.mean(residuals**2))),
+                chi_square=float(weighted @ weighted),
+                degrees_of_freedom=residuals.size + len(problem.extra_names) - int(solution.rank[place]),
+            )
+        )
+    shared = shared_parameters(problem, solution)
+    return Identification(
+        campaign=campaign.name,
+        method=campaign.method,
+        model=model.name,
+        parameters=problem.base_names,
+        units=tuple(effect.unit for effect in problem.base for _ in effect.parameters(problem.context)),
+        runs=tuple(runs),
+        added=shared.names,
+        added_units=shared.units,
+        added_estimate=shared.estimate,
+        added_covariance=shared.covariance,
+        added_refused=shared.refused,
+        iterations=solution.iterations,
+    )

@@ -1,0 +1,128 @@
+"""Touching targets: runs in which a stylus tip is brought to balls.
+
+A run's own unknowns are the balls' coordinates and the stylus tip; a calibrated distance between two balls gives the
+unit of length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from monitor.machine import Evaluation
+from monitor.methods.chain.problem import ChainProblem, solve_problem, stops
+from monitor.records import Array
+
+# mm; more than the stylus' offset moves an axis as the spindle turns, less than any plan means to move it.
+STILL = 1.0
+
+
+@dataclass(frozen=True)
+class Distance:
+    """A calibrated distance between two targets: length and standard uncertainty (R,) in mm, one a run."""
+
+    between: tuple[str, str]
+    length: Array
+    standard_uncertainty: float
+
+
+@dataclass(frozen=True)
+class TouchProblem(ChainProblem):
+    """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is told.
+
+    ``beside`` (n, 3) mm is what the readings differ by where the chain stands at expected places.
+    """
+
+    distances: tuple[Distance, ...] = ()
+    tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    beside: Array | None = None
+
+    @cached_property
+    def own_names(self) -> tuple[str, ...]:
+        """Coordinates of the balls, then of the tip."""
+        balls = tuple(f"ball {target} {axis}" for target in self.targets for axis in "xyz")
+        return (*balls, "tip x", "tip y", "tip z")
+
+    @cached_property
+    def own_start(self) -> Array:
+        """Balls at their nominal places (R, q)."""
+        first = {str(t): row for row, t in reversed(list(enumerate(self.context.target)))}
+        nominal = np.concatenate([self.context.nominal[first[t]] for t in self.targets])
+        return np.tile(np.concatenate([nominal, self.tip]), (len(self.runs), 1))
+
+    @property
+    def movable(self) -> tuple[str, ...]:
+        """The balls."""
+        return self.targets
+
+    @property
+    def measured_joints(self) -> tuple[int, ...]:
+        """The linear axes: their readings say where the tip met the ball."""
+        return tuple(place for place, joint in enumerate(self.context.chain.joints) if not joint.turns)
+
+    def foreseen(self) -> TouchProblem:
+        """As read, unless an axis stands still while a ball is probed at all its poses.
+
+        Where balls move every axis by millimetres from touch to touch, the reading is as good as the expected place. An
+        axis that stands still (along a single rotary axis) tells little but its noise, and leaves gains to what moves
+        the others least: the chain is then taken where it is expected to stop, what the readings differ by beside it.
+        """
+        if self.context.expected is not None or not self._stands_still:
+            return self
+        bare = replace(self, added=())
+        solution = solve_problem(bare)
+        places = stops(bare, solution)
+        return replace(
+            self,
+            context=replace(self.context.expecting(places), positions=places),
+            beside=bare.evaluated(solution.local, solution.common).residual,
+        )
+
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
+        """The chain where it stands, and what the readings differ by."""
+        seen = super().evaluated(local, common, jacobian=jacobian)
+        return seen if self.beside is None else replace(seen, residual=seen.residual + self.beside)
+
+    @property
+    def _stands_still(self) -> bool:
+        """Whether there is a linear axis that every ball moves by less than ``STILL`` over all its probings."""
+        order = np.argsort(self._target, kind="stable")
+        first = np.searchsorted(self._target[order], np.arange(len(self.targets)))
+        read = self.context.positions[order]
+        moved = (np.maximum.reduceat(read, first) - np.minimum.reduceat(read, first)).max(axis=0)
+        return any(moved[place] < STILL for place in self.measured_joints)
+
+    @property
+    def extra_names(self) -> tuple[str, ...]:
+        """The calibrated distances."""
+        return tuple("-".join(distance.between) for distance in self.distances)
+
+    def ends(self, own: Array) -> tuple[Array, Array]:
+        """The ball of every probing and the tip."""
+        balls = own[:, :-3].reshape(len(self.runs), len(self.targets), 3)
+        return balls[self._run, self._target], own[self._run, -3:]
+
+    def by_own(self, own: Array, seen: Evaluation) -> Array:
+        """Derivatives (n, 3, q) by balls and tip."""
+        found = np.zeros((len(self.context), 3, own.shape[1]))
+        for axis in range(3):
+            found[np.arange(len(self.context)), axis, 3 * self._target + axis] = -1.0
+        found[:, :, -3:] = seen.by_tip
+        return found
+
+    def extras(self, own: Array) -> tuple[Array, Array]:
+        """Length of every calibrated distance less the calibrated one."""
+        balls = own[:, :-3].reshape(len(self.runs), len(self.targets), 3)
+        residual = np.zeros((len(self.runs), len(self.distances)))
+        by_own = np.zeros((len(self.runs), len(self.distances), own.shape[1]))
+        for place, distance in enumerate(self.distances):
+            first, second = (self.targets.index(name) for name in distance.between)
+            between = balls[:, first] - balls[:, second]
+            length = np.linalg.norm(between, axis=-1)
+            residual[:, place] = (length - distance.length) / distance.standard_uncertainty
+            slope = between / length[:, None] / distance.standard_uncertainty
+            by_own[:, place, 3 * first : 3 * first + 3] = slope
+            by_own[:, place, 3 * second : 3 * second + 3] = -slope
+        return residual, by_own

@@ -1,0 +1,1 @@
+"""One response over its inputs: no machine at all."""

@@ -1,0 +1,1 @@
+"""A workpiece of unknown shape, probed at several angles."""

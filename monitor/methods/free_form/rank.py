@@ -1,0 +1,74 @@
+"""What a free-form plan cannot separate, and why: a missing boundary condition, an unseen node, the table's angles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from monitor.methods.chain.least_squares import eliminate
+from monitor.methods.free_form.axes import WORKPIECE_CONDITIONS, all_conditions
+from monitor.records import Array
+from monitor.units import DEGREE
+
+if TYPE_CHECKING:
+    from monitor.methods.free_form.problem import FreeFormProblem
+
+#: An angle of the table this close to a multiple of 90 degrees swaps the tables of the linear axes, in degrees.
+QUARTER_DEG = 1.0
+
+
+def nullity(problem: FreeFormProblem, run: int) -> int:
+    """The dimension of what the readings and conditions of a run (its place) leave open, at no errors."""
+    return int(np.count_nonzero(np.any(_null_space(problem)[run] != 0.0, axis=1)))
+
+
+def _null_space(problem: FreeFormProblem) -> Array:
+    """Scaled null vectors (R, p, p) in rows, at no errors."""
+    return eliminate(problem.linearise(problem.start, problem.common_start).local).null_space
+
+
+def missing_conditions(problem: FreeFormProblem) -> dict[str, str]:
+    """The boundary conditions of the method that the campaign left out, each with what it fixes.
+
+    One on the workpiece stands for one on the table's first angle: shifts for the shifts, the turn for the turn.
+    """
+    known = all_conditions(problem.plane, problem.nodes, problem.first_angle)
+    shift_u, shift_v, turn = (f"{symbol}({problem.first_angle:.9g})" for symbol in problem.plane.table_terms)
+    instead = dict(zip(WORKPIECE_CONDITIONS, (shift_u, shift_v, turn), strict=True))
+    there = {*problem.held, problem.length.parameter, *(instead[one] for one in problem.on_shape)}
+    return {name: words for name, words in known.items() if name not in there}
+
+
+def reason_of(problem: FreeFormProblem, parameters: tuple[str, ...], run: int) -> str:
+    """Why ``parameters`` of a run cannot be told apart, and what would separate them."""
+    missing = {name: words for name, words in missing_conditions(problem).items() if name in parameters}
+    if missing:
+        told = "; ".join(f"{name} = 0 ({words})" for name, words in missing.items())
+        return (
+            f": the boundary condition{'s' * (len(missing) > 1)} {told} {'are' if len(missing) > 1 else 'is'} missing; "
+            "add to the conditions of [artefact.self_calibration]"
+        )
+    rows = problem.context.run == run
+    unseen = _unseen(problem, parameters, rows)
+    if unseen:
+        return f": no point was probed where {unseen} acts; probe nearer to the ends, or leave the node out"
+    table = problem.context.chain.index(problem.plane.table.name)
+    degrees = np.unique(np.round(problem.context.positions[rows, table] / DEGREE.factor, 6))
+    name = problem.plane.table.name
+    from_first = (degrees - degrees[0] + 45.0) % 90.0 - 45.0
+    if np.all(np.abs(from_first) < QUARTER_DEG):
+        return (
+            f": the angles of {name} are multiples of 90 degrees apart, which swaps the tables of the linear axes; "
+            "probe at another angle too"
+        )
+    return f": {len(degrees)} angles of {name} do not suffice for these points; probe at more angles, or more points"
+
+
+def _unseen(problem: FreeFormProblem, parameters: tuple[str, ...], rows: Array) -> str:
+    """The parameters that act at none of the probings."""
+    local = problem.linearise(problem.start, problem.common_start).local
+    place = int(np.flatnonzero(problem.runs == problem.context.run[rows][0])[0])
+    size = np.linalg.norm(local[place], axis=0)
+    silent = [name for name in parameters if size[problem.local_names.index(name)] == 0.0]
+    return ", ".join(silent)

@@ -1,0 +1,1 @@
+"""A piece touched at indexed angles of rotary axes."""

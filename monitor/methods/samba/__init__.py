@@ -1,0 +1,1 @@
+"""SAMBA: balls and a scale bar, touched at indexed angles."""

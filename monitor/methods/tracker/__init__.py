@@ -1,0 +1,1 @@
+"""Reflectors on a robot or serial machine, seen from outside."""

@@ -1,0 +1,209 @@
+"""Looking from outside: reflectors carried by the tool, measured by a tracker or camera in a frame of its own.
+
+A run's own unknowns are the frame (as a small motion away from a first guess), the places of the reflectors on the
+tool in the frame of the last tool axis, and those of reflectors fixed beside the machine. The first guess comes
+from linear least squares: with the rotation's nine numbers taken as free, frame and reflectors are linear in what
+the nominal chain says; the nearest rotation then takes their place (Horn, Hilden and Negahdaripour, J. Opt. Soc.
+Am. A 5 (1988) 1127). It needs no start of its own: a frame metres away or upside down is as good as any.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.effects import Context
+from monitor.effects.catalogue import of_tracker
+from monitor.exceptions import DataError
+from monitor.machine import Evaluation, evaluate
+from monitor.machine.chain import rotation_about
+from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.problem import ChainProblem
+from monitor.records import Array
+
+FRAME = ("frame x", "frame y", "frame z", "frame a", "frame b", "frame c")
+# A zero that is off by more than 20 degrees is another zero; mastering errors stay below some degrees.
+LARGEST_TURN = 0.35
+# Robots hide larger effects than machine tools: a joint that gives way under a payload, or a reversal, of a few
+# millimetres at the tool; a tilt or turn of a degree.
+LARGEST_DISPLACEMENT, LARGEST_ANGLE = 5.0, 0.02
+# Geometry alone leaves a robot some tenths of a millimetre over a metre. Where a fiftieth of the spread of the
+# points is left, the chain is another one.
+CONTRADICTS = 0.02
+# Points this many times too small or too large are in another unit (cm, inch, m); no error of a chain comes near.
+OTHER_UNIT = 5.0
+AXES: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class TrackingProblem(ChainProblem):
+    """Points of reflectors (n rows); ``context.nominal`` (n, 3) holds them in the machine's frame by the first guess,
+    ``reflectors`` (T, 3) their places by it in the order of ``targets``, ``fixed`` names those beside the machine,
+    ``gear_ratios`` are those that the machine file gives."""
+
+    reflectors: tuple[tuple[float, float, float], ...] = ()
+    fixed: tuple[str, ...] = ()
+    gear_ratios: tuple[tuple[str, float], ...] = ()
+
+    @cached_property
+    def own_names(self) -> tuple[str, ...]:
+        """The frame's motion, then the coordinates of the reflectors."""
+        return (*FRAME, *(f"reflector {target} {axis}" for target in self.targets for axis in "xyz"))
+
+    @cached_property
+    def own_start(self) -> Array:
+        """The first guess (R, q)."""
+        one = np.concatenate([np.zeros(6), np.array(self.reflectors).reshape(-1)])
+        return np.tile(one, (len(self.runs), 1))
+
+    @property
+    def largest_error(self) -> float:
+        """A turn of 20 degrees."""
+        return LARGEST_TURN
+
+    @property
+    def target_word(self) -> str:
+        """A reflector."""
+        return "reflector"
+
+    @property
+    def largest_effect(self) -> tuple[float, float]:
+        """Displacement in mm and angle in rad that a robot may hide."""
+        return LARGEST_DISPLACEMENT, LARGEST_ANGLE
+
+    def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
+        """What poses seen from outside can show besides the errors of every chain."""
+        return of_tracker(self.context.chain, drivers, dict(self.gear_ratios))
+
+    @cached_property
+    def _fixed(self) -> npt.NDArray[np.bool_]:
+        """Rows (n,) of reflectors beside the machine."""
+        return np.isin(self.context.target, list(self.fixed))
+
+    @cached_property
+    def _centre(self) -> Array:
+        """The middle (R, 3) of every run's points, about which its frame turns."""
+        return np.array(
+            [self.context.nominal[self._run == run].mean(axis=0) for run in range(len(self.runs))]
+        )
+
+    def _turned(self, own: Array) -> tuple[Array, Array, Array]:
+        """Rotations (R, 3, 3) of the frames, and those of their two outer turns."""
+        about_c = rotation_about(AXES[2], own[:, 5])
+        about_cb = about_c @ rotation_about(AXES[1], own[:, 4])
+        return about_cb @ rotation_about(AXES[0], own[:, 3]), about_cb, about_c
+
+    def ends(self, own: Array) -> tuple[Array, Array]:
+        """The measured points in the machine's frame, and the reflectors in that of the last axis."""
+        turn, _, _ = self._turned(own)
+        arm = self.context.nominal - self._centre[self._run]
+        points = np.einsum("nij,nj->ni", turn[self._run], arm) + self._centre[self._run] + own[self._run, :3]
+        places = own[:, 6:].reshape(len(self.runs), len(self.targets), 3)
+        return points, places[self._run, self._target]
+
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
+        """The chain at (R, p) and (c,); reflectors beside the machine are not carried by it."""
+        errors, points, places = self.state(local, common)
+        context = self.context
+        seen = evaluate(context.chain, context.positions, errors, points, places, jacobian=jacobian)
+        if not self._fixed.any():
+            return seen
+        residual, by_tip = seen.residual.copy(), seen.by_tip.copy()
+        residual[self._fixed] = (places - points)[self._fixed]
+        by_tip[self._fixed] = np.eye(3)
+        by_error = seen.by_error
+        if by_error is not None:
+            by_error[self._fixed] = 0.0
+        return replace(seen, residual=residual, by_tip=by_tip, by_error=by_error)
+
+    def by_own(self, own: Array, seen: Evaluation) -> Array:
+        """Derivatives (n, 3, q) by frame and reflectors."""
+        found = np.zeros((len(self.context), 3, own.shape[1]))
+        found[:, :, :3] = -np.eye(3)
+        turn, about_cb, about_c = self._turned(own)
+        arm = self.context.nominal - self._centre[self._run]
+        turned = np.einsum("nij,nj->ni", turn[self._run], arm)
+        # d(R_C R_B R_A) turns about R_C R_B x, R_C y and z.
+        for place, axes in enumerate((about_cb[:, :, 0], about_c[:, :, 1], np.tile(AXES[2], (len(turn), 1)))):
+            found[:, :, 3 + place] = -np.cross(axes[self._run], turned)
+        rows = np.arange(len(self.context))
+        for axis in range(3):
+            found[rows, :, 6 + 3 * self._target + axis] = seen.by_tip[:, :, axis]
+        return found
+
+    def contradiction(self, solution: Solution) -> str | None:
+        """Why the readings cannot come from this chain, in words; None where they may."""
+        left = self.vectors(solution.local, solution.common)
+        weight = np.isfinite(self.sigma[:, 0]) & ~self._fixed
+        spread = float(np.sqrt(np.mean((self.context.nominal - self._centre[self._run])[weight] ** 2)))
+        rms = float(np.sqrt(np.mean(left[weight] ** 2)))
+        if rms <= CONTRADICTS * spread:
+            return None
+        return (
+            f"after the fit {rms:.3g} mm are left over points that spread by {spread:.3g} mm, which no errors of this "
+            "chain explain; check the order of the axes, their signs, directions and offsets, and the units"
+        )
+
+
+def first_guess(context: Context, points: Array, fixed: Sequence[str]) -> tuple[Array, Array]:
+    """Points (n, 3) carried into the machine's frame, and the places (T, 3) of all targets, by the nominal chain.
+
+    ``points`` (n, 3) mm are in the tracker's frame, a frame of its own in every run; places of reflectors on the
+    tool are in the frame of the last axis, of fixed ones in the machine's.
+    """
+    count = len(context)
+    none = np.zeros((count, len(context.chain.joints), 2, 6))
+    seen = evaluate(context.chain, context.positions, none, np.zeros((count, 3)), np.zeros(3))
+    targets = np.unique(context.target)
+    carried = np.empty((count, 3))
+    sums, times = np.zeros((len(targets), 3)), np.zeros(len(targets))
+    for run in np.unique(context.run):
+        rows = np.flatnonzero(context.run == run)
+        tool = rows[~np.isin(context.target[rows], list(fixed))]
+        names, at = np.unique(context.target[tool], return_inverse=True)
+        turn, shift, places = _frame(seen.by_tip[tool], seen.residual[tool], points[tool], at)
+        carried[rows] = points[rows] @ turn.T + shift
+        for name, place in zip(names, places, strict=True):
+            number = int(np.flatnonzero(targets == name)[0])
+            sums[number] += place
+            times[number] += 1.0
+        for number, name in enumerate(targets):
+            own = rows[context.target[rows] == name]
+            if name in fixed and len(own):
+                sums[number] += carried[own].mean(axis=0)
+                times[number] += 1.0
+    return carried, sums / np.maximum(times, 1.0)[:, None]
+
+
+def _frame(
+    rotation: Array, origin: Array, points: Array, at: npt.NDArray[np.int64]
+) -> tuple[Array, Array, Array]:
+    """Rotation (3, 3) and shift (3,) of the tracker's frame and places (K, 3) such that
+    rotation_i place + origin_i = turn point_i + shift, as well as may be."""
+    count, kinds = len(points), int(at.max()) + 1
+    middle = points.mean(axis=0)
+    arm = points - middle
+    size = max(float(np.sqrt(np.mean(arm**2))), 1.0)
+    columns = np.zeros((count, 3, 9 + 3 + 3 * kinds))
+    for row in range(3):
+        columns[:, row, 3 * row : 3 * row + 3] = -arm / size
+    columns[:, :, 9:12] = -np.eye(3)
+    for axis in range(3):
+        columns[np.arange(count), :, 12 + 3 * at + axis] = rotation[:, :, axis]
+    flat, wanted = columns.reshape(3 * count, -1), -origin.reshape(-1)
+    free, _, rank, _ = np.linalg.lstsq(flat, wanted, rcond=1e-8)
+    u, stretch, vt = np.linalg.svd(free[:9].reshape(3, 3) / size)
+    times = float(np.prod(stretch) ** (1.0 / 3.0))
+    if rank == flat.shape[1] and not 1.0 / OTHER_UNIT < times < OTHER_UNIT:
+        raise DataError(
+            f"the measured points would have to be {times:.3g} times as large to come from this chain: check the units "
+            "of the tracker's columns (mm) and of offset_mm"
+        )
+    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    left = (origin - arm @ turn.T).reshape(-1)
+    rest = np.linalg.lstsq(flat[:, 9:], -left, rcond=1e-8)[0]
+    return turn, rest[:3] - turn @ middle, rest[3:].reshape(kinds, 3)

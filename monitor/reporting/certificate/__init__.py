@@ -1,0 +1,1 @@
+"""The calibration certificate: its record, its pages, its digital form."""

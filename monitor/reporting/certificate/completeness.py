@@ -1,0 +1,127 @@
+"""Is a certificate's record complete, and do its dates agree? Asked before anything is printed or written.
+
+An item is missing where it is None, empty, or says nothing: blanks, dashes, ``n/a``, ``TBD``. What does not apply is
+said with a reason (``NotApplicable``).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from datetime import date
+
+from monitor.exceptions import InputError
+from monitor.reporting.certificate.record import ITEMS, CertificateRecord
+from monitor.reporting.certificate.results import ResultSet
+
+#: What only a certificate that replaces another has to say.
+AMENDMENT = ("7.8.8.1 and 7.8.8.3", "reference to the certificate that it replaces, with the reason")
+#: Written where nothing is known: a reader learns no more from it than from a blank. Not "na", which is a name too.
+_PLACEHOLDERS = frozenset({"n/a", "n.a.", "n. a.", "k.a.", "k. a.", "tbd", "tba", "t.b.d."})
+
+
+@dataclass(frozen=True)
+class MissingItem:
+    """An item that the certificate lacks: the clause, what it is, and what of it is missing (may be empty)."""
+
+    clause: str
+    item: str
+    part: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.item}{f', {self.part}' if self.part else ''} (ISO/IEC 17025:2017, {self.clause})"
+
+
+class IncompleteCertificateError(InputError):
+    """A certificate that lacks items; ``missing`` lists them all."""
+
+    def __init__(self, missing: tuple[MissingItem, ...]) -> None:
+        self.missing = missing
+        count = len(missing)
+        lines = [f"the certificate is refused: {count} item{'s are' if count != 1 else ' is'} missing"]
+        lines += [f"  {item}" for item in missing]
+        super().__init__("\n".join(lines))
+
+
+def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
+    """Every item that is None, empty or says nothing, and every such part of an item, in the order of the record."""
+    found: list[MissingItem] = []
+    for name, (clause, item) in ITEMS.items():
+        found += [MissingItem(clause, item, part) for part in _gaps(getattr(record, name))]
+    if record.replaces is not None:
+        found += [MissingItem(*AMENDMENT, part) for part in _gaps(record.replaces)]
+    return tuple(found)
+
+
+def date_faults(record: CertificateRecord) -> tuple[str, ...]:
+    """What cannot be true of a record's dates: an item that came after its calibration, an issue before it."""
+    faults = []
+    if record.performed_on is not None:
+        first, last = record.performed_on
+        if last < first:
+            faults.append(f"the calibration ended on {last}, before it began on {first}")
+        if isinstance(record.received_on, date) and record.received_on > first:
+            faults.append(f"the item was received on {record.received_on}, after the calibration of {first}")
+        if record.issued_on is not None and record.issued_on < last:
+            faults.append(f"it was issued on {record.issued_on}, before the calibration of {last}")
+    issued, old = record.issued_on, record.replaces
+    if issued is not None and old is not None and old.issued_on is not None and issued < old.issued_on:
+        faults.append(
+            f"it replaces certificate {old.number} of {old.issued_on}, and was issued on {issued}, before it"
+        )
+    return tuple(faults)
+
+
+def check_complete(record: CertificateRecord) -> None:
+    """Raise IncompleteCertificateError, with the whole list, where an item is missing; InputError for dates that
+    contradict one another."""
+    missing = missing_items(record)
+    if missing:
+        raise IncompleteCertificateError(missing)
+    faults = date_faults(record)
+    if faults:
+        raise InputError(
+            "\n  ".join(["the certificate is refused, its dates contradict one another:", *faults])
+        )
+
+
+def _gaps(value: object) -> list[str]:
+    """Which parts of a value are missing; ``""`` is the value itself."""
+    if value is None:
+        return [""]
+    if isinstance(value, str):
+        return _gaps_of_text(value)
+    if isinstance(value, tuple):
+        if not value:
+            return [""]
+        return [_within(_label(element), gap) or "one entry" for element in value for gap in _gaps(element)]
+    if isinstance(value, ResultSet):
+        return list(value.gaps())
+    if dataclasses.is_dataclass(value):
+        return [
+            _within(place.name, gap)
+            for place in dataclasses.fields(value)
+            for gap in _gaps(getattr(value, place.name))
+        ]
+    return []
+
+
+def _gaps_of_text(text: str) -> list[str]:
+    if not text.strip():
+        return [""]
+    said = text.strip().casefold()
+    if said in _PLACEHOLDERS or not any(sign.isalnum() for sign in said):
+        return [f"{text.strip()!r} says nothing"]
+    return []
+
+
+def _within(name: str, gap: str) -> str:
+    """A gap of something that has a name, told with that name."""
+    if gap.endswith("says nothing"):
+        return f"{name}: {gap}" if name else gap
+    return " of ".join(filter(None, (gap, name)))
+
+
+def _label(element: object) -> str:
+    name = getattr(element, "name", None)
+    return name if isinstance(name, str) else ""

@@ -1,0 +1,180 @@
+"""The figures of a certificate's results, written as SVG: parameters with their intervals, residuals by group.
+
+No figure is taller than a page: what 150 parameters need is broken into several, with one scale a unit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.records import Array
+from monitor.reporting.certificate.results import ResidualSummary, ResultSet
+from monitor.reporting.palette import BLUE, FAINT, INK, MID, PALE
+from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, nice_ticks, tick_words
+from monitor.reporting.texts import Texts
+
+#: A figure alone on its page, below a heading and above its caption: an A4 page has 259 mm between its margins.
+TALLEST_MM = 228.0
+#: A row, and what a panel needs besides its rows (scale, unit, distance to the next), in tenths of a millimetre.
+_ROW, _AROUND = 39.0, 96.0
+#: Names of parameters may take this part of the width.
+_MOST_OF_WIDTH = 0.5
+#: Half the height of a bracket that marks a limit, and of the end of an interval.
+_BRACKET, _END = 13.0, 7.0
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """Rows of one unit in a figure: which parameters, the unit, the range of its scale."""
+
+    members: tuple[int, ...]
+    unit: str
+    across: tuple[float, float]
+
+
+def interval_drawings(result: ResultSet, texts: Texts, width_mm: float) -> list[Drawing]:
+    """Estimates with the interval ± U of each, a panel a unit, in as many figures as fit a page each.
+
+    Limits of absolute values are drawn as brackets where there are any.
+    """
+    limits = np.full(len(result.names), np.nan) if result.tolerances is None else result.tolerances
+    label = min(
+        WIDE * LETTER * max(map(len, result.names), default=1) + 12.0, _MOST_OF_WIDTH * width_mm * SCALE
+    )
+    drawings = []
+    for panels in _pages(result, limits):
+        height = sum(len(panel.members) * _ROW + _AROUND for panel in panels)
+        on = Drawing(width_mm, height / SCALE, texts("figures.intervals_alternative"))
+        top = 0.0
+        for panel in panels:
+            _draw_panel(on, panel, result, limits, top, label, texts.decimal_sign)
+            top += len(panel.members) * _ROW + _AROUND
+        drawings.append(on)
+    return drawings
+
+
+def _pages(result: ResultSet, limits: Array) -> list[list[_Panel]]:
+    """The panels, page by page; a unit with more rows than a page has goes on on the next one."""
+    pages: list[list[_Panel]] = [[]]
+    room = TALLEST_MM * SCALE
+    most = int((room - _AROUND) // _ROW)
+    for unit in dict.fromkeys(result.units):
+        left = [place for place, own in enumerate(result.units) if own == unit]
+        across = _range(result, limits, left)
+        # Pieces of nearly the same length.
+        pieces = -(-len(left) // most)
+        each = -(-len(left) // pieces)
+        for first in range(0, len(left), each):
+            part = tuple(left[first : first + each])
+            height = len(part) * _ROW + _AROUND
+            if height > room and pages[-1]:
+                pages.append([])
+                room = TALLEST_MM * SCALE
+            pages[-1].append(_Panel(part, unit, across))
+            room -= height
+    return pages
+
+
+def _range(result: ResultSet, limits: Array, members: list[int]) -> tuple[float, float]:
+    """What a scale spans: every interval, every limit, zero, and a little more."""
+    ends = [0.0]
+    for place in members:
+        value, half = float(result.estimate[place]), float(result.expanded[place])
+        ends += [value - half, value + half]
+        if math.isfinite(limits[place]):
+            ends += [-float(limits[place]), float(limits[place])]
+    low, high = min(ends), max(ends)
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _draw_panel(
+    on: Drawing, panel: _Panel, result: ResultSet, limits: Array, top: float, label: float, sign: str
+) -> None:
+    left, right = label + 10.0, on.width_mm * SCALE - 14.0
+    bottom = top + len(panel.members) * _ROW
+    low, high = panel.across
+
+    def x(value: float) -> float:
+        return left + (right - left) * (value - low) / (high - low)
+
+    bars, ends, dots, brackets, bands = [], [], [], [], []
+    for row, place in enumerate(panel.members):
+        y = top + (row + 0.5) * _ROW
+        value, half = float(result.estimate[place]), float(result.expanded[place])
+        first, last = x(value - half), x(value + half)
+        bands.append(f"M{left:.1f} {y:.1f}H{right:.1f}")
+        bars.append(f"M{first:.1f} {y:.1f}H{last:.1f}")
+        ends += [f"M{end:.1f} {y - _END:.1f}v{2 * _END:g}" for end in (first, last)]
+        dots.append(f"M{x(value):.1f} {y:.1f}h0")
+        if math.isfinite(limits[place]):
+            brackets += [
+                f"M{x(limit):.1f} {y - _BRACKET:.1f}v{2 * _BRACKET:g}"
+                for limit in (-limits[place], limits[place])
+            ]
+        on.text(label, y + 0.36 * LETTER, _fitted(result.names[place], label), anchor="end")
+    on.path("".join(bands), stroke=FAINT, width=11.0)
+    on.line(x(0.0), top, x(0.0), bottom, MID, 2.0, "8 5")
+    on.path("".join(bars), stroke=BLUE, width=4.6)
+    on.path("".join(ends), stroke=BLUE, width=3.0)
+    on.dots("".join(dots), BLUE, 13.0)
+    if brackets:
+        on.path("".join(brackets), stroke=INK, width=5.0)
+    on.line(left, bottom, right, bottom, MID, 2.0)
+    for value in nice_ticks(low, high, max(3, int((right - left) / 130.0))):
+        on.line(x(value), bottom, x(value), bottom + 8.0, MID, 2.0)
+        on.text(x(value), bottom + 12.0 + LETTER, tick_words(value, sign), anchor="middle")
+    on.text((left + right) / 2, bottom + 17.0 + 2.0 * LETTER, panel.unit, anchor="middle")
+
+
+def _fitted(name: str, room: float) -> str:
+    """A name no wider than its room; the table of results has the whole of it, in the same order."""
+    most = int(room / (WIDE * LETTER))
+    return name if len(name) <= most else name[: most - 1] + "…"
+
+
+def residual_drawing(
+    residuals: ResidualSummary, texts: Texts, width_mm: float, height_mm: float, title: str
+) -> Drawing:
+    """Bars of the RMS residuals, µm, the probe's uncertainty dashed; bars above twice of it are striped."""
+    on = Drawing(width_mm, height_mm, title)
+    level = residuals.probe_um
+    left, right, top = 100.0, width_mm * SCALE - 8.0, 14.0
+    bottom = height_mm * SCALE - 30.0 - 2.4 * LETTER
+    most = max([*residuals.rms_um, level or 0.0]) * 1.15 or 1.0
+
+    def y(value: float) -> float:
+        return bottom - (bottom - top) * value / most
+
+    for value in nice_ticks(0.0, most, 6):
+        on.line(left, y(value), right, y(value), PALE, 1.5)
+        on.text(left - 10.0, y(value) + 0.36 * LETTER, tick_words(value, texts.decimal_sign), anchor="end")
+    step = (right - left) / max(len(residuals.labels), 4)
+    bars, stripes = [], []
+    for place, rms in enumerate(residuals.rms_um):
+        first, wide = left + (place + 0.17) * step, 0.66 * step
+        bars.append(f"M{first:.1f} {bottom:.1f}V{y(rms):.1f}h{wide:.1f}V{bottom:.1f}z")
+        if level is not None and rms > 2.0 * level:
+            stripes += [
+                f"M{first:.1f} {at:.1f}h{wide:.1f}" for at in np.arange(y(rms) + 9.0, bottom - 4.0, 12.0)
+            ]
+    on.path("".join(bars), fill=BLUE)
+    if stripes:
+        on.path("".join(stripes), stroke="white", width=4.0)
+    longest = WIDE * LETTER * max(map(len, residuals.labels), default=1) + 10.0
+    every = max(1, math.ceil(longest / step))
+    for place in range(0, len(residuals.labels), every):
+        at = left + (place + 0.5) * step
+        on.text(at, bottom + 10.0 + LETTER, residuals.labels[place], anchor="middle")
+    on.line(left, bottom, right, bottom, MID, 2.4)
+    if level is not None:
+        on.line(left, y(level), right, y(level), INK, 3.4, "14 8")
+    on.text(
+        (left + right) / 2, bottom + 16.0 + 2.1 * LETTER,
+        texts("figures.by", kind=texts(f"figures.{residuals.by}")), anchor="middle",
+    )  # fmt: skip
+    on.text(LETTER, (top + bottom) / 2, texts("figures.residual_axis"), anchor="middle", turned=True)
+    return on

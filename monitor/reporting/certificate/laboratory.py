@@ -1,0 +1,207 @@
+"""What a laboratory states on its certificates: the TOML file that it writes once and keeps.
+
+Nothing is filled in: a key that is absent stays None, and the certificate that needs it is refused by name.
+``examples/laboratory.toml`` shows every key.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any
+
+from monitor.exceptions import InputError
+from monitor.reporting.certificate.record import NotApplicable, Party, Person
+from monitor.reporting.texts import languages
+
+#: Every section and its keys.
+SECTIONS: Mapping[str, tuple[str, ...]] = {
+    "laboratory": ("name", "address", "contact", "accreditation", "country", "language"),
+    "customer": ("name", "address", "contact"),
+    "item": ("description", "identification", "condition", "place", "received_on"),
+    "method": ("document",),
+    "traceability": ("statement", "probe", "scale_bar"),
+    "statements": (
+        "title",
+        "sampling",
+        "relates_only",
+        "deviations",
+        "external_results",
+        "reproduction",
+        "adjustment",
+        "conformity",
+        "opinions",
+    ),
+    "authorised_by": ("name", "function"),
+}
+#: The keys that may be answered by ``{ not_applicable = "..." }``.
+MAY_NOT_APPLY = frozenset(
+    {
+        "item.received_on",
+        "traceability.probe",
+        "traceability.scale_bar",
+        "statements.sampling",
+        "statements.deviations",
+        "statements.external_results",
+        "statements.adjustment",
+        "statements.conformity",
+        "statements.opinions",
+    }
+)
+
+Statement = str | NotApplicable
+
+
+@dataclass(frozen=True)
+class LaboratoryFile:
+    """The answers of a laboratory, None where it gave none.
+
+    ``item_*`` replace what the campaign says of the machine; ``probe`` and ``scale_bar`` are the certificates
+    of those standards where the campaign names none.
+    """
+
+    laboratory: Party | None
+    customer: Party | None
+    accreditation: str | None
+    item_description: str | None
+    item_identification: str | None
+    item_condition: str | None
+    place: str | None
+    received_on: date | NotApplicable | None
+    method_document: str | None
+    traceability: str | None
+    probe: Statement | None
+    scale_bar: Statement | None
+    title: str | None
+    sampling: Statement | None
+    relates_only: str | None
+    deviations: Statement | None
+    external_results: Statement | None
+    reproduction: str | None
+    adjustment: Statement | None
+    conformity: Statement | None
+    opinions: Statement | None
+    authorised_by: tuple[Person, ...] | None
+    country: str | None = None
+    language: str | None = None
+
+
+def read_laboratory(path: str | Path) -> LaboratoryFile:
+    """The answers in a TOML file. Raises InputError, with all faults, where it cannot be read as such."""
+    place = Path(path)
+    try:
+        text = place.read_bytes().decode("utf-8-sig")
+        tables = tomllib.loads(text)
+    except OSError as error:
+        raise InputError(f"{place} cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise InputError(f"{place}, line {line}, is not UTF-8; save the file as UTF-8 text") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{place} is not TOML: {error}") from error
+    faults: list[str] = []
+    found = _answers(tables, faults)
+    if faults:
+        raise InputError("\n  ".join([f"{place} was refused:", *faults]))
+    people = found.get("authorised_by")
+    return LaboratoryFile(
+        laboratory=_party("laboratory", found),
+        customer=_party("customer", found),
+        accreditation=found.get("laboratory.accreditation"),
+        country=found.get("laboratory.country"),
+        language=found.get("laboratory.language"),
+        item_description=found.get("item.description"),
+        item_identification=found.get("item.identification"),
+        item_condition=found.get("item.condition"),
+        place=found.get("item.place"),
+        received_on=found.get("item.received_on"),
+        method_document=found.get("method.document"),
+        traceability=found.get("traceability.statement"),
+        probe=found.get("traceability.probe"),
+        scale_bar=found.get("traceability.scale_bar"),
+        authorised_by=people,
+        **{key: found.get(f"statements.{key}") for key in SECTIONS["statements"]},
+    )
+
+
+def _answers(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
+    """Every answer under ``section.key``; what is wrong goes to ``faults``."""
+    found: dict[str, Any] = {}
+    for section, content in tables.items():
+        if section not in SECTIONS:
+            faults.append(f"there is no section [{section}]; there are {', '.join(SECTIONS)}")
+        elif section == "authorised_by":
+            if not isinstance(content, list) or not all(isinstance(person, dict) for person in content):
+                faults.append("authorised_by is a list of persons: begin each with [[authorised_by]]")
+                continue
+            people = [_section(section, person, faults) for person in content]
+            found[section] = tuple(
+                Person(person.get(f"{section}.name"), person.get(f"{section}.function")) for person in people
+            )
+        elif isinstance(content, dict):
+            found |= _section(section, content, faults)
+        else:
+            faults.append(f"{section} is a section: write [{section}] and its keys below")
+    return found
+
+
+def _section(section: str, content: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
+    found = {}
+    for key, value in content.items():
+        name = f"{section}.{key}"
+        if key not in SECTIONS[section]:
+            faults.append(f"[{section}] has no key {key}; it has {', '.join(SECTIONS[section])}")
+            continue
+        answer = _answer(name, value, faults)
+        if answer is not None:
+            found[name] = answer
+    return found
+
+
+def _answer(name: str, value: Any, faults: list[str]) -> Any:
+    if (
+        isinstance(value, dict)
+        and set(value) == {"not_applicable"}
+        and isinstance(value["not_applicable"], str)
+    ):
+        if name in MAY_NOT_APPLY:
+            return NotApplicable(value["not_applicable"])
+        faults.append(f"{name} always applies; not_applicable is no answer to it")
+    elif name.endswith(".address"):
+        if isinstance(value, list) and all(isinstance(line, str) for line in value):
+            return tuple(value)
+        faults.append(f'{name} is a list of lines, for example ["1 Example Road", "Town"], but is {value!r}')
+    elif name == "item.received_on":
+        if isinstance(value, date) and not isinstance(value, datetime):
+            return value
+        faults.append(f"{name} is a date without quotes, for example 2026-03-02, but is {_shown(value)}")
+    elif name == "laboratory.language":
+        if value in languages():
+            return value
+        faults.append(f"{name} is one of {', '.join(languages())}, but is {value!r}")
+    elif (
+        name in ("laboratory.accreditation", "laboratory.country")
+        and isinstance(value, str)
+        and not value.strip()
+    ):
+        faults.append(f"{name} is blank; leave the line out where there is none")
+    elif isinstance(value, str):
+        return value
+    else:
+        faults.append(f"{name} is a text in quotes, but is {value!r}")
+    return None
+
+
+def _shown(value: object) -> str:
+    return value.isoformat() if isinstance(value, datetime) else repr(value)
+
+
+def _party(section: str, found: Mapping[str, Any]) -> Party | None:
+    keys = [f"{section}.{key}" for key in ("name", "address", "contact")]
+    if not any(key in found for key in keys):
+        return None
+    name, address, contact = keys
+    return Party(found.get(name), found.get(address, ()), found.get(contact))

@@ -1,0 +1,128 @@
+"""A complete certificate record as the words and numbers of its template: rounded, with units, in its language."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from markupsafe import Markup
+
+from monitor.reporting.certificate.completeness import check_complete
+from monitor.reporting.certificate.matrix import Block, correlation_blocks
+from monitor.reporting.certificate.pictures import Picture, beside, map_picture, pictures_of
+from monitor.reporting.certificate.record import (
+    CertificateRecord,
+    ConformityStatement,
+    MethodUsed,
+)
+from monitor.reporting.certificate.results import ResultSet
+from monitor.reporting.certificate.tables import (
+    Row,
+    conformity_rows,
+    result_rows,
+    result_widths,
+)
+from monitor.reporting.certificate.volumetric import POINTS_FILE, printed_map
+from monitor.reporting.certificate.words import amendment, answer
+from monitor.reporting.numbers import written_factor, written_probability
+from monitor.reporting.texts import Texts, texts_of
+
+
+@dataclass(frozen=True)
+class PrintedResult:
+    """One result set as printed."""
+
+    state: str
+    k_q: str
+    rows: tuple[Row, ...]
+    widths: tuple[float, ...]
+    explained: Markup
+    refused: tuple[Markup, ...]
+    half_axes: Markup
+    blocks: tuple[Block, ...]
+    beside: bool
+    pictures: tuple[Picture, ...]
+
+
+def certificate_context(record: CertificateRecord) -> dict[str, Any]:
+    """Everything that ``certificate.html`` prints. Raises IncompleteCertificateError where an item is missing."""
+    check_complete(record)
+    assert record.performed_on is not None  # complete: checked above
+    assert record.results is not None
+    assert record.issued_on is not None
+    assert record.method is not None
+    texts = texts_of(record.language)
+    first, last = (texts.day(day) for day in record.performed_on)
+    conformity = record.conformity
+    return {
+        "record": record,
+        "texts": texts,
+        "heading": texts.markup("page.number_issued", number=record.number, day=texts.day(record.issued_on)),
+        "replaces": amendment(record.replaces, texts),
+        "received_on": answer(record.received_on, texts),
+        "performed_on": first if first == last else texts("page.from_to", first=first, last=last),
+        "method": _method(record.method, texts),
+        "references": [(one.name, answer(one.certificate, texts)) for one in record.references or ()],
+        "results": [_printed(result, texts) for result in record.results],
+        "maps": [
+            (printed_map(one, texts), map_picture(one, texts, POINTS_FILE.format(place=place)))
+            for place, one in enumerate(record.volumetric, start=1)
+        ],
+        "conformity": conformity_rows(conformity, texts)
+        if isinstance(conformity, ConformityStatement)
+        else None,
+        "statements": [
+            (texts("page.sampling"), answer(record.sampling, texts)),
+            (texts("page.deviations"), answer(record.deviations, texts)),
+            (texts("page.external_results"), answer(record.external_results, texts)),
+            (texts("page.adjustment"), answer(record.adjustment, texts)),
+            (texts("page.conformity_statement"), answer(conformity, texts)),
+            (texts("page.opinions"), answer(record.opinions, texts)),
+            (texts("page.validity"), answer(record.relates_only, texts)),
+            (texts("page.reproduction"), answer(record.reproduction, texts)),
+        ],
+    }
+
+
+def _method(method: MethodUsed, texts: Texts) -> list[tuple[str, str]]:
+    return [
+        (texts("page.method"), method.name or ""),
+        (texts("page.procedure"), method.document or ""),
+        (texts("page.model"), method.model or ""),
+        (texts("page.software"), method.software or ""),
+    ]
+
+
+def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
+    sign = texts.decimal_sign
+    k_q, k_p = written_factor(result.k_q, sign), written_factor(result.k_p, sign)
+    half_axes = "; ".join(written_factor(axis, sign) for axis in result.half_axes)
+    rows = result_rows(result, texts)
+    heads = (
+        texts("page.symbol"), texts("page.parameter"), texts("page.estimate"), "u", f"U = {k_q} u", texts("page.unit")
+    )  # fmt: skip
+    return PrintedResult(
+        state=result.state,
+        k_q=k_q,
+        rows=rows,
+        widths=result_widths(rows, heads),
+        explained=texts.markup(
+            "page.results_explained",
+            k_q=k_q,
+            k_p=k_p,
+            count=len(result.names),
+            rank=result.rank,
+            p=written_probability(result.p, sign),
+            evaluation=result.evaluation,
+        ),
+        refused=tuple(
+            texts.markup("page.refused", parameters=", ".join(one.parameters), why=texts.computed(one.why))
+            for one in result.refused
+        ),
+        half_axes=texts.markup("page.half_axes", half_axes=half_axes),
+        blocks=correlation_blocks(
+            result.names, result.correlation, texts, texts("page.correlation", state=result.state)
+        ),
+        beside=beside(result),
+        pictures=pictures_of(result, texts),
+    )

@@ -1,0 +1,95 @@
+"""The volumetric error as a certificate prints it: a table of its lengths, and in words what they mean and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from decimal import Decimal
+
+from markupsafe import Markup
+
+from monitor.reporting.certificate.tables import Number, aligned
+from monitor.reporting.certificate.volumetric_result import Length, Place, VolumetricResult
+from monitor.reporting.numbers import (
+    round_result,
+    round_to_place,
+    round_uncertainty,
+    written_factor,
+    written_probability,
+)
+from monitor.reporting.texts import Texts
+
+#: The file inside the PDF that holds every point of the grid.
+POINTS_FILE = "volumetric-error-{place}.csv"
+
+
+@dataclass(frozen=True)
+class PrintedMap:
+    """A volumetric error as printed: rows of (quantity, where, value, u, U), all lengths in µm."""
+
+    state: str
+    expanded: Markup
+    rows: tuple[tuple[str, str, tuple[Number, ...]], ...]
+    explained: str
+    left_out: str
+
+
+def printed_map(found: VolumetricResult, texts: Texts) -> PrintedMap:
+    """The map in the words of a language."""
+    sign = texts.decimal_sign
+    k = written_factor(found.k, sign)
+    return PrintedMap(
+        state=found.state,
+        expanded=texts.markup("page.map_expanded", k=k),
+        rows=_rows(found, texts),
+        explained=texts(
+            "page.map_explained",
+            points=found.points,
+            each=found.each,
+            poses=found.poses,
+            ranges="; ".join(
+                texts("page.map_range", axis=axis, first=_tenths(first, texts), last=_tenths(last, texts))
+                for axis, first, last in found.ranges
+            ),
+            origin=texts("page.map_from_strokes" if found.from_strokes else "page.map_from_visited"),
+            datum=texts("page.map_datum", place=place_words(found.datum, texts))
+            if found.datum
+            else texts("page.map_no_datum"),
+            k=k,
+            p=written_probability(found.p, sign),
+        ),
+        left_out=" ".join(
+            texts("page.map_left_out", parameters=name, why=texts.computed(why))
+            for name, why in found.left_out
+        ),
+    )
+
+
+def place_words(place: Place, texts: Texts) -> str:
+    """A place of the machine: ``X −178.9 mm, B −90.0°``."""
+    return ", ".join(
+        f"{axis}\N{NO-BREAK SPACE}{_tenths(reading, texts)}{'' if unit == '°' else chr(0xA0)}{unit}"
+        for axis, reading, unit in place
+    )
+
+
+def _tenths(value: float, texts: Texts) -> str:
+    return texts.number(round_to_place(value, Decimal("0.1")))
+
+
+def _rows(found: VolumetricResult, texts: Texts) -> tuple[tuple[str, str, tuple[Number, ...]], ...]:
+    lengths: list[tuple[str, Length]] = [
+        ("page.map_largest", found.largest),
+        ("page.map_rms", found.rms),
+        ("page.map_mean", found.mean),
+    ]
+    columns: tuple[list[str], list[str], list[str]] = ([], [], [])
+    for _, one in lengths:
+        rounded = round_result(one.value_um, one.expanded_um)
+        columns[0].append(texts.number(rounded.estimate))
+        columns[1].append(texts.number(round_uncertainty(one.u_um)))
+        columns[2].append(texts.number(rounded.uncertainty))
+    numbers = zip(*(aligned(column, texts.decimal_sign) for column in columns), strict=True)
+    return tuple(
+        (texts(key), place_words(one.at, texts) if one.at else texts("page.map_all"), row)
+        for (key, one), row in zip(lengths, numbers, strict=True)
+    )

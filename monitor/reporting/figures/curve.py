@@ -1,0 +1,59 @@
+"""Figures of a curve: what was measured, and the residual of one model after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.reporting.figures.style import new_figure, style, zero_line
+from monitor.reporting.palette import BLUE, INK, ORANGE, PAGE_WIDTH_MM
+
+PANEL_MM = 30.0
+HEAD_MM = 22.0
+#: More panels than these are a book, not a figure: the first ones and the last are drawn.
+MOST_PANELS = 5
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """The residual (n,) of a model and what is said above it."""
+
+    title: str
+    values: Array
+
+
+def residuals_figure(
+    x: Array,
+    measured: Array,
+    *,
+    x_name: str,
+    response: str,
+    residuals: Sequence[Residuals],
+    outliers: npt.NDArray[np.bool_],
+    title: str,
+) -> Figure:
+    """The response (n,) over one input (n,) on top, below it the residual (n,) of each model, ``outliers`` ringed."""
+    if any(one.values.shape != x.shape for one in residuals) or measured.shape != x.shape:
+        raise DataError(f"response and residuals must have the {len(x)} rows of {x_name}")
+    shown = [*residuals[: MOST_PANELS - 1], residuals[-1]] if len(residuals) > MOST_PANELS else [*residuals]
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, HEAD_MM + PANEL_MM * (1 + len(shown)), title)
+        axes = figure.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
+        axes[0].plot(x, measured, ".", color=INK, markersize=3.0)
+        axes[0].set_ylabel(response)
+        for panel, one in zip(axes[1:], shown, strict=True):
+            zero_line(panel)
+            panel.plot(x, one.values, ".", color=BLUE, markersize=3.0)
+            panel.plot(
+                x[outliers], one.values[outliers], "o", markersize=6.0, markerfacecolor="none", color=ORANGE
+            )
+            panel.set_title(one.title)
+            panel.set_ylabel("residual")
+        axes[-1].set_xlabel(x_name)
+    return figure

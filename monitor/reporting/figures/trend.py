@@ -1,0 +1,114 @@
+"""Figures of the long view: one parameter over the dates, and several selections of runs side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib.figure import Figure
+
+from monitor.exceptions import DataError
+from monitor.reporting.figures.style import caption, new_figure, reference_line, style, zero_line
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PAGE_WIDTH_MM, PALE
+
+
+def parameter_over_time(
+    days: npt.ArrayLike,
+    values: npt.ArrayLike,
+    expanded: npt.ArrayLike,
+    *,
+    unit: str,
+    title: str,
+    line: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike] | None = None,
+    limit: float | None = None,
+    changes: Sequence[float] = (),
+    events: Mapping[float, str] | None = None,
+) -> Figure:
+    """Runs of one parameter, ``values`` ± ``expanded`` (n,) over ``days`` since 1970 (n,).
+
+    ``line`` is the drift and its band: days, level and half-width (m,) each; ``limit`` that of the absolute value;
+    ``changes`` and ``events`` (day to words) are upright lines. Raises DataError for arrays of unequal length.
+    """
+    t, y, half = (np.asarray(array, dtype=np.float64) for array in (days, values, expanded))
+    if not t.shape == y.shape == half.shape or t.ndim != 1 or not len(t):
+        raise DataError(f"days, values and expanded must be as long, not {t.shape}, {y.shape}, {half.shape}")
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, 80.0, title)
+        axes = figure.subplots()
+        axes.errorbar(
+            t, y, yerr=half, fmt="o", color=BLUE, markersize=2.6, elinewidth=0.7, label="runs, ± 2 u", zorder=2
+        )  # fmt: skip
+        if line is not None:
+            at, level, width = (np.asarray(array, dtype=np.float64) for array in line)
+            axes.plot(at, level, color=ORANGE, linewidth=1.4, label="drift since the last change", zorder=3)
+            axes.fill_between(at, level - width, level + width, color=PALE, linewidth=0, zorder=1)
+        for number, at_change in enumerate(changes):
+            axes.axvline(
+                at_change, color=ORANGE, linewidth=1.1, linestyle=(0, (4, 2)),
+                label="change found" if number == 0 else None,
+            )  # fmt: skip
+        for number, (at_event, words) in enumerate((events or {}).items()):
+            moment = at_event
+            axes.axvline(moment, color=INK, linewidth=0.8, label="event recorded" if number == 0 else None)
+            axes.annotate(
+                words, (moment, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2), textcoords="offset points",
+                rotation=90, va="top", fontsize=6, color=INK,
+            )  # fmt: skip
+        if limit is not None:
+            for side in (-limit, limit):
+                reference_line(axes, side)
+        # Days since 1970 are what matplotlib counts its dates in.
+        locator = AutoDateLocator(minticks=3, maxticks=8)  # type: ignore[no-untyped-call]
+        axes.xaxis.set_major_locator(locator)
+        axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
+        axes.set_ylabel(unit, labelpad=2)
+        axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
+        axes.legend(loc="best", fontsize=6.5, ncols=2)
+        said = ["grey: 95 % band of the drift"] if line is not None else []
+        said += ["dashed across: the limits of the absolute value"] if limit is not None else []
+        if said:
+            caption(figure, "; ".join(said))
+    return figure
+
+
+def selections_side_by_side(
+    names: Sequence[str],
+    units: Sequence[str],
+    selections: Sequence[str],
+    expanded: npt.ArrayLike,
+    *,
+    title: str,
+    meaning: str,
+) -> Figure:
+    """Expanded uncertainties (selections, parameters) of several selections of runs, bars side by side, a panel a unit.
+
+    After Los 2017, Figure 4.6. ``meaning`` says what the bars are. NaN leaves a bar out.
+    """
+    values = np.asarray(expanded, dtype=np.float64)
+    if values.shape != (len(selections), len(names)):
+        raise DataError(f"expanded must be ({len(selections)}, {len(names)}), not {values.shape}")
+    kinds = list(dict.fromkeys(units))
+    members = [[place for place, unit in enumerate(units) if unit == kind] for kind in kinds]
+    width = 0.8 / max(len(selections), 1)
+    shades = (BLUE, ORANGE, MID, INK, PALE)
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, 78.0, title)
+        panels = figure.subplots(
+            1, len(kinds), squeeze=False, width_ratios=[len(part) + 0.5 for part in members]
+        )[0]
+        for axes, kind, part in zip(panels, kinds, members, strict=True):
+            zero_line(axes)
+            for row, name in enumerate(selections):
+                axes.bar(
+                    np.arange(len(part)) + (row - (len(selections) - 1) / 2.0) * width, values[row, part], width * 0.92,
+                    color=shades[row % len(shades)], edgecolor=INK, linewidth=0.3, label=name,
+                    hatch=("", "///", "...", "xxx")[row % 4],
+                )  # fmt: skip
+            axes.set_xticks(np.arange(len(part)), [names[place] for place in part], rotation=60)
+            axes.set_ylabel(kind, labelpad=2)
+            axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
+        panels[0].legend(loc="upper left", fontsize=6.5)
+        caption(figure, meaning)
+    return figure

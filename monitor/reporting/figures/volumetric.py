@@ -1,0 +1,129 @@
+"""Figures of the volumetric error: slices through the workspace, with its uncertainty; expected uncertainties."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+
+from monitor.exceptions import DataError
+from monitor.reporting.figures.style import caption, new_figure, style
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PAGE_WIDTH_MM
+from monitor.reporting.svg.map_slices import Slice, slices_of
+
+#: From paper to blue: the darker, the larger, in grey too.
+_LENGTHS = LinearSegmentedColormap.from_list("lengths", ["#ffffff", "#8fb0cf", BLUE])
+#: Numbers are written at so many nodes of a slice, the corners and the middle of a grid of three.
+_NUMBERS = 3
+
+
+def volumetric_slices(
+    readings_mm: npt.ArrayLike,
+    vectors_um: npt.ArrayLike,
+    expanded_um: npt.ArrayLike,
+    *,
+    names: Sequence[str],
+    title: str,
+    note: str = "",
+) -> Figure:
+    """Three slices through the middle of a regular grid of points (n, 3), one across each axis.
+
+    ``vectors_um`` (n, 3) is the error along the machine's axes, ``expanded_um`` (n,) the expanded uncertainty of its
+    length. Colour is the length of the error, arrows are its part in the slice. Raises DataError for what is no grid.
+    """
+    slices = slices_of(readings_mm, vectors_um, expanded_um, names)
+    longest = float(np.linalg.norm(np.asarray(vectors_um, dtype=np.float64), axis=1).max())
+    scale = Normalize(0.0, longest if longest > 0.0 else 1.0)
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, 86.0 if title else 62.0, title)
+        panels = figure.subplots(1, 3)
+        for one, axes in zip(slices, panels, strict=True):
+            _slice(axes, one, scale)
+        colours = figure.colorbar(panels[0].collections[0], ax=list(panels), shrink=0.8, aspect=24, pad=0.015)
+        colours.set_label("length of the error / µm")
+        colours.outline.set_linewidth(0.4)
+        if note:
+            caption(figure, note)
+    return figure
+
+
+def _slice(axes: Axes, one: Slice, scale: Normalize) -> None:
+    first, second = np.array(one.first_mm), np.array(one.second_mm)
+    axes.pcolormesh(
+        first,
+        second,
+        np.array(one.lengths_um).T,
+        cmap=_LENGTHS,
+        norm=scale,
+        shading="gouraud",
+        rasterized=True,
+    )
+    x, y = np.meshgrid(first, second, indexing="ij")
+    length = 0.16 * max(np.ptp(first), np.ptp(second)) / float(scale.vmax or 1.0)
+    axes.quiver(
+        x, y, np.array(one.first_um) * length, np.array(one.second_um) * length, angles="xy", scale_units="xy",
+        scale=1.0, color=INK, width=0.006, zorder=4,
+    )  # fmt: skip
+    picks = [np.unique(np.linspace(0, len(level) - 1, _NUMBERS).astype(int)) for level in (first, second)]
+    for i in picks[0]:
+        for j in picks[1]:
+            axes.annotate(
+                f"±{one.expanded_um[i][j]:.1f}", (first[i], second[j]), xytext=(0, -7),
+                textcoords="offset points", ha="center", va="top", fontsize=5.5, color=INK, zorder=5,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
+            )  # fmt: skip
+    room = [0.18 * float(np.ptp(level)) for level in (first, second)]
+    axes.set_xlim(float(first[0]) - room[0], float(first[-1]) + room[0])
+    axes.set_ylim(float(second[0]) - room[1], float(second[-1]) + room[1])
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlabel(f"{one.along[0]} / mm", labelpad=1)
+    axes.set_ylabel(f"{one.along[1]} / mm", labelpad=1)
+    axes.set_title(f"{one.across} = {round(one.at_mm) + 0.0:.0f} mm")
+
+
+def expected_uncertainties(
+    names: Sequence[str],
+    units: Sequence[str],
+    present: npt.ArrayLike,
+    proposed: npt.ArrayLike | None,
+    *,
+    title: str,
+    note: str = "",
+) -> Figure:
+    """Expected standard uncertainties (k,) of a plan, and of another beside it; NaN where a plan gives no number."""
+    now = np.asarray(present, dtype=np.float64)
+    then = None if proposed is None else np.asarray(proposed, dtype=np.float64)
+    if (
+        now.shape != (len(names),)
+        or len(units) != len(names)
+        or (then is not None and then.shape != now.shape)
+    ):
+        raise DataError(f"{len(names)} parameters need as many units and uncertainties")
+    at = np.arange(len(names), dtype=np.float64)
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, 70.0, title)
+        axes = figure.subplots()
+        axes.plot(
+            at - (0.12 if then is not None else 0.0), now, "o", color=BLUE, markersize=5, label="present plan"
+        )
+        if then is not None:
+            axes.plot(
+                at + 0.12, then, "s", color=ORANGE, markerfacecolor="white", markeredgewidth=1.4, markersize=5,
+                label="proposed plan",
+            )  # fmt: skip
+            axes.vlines(at, 0.0, np.nanmax([now, then]), color=MID, linewidth=0.2, zorder=0)
+            axes.legend(loc="upper left", ncols=2, fontsize=7)
+        axes.set_xticks(
+            at, [f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)], rotation=0, fontsize=6
+        )
+        axes.set_ylim(
+            0.0, 1.2 * float(np.nanmax(np.concatenate([now, [] if then is None else then, [1e-9]])))
+        )
+        axes.set_ylabel("expected standard uncertainty")
+        if note:
+            caption(figure, note)
+    return figure

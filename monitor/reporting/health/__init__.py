@@ -1,0 +1,1 @@
+"""The weekly health report: its records and pages."""

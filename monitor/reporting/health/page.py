@@ -1,0 +1,257 @@
+"""A health report's records as the words and numbers of its template: rounded, with units, nothing computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from markupsafe import Markup
+
+from monitor.reporting.health.pictures import PrintedPictures, map_picture, printed_pictures
+from monitor.reporting.health.records import (
+    ALARMS,
+    STATES,
+    Change,
+    Fleet,
+    FleetRow,
+    MachineHealth,
+    ParameterHealth,
+    VolumetricMap,
+    fleet_row,
+)
+from monitor.reporting.health.refusals import PrintedRefusal, printed_refusal
+from monitor.reporting.health.words import day, in_words, micrometres, p_in_words, percent, plain
+from monitor.reporting.numbers import (
+    round_result,
+    written,
+)
+from monitor.reporting.svg.sparkline import sparkline
+
+#: Signs before a state: they tell the states apart without colour.
+SIGNS = {
+    "out of tolerance": "■",
+    "may be out of tolerance": "▲",
+    "changed": "◆",
+    "model fails": "◇",
+    "suspect data": "○",
+    "not measured": "–",
+    "in tolerance": "✓",
+    "no change seen": "✓",
+}
+#: Blind spots named on the page; the rest are counted (all stand in the JSON).
+_BLIND_SHOWN = 4
+#: Changes and events named on the page, the latest first.
+_CHANGES_SHOWN = 12
+#: Poses of the rotary axes named for the volumetric error, the worst first.
+_POSES_SHOWN = 3
+#: A drift is set in bold below this probability of seeing it where there is none.
+_DRIFT_P = 0.001
+
+
+@dataclass(frozen=True)
+class FleetLine:
+    """A machine as printed in the fleet table; ``anchor`` leads to its page."""
+
+    machine: str
+    anchor: str
+    location: str
+    sign: str
+    state: str
+    alarm: bool
+    changed: str
+    since: str
+    out: str
+    next_check: str
+
+
+@dataclass(frozen=True)
+class ParameterLine:
+    """A parameter as printed; ``picture`` is its history."""
+
+    name: str
+    description: str
+    estimate: str
+    expanded: str
+    tolerance: str
+    out: str
+    beyond: bool
+    drift: str
+    drifts: bool
+    unit: str
+    picture: str
+
+
+@dataclass(frozen=True)
+class PrintedMachine:
+    """A machine's page."""
+
+    health: MachineHealth
+    head: FleetLine
+    meaning: str
+    lines: tuple[ParameterLine, ...]
+    no_trend: str
+    changes: tuple[tuple[str, str, bool], ...]
+    more_changes: int
+    conditions: tuple[tuple[str, str], ...]
+    fit: tuple[tuple[str, str], ...]
+    map: tuple[tuple[str, str], ...]
+    map_picture: Markup
+    blind: str
+    refused: tuple[tuple[str, str], ...]
+    imports: tuple[PrintedRefusal, ...]
+    pictures: PrintedPictures
+
+
+def fleet_context(fleet: Fleet) -> dict[str, Any]:
+    """What the first page prints."""
+    return {
+        "week": fleet.week,
+        "days": f"{fleet.first_day.isoformat()} to {fleet.last_day.isoformat()}",
+        "made_at": f"{fleet.made_at:%Y-%m-%d %H:%M}",
+        "made_iso": fleet.made_at.isoformat() + "Z",
+        "software": fleet.software,
+        "risk": percent(fleet.risk),
+        "ended": fleet.ended,
+        "lines": [_line(row) for row in fleet.rows],
+        "legend": [
+            (SIGNS[state], state, words)
+            for state, words in STATES.items()
+            if state in {row.state for row in fleet.rows}
+        ],
+        "imports": [printed_refusal(one) for one in fleet.refused_imports],
+        "alarms": sum(row.state in ALARMS for row in fleet.rows),
+        "measured": sum(row.state != "not measured" for row in fleet.rows),
+    }
+
+
+def machine_pages(machines: Iterable[MachineHealth]) -> Iterator[PrintedMachine]:
+    """The pages one after the other, so that only one machine is held at a time."""
+    for health in machines:
+        yield _page(health)
+
+
+def _page(health: MachineHealth) -> PrintedMachine:
+    shown = health.changes[:_CHANGES_SHOWN]
+    blind = health.quality.blind_spots
+    more = f" and {len(blind) - _BLIND_SHOWN} more" if len(blind) > _BLIND_SHOWN else ""
+    return PrintedMachine(
+        health=health,
+        head=_line(fleet_row(health)),
+        meaning=STATES[health.state],
+        lines=tuple(_parameter(one) for one in health.parameters),
+        no_trend=(
+            ""
+            if any(one.drift for one in health.parameters)
+            else "No trend a year: the history is too short for one."
+        ),
+        changes=tuple((_span(one), _sentence(one), one.this_week) for one in shown),
+        more_changes=len(health.changes) - len(shown),
+        conditions=tuple(
+            (
+                one.name,
+                f"{plain(one.lowest)} to {plain(one.highest)}, mean {plain(one.mean)} {one.unit}".strip(),
+            )
+            for one in health.conditions
+        ),
+        fit=_fit(health),
+        map=_map(health.map),
+        map_picture=map_picture(health.map),
+        blind=", ".join(blind[:_BLIND_SHOWN]) + more if blind else "",
+        refused=health.quality.refused,
+        imports=tuple(printed_refusal(one) for one in health.quality.refused_imports),
+        pictures=printed_pictures(health.model),
+    )
+
+
+def _line(row: FleetRow) -> FleetLine:
+    return FleetLine(
+        machine=row.machine,
+        anchor="machine-" + "".join(sign if sign.isalnum() else f"_{ord(sign):x}_" for sign in row.machine),
+        location=row.location,
+        sign=SIGNS[row.state],
+        state=row.state,
+        alarm=row.state in ALARMS,
+        changed=row.changed,
+        since="" if row.since is None else day(row.since),
+        out="" if row.probability_out is None else percent(row.probability_out),
+        next_check=row.next_check,
+    )
+
+
+def _parameter(one: ParameterHealth) -> ParameterLine:
+    rounded = round_result(one.estimate, one.expanded)
+    factor = one.expanded / one.u
+    drift = _drift(one)
+    return ParameterLine(
+        name=one.name,
+        description=one.description,
+        estimate=written(rounded.estimate),
+        expanded=written(rounded.uncertainty),
+        tolerance="" if one.tolerance is None else "± " + plain(one.tolerance),
+        out="" if one.probability_out is None else percent(one.probability_out),
+        beyond=one.tolerance is not None and abs(one.estimate) > one.tolerance,
+        drift=drift,
+        drifts=one.drift is not None and one.drift.p_value < _DRIFT_P,
+        unit=one.unit,
+        picture=sparkline(one, factor),
+    )
+
+
+def _drift(one: ParameterHealth) -> str:
+    """The drift a year with its interval, and when the tolerance is reached where there is a sign of it."""
+    if one.drift is None:
+        return ""
+    u = one.drift.u_per_year
+    slope, low, high = (
+        in_words(value, u, sign=True)[0] for value in (one.drift.per_year, *one.drift.between)
+    )
+    words = f"{slope} ({low} to {high}) {one.unit}/year"
+    if one.drift.crosses_at is not None:
+        first, last = one.drift.crosses_between
+        when = f" ({first} at the earliest)" if first else ""
+        when = f" ({first} to {last})" if first and last else when
+        words += f"; tolerance reached about {one.drift.crosses_at}{when}"
+    return words
+
+
+def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
+    model = health.model
+    if model is None:
+        return ()
+    lines = [("model", model.model), ("compared with", model.runs), ("verdict", model.verdict)]
+    lines.append(("what it leaves", f"{micrometres(model.rms_um)} rms of all coordinates"))
+    if model.repeatability_um is not None:
+        lines.append(("repeatability", micrometres(model.repeatability_um)))
+    if model.lack_of_fit_p is not None and model.lack_of_fit_f is not None:
+        lines.append(("lack of fit", f"F = {model.lack_of_fit_f:.3g}, p {p_in_words(model.lack_of_fit_p)}"))
+    return tuple(lines)
+
+
+def _map(found: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
+    if found is None:
+        return ()
+    worst = round_result(found.worst_um, found.expanded_um)
+    lines = [
+        ("worst", f"{written(worst.estimate)} µm (U = {written(worst.uncertainty)} µm) at {found.worst_at}"),
+        ("root mean square", f"{plain(float(f'{found.rms_um:.3g}'))} µm over {found.region}"),
+    ]
+    by = sorted(found.by_pose, key=lambda one: -one.worst_um)[:_POSES_SHOWN]
+    if by:
+        words = "; ".join(f"{one.pose}: {one.worst_um:.1f} µm ({one.rms_um:.1f} µm)" for one in by)
+        lines.append(("by pose", f"at most (rms) {words}"))
+    return tuple(lines)
+
+
+def _span(change: Change) -> str:
+    if change.after is None or change.after == change.at:
+        return day(change.at)
+    return f"{day(change.after)} to {day(change.at)}"
+
+
+def _sentence(change: Change) -> str:
+    return (
+        change.what
+        if change.p_value is None
+        else f"{change.what} (p\N{NO-BREAK SPACE}{p_in_words(change.p_value)})"
+    )

@@ -1,0 +1,207 @@
+"""The pictures of a machine's page: its volumetric error, where the model fails, what is missing, how errors fall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+
+from monitor.reporting.figures.residuals import view_of
+from monitor.reporting.health.comparison import ErrorStep, ModelHealth, ResidualAgainst, ResidualMap
+from monitor.reporting.health.records import VolumetricMap
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PALE
+from monitor.reporting.svg.map_slices import map_drawing
+from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, arrow_head
+
+#: The whole text width of the page, and the two parts that stand side by side.
+WIDTH_MM, LEFT_MM, RIGHT_MM = 176.0, 104.0, 66.0
+#: Signs of group means, and the head of an arrow: half their size in tenths of a millimetre.
+_SIGN, _HEAD = 9.0, 9.0
+
+
+@dataclass(frozen=True)
+class PrintedPictures:
+    """The pictures of a machine's page as SVG, each with the sentence over it; empty where there is none."""
+
+    where: Markup
+    against: Markup
+    against_says: str
+    steps: Markup
+    steps_say: str
+
+
+def printed_pictures(model: ModelHealth | None) -> PrintedPictures:
+    """What is drawn of the comparison; the pictures escape their own words."""
+    where = against = steps = Markup()
+    against_says = steps_say = ""
+    if model is not None and model.where is not None:
+        where = Markup(where_it_fails(model.where))
+    if model is not None and model.against is not None:
+        against = Markup(against_driver(model.against))
+        effect = model.missing[0].effect if model.missing else None
+        against_says = (
+            f"What is missing: {effect}"
+            if effect
+            else f"Nothing known is missing; it follows {model.against.driver}"
+        )
+    if model is not None and len(model.steps) > 1:
+        steps = Markup(error_steps(model))
+        first, last = model.steps[0].rms_um, model.steps[-1].rms_um
+        verb = "would fall" if model.steps[-1].proposed else "fell"
+        steps_say = f"The error {verb} from {first:.2f} to {last:.2f} µm"
+    return PrintedPictures(where, against, against_says, steps, steps_say)
+
+
+def map_picture(found: VolumetricMap | None) -> Markup:
+    """The volumetric error in three slices, in the greys of a certificate; empty where there is nothing to draw."""
+    if found is None or not found.slices:
+        return Markup()
+    title = "Volumetric error over the workspace in three slices"
+    return Markup(map_drawing(found.slices, title=title, scale_words="length of the error / µm").svg())
+
+
+def where_it_fails(found: ResidualMap) -> str:
+    """Residual vectors, magnified, seen along Z, Y and X; the largest tenth thick and in the accent colour."""
+    place, size = np.array(found.place_mm), np.array(found.residual_um)
+    view = view_of(place, size)
+    on = Drawing(WIDTH_MM, 63.0, "Mean residual vectors over the workspace, seen along Z, Y and X")
+    side, gap = 465.0, 112.0
+    for place_of, (across, up) in enumerate(((0, 1), (0, 2), (1, 2))):
+        panel = Panel(
+            88.0 + place_of * (side + gap), 34.0, side, side,
+            (view.middle[across] - view.reach, view.middle[across] + view.reach),
+            (view.middle[up] - view.reach, view.middle[up] + view.reach),
+        )  # fmt: skip
+        panel.frame(on, f"{'XYZ'[across]} / mm", f"{'XYZ'[up]} / mm", ticks=4)
+        on.text(panel.left, panel.top - 10, f"{'XYZ'[across]}{'XYZ'[up]}", bold=True)
+        for large, colour, width in ((False, BLUE, 2.6), (True, ORANGE, 5.0)):
+            shafts, heads = [], []
+            for at, vector in zip(place[view.large == large], size[view.large == large], strict=True):
+                end = at + vector * 1e-3 * view.magnify
+                x1, y1, x2, y2 = panel.x(at[across]), panel.y(at[up]), panel.x(end[across]), panel.y(end[up])
+                shafts.append(f"M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}")
+                heads.append(arrow_head(x1, y1, x2, y2, _HEAD * (1.3 if large else 1.0)))
+            on.path("".join(shafts), stroke=colour, width=width)
+            on.path("".join(heads), fill=colour)
+        if place_of == 0:
+            length = side * view.key * 1e-3 * view.magnify / (2.0 * view.reach)
+            x, y = panel.left + 14.0, panel.top + side - 16.0
+            on.line(x, y, x + length, y, INK, 7)
+            on.text(x, y - 9, f"{view.key:g} µm", bold=True)
+    on.text(
+        0.0, 62.4 * SCALE,
+        f"Mean of the runs at every pose of the plan, {_thousands(view.magnify)} times enlarged; bar: {view.key:g} µm; "
+        "thick: the largest tenth.",
+        colour=MID,
+    )  # fmt: skip
+    return on.svg()
+
+
+def against_driver(found: ResidualAgainst) -> str:
+    """The residual against what drives it: means of groups before (circles) and after (squares), points in grey."""
+    on = Drawing(LEFT_MM, 58.0, f"Residual along {found.along} against {found.driver}")
+    known = [one for one in found.groups if one.after_um is not None]
+    x = np.array([*found.at, *(one.at for one in found.groups)])
+    edge = 0.05 * float(np.ptp(x)) or 1.0
+    # The scale is that of the means; points far from them are left out of the picture.
+    y = np.concatenate(
+        [
+            np.quantile(found.before_um, [0.15, 0.85]) if found.before_um else [],
+            [one.before_um + sign * 1.3 * one.u_before_um for one in found.groups for sign in (-1, 1)],
+            [one.after_um for one in known if one.after_um is not None],
+            [0.0],
+        ]
+    )
+    span = 0.08 * float(np.ptp(y)) or 1.0
+    panel = Panel(
+        88.0, 40.0, LEFT_MM * SCALE - 100.0, 430.0,
+        (float(x.min()) - edge, float(x.max()) + edge), (float(y.min()) - span, float(y.max()) + span),
+    )  # fmt: skip
+    directions = (
+        {-1.0: "towards \N{MINUS SIGN}", 1.0: "towards +"} if set(x.tolist()) == {-1.0, 1.0} else None
+    )
+    panel.frame(on, found.driver, "residual / µm", named=directions)
+    low, high = panel.up
+    points = [(a, b) for a, b in zip(found.at, found.before_um, strict=True) if low <= b <= high]
+    on.path("".join(_square(panel.x(a), panel.y(b), 2.6) for a, b in points), fill=PALE)
+    # The x of the second series is moved a little where groups are few, so that both are seen.
+    shift = 0.012 * panel.width if len(found.groups) <= 8 else 0.0
+    before = [(panel.x(one.at) - shift, one.before_um, one.u_before_um) for one in found.groups]
+    after = [(panel.x(one.at) + shift, one.after_um or 0.0, one.u_after_um or 0.0) for one in known]
+    for series, colour, sign in ((before, ORANGE, _circle), (after, BLUE, _square)):
+        if not series:
+            continue
+        bars = "".join(f"M{a:.1f} {panel.y(b - u):.1f}L{a:.1f} {panel.y(b + u):.1f}" for a, b, u in series)
+        on.path("M" + "L".join(f"{a:.1f} {panel.y(b):.1f}" for a, b, _ in series), stroke=colour, width=3.2)
+        on.path(bars, stroke=colour, width=3.2)
+        on.path(
+            "".join(sign(a, panel.y(b), _SIGN) for a, b, _ in series), fill=colour, stroke="white", width=1.5
+        )
+    at = panel.left + 6
+    on.path(_circle(at, 16, _SIGN), fill=ORANGE)
+    on.text(at + 16, 24, "as the model is", bold=True, colour=ORANGE)
+    if after:
+        at += 330
+        on.path(_square(at, 16, _SIGN), fill=BLUE)
+        on.text(at + 16, 24, "with what is missing added", bold=True, colour=BLUE)
+    return on.svg()
+
+
+def error_steps(found: ModelHealth) -> str:
+    """A row a version: the fitted error as a bar, the held-out one as a circle, the probe's statement as a line."""
+    steps = _shown(found.steps)
+    row = 92.0
+    on = Drawing(RIGHT_MM, (64.0 + row * len(steps) + 62.0) / SCALE, "The error, model by model")
+    most = max([one.rms_um for one in steps] + [one.heldout_um or 0.0 for one in steps] + [found.stated_um])
+    panel = Panel(6.0, 40.0, RIGHT_MM * SCALE - 190.0, row * len(steps), (0.0, 1.04 * most), (0.0, 1.0))
+    for place, one in enumerate(steps):
+        top = panel.top + place * row
+        on.text(panel.left, top + 26, _fitting(one.what, RIGHT_MM * SCALE - 12.0), bold=not one.proposed)
+        y = top + 36
+        end = panel.x(one.rms_um)
+        on.path(
+            f"M{panel.left:g} {y:.1f}H{end:.1f}V{y + 34:.1f}H{panel.left:g}Z",
+            fill="white" if one.proposed else BLUE, stroke=BLUE, width=3,
+        )  # fmt: skip
+        held, values = end, f"{one.rms_um:.2f}"
+        if one.heldout_um is not None:
+            held = panel.x(one.heldout_um)
+            on.path(_circle(held, y + 17, _SIGN), fill="white", stroke=ORANGE, width=4)
+            values += f" ({one.heldout_um:.2f})"
+        on.text(max(end, held, panel.x(found.stated_um)) + 14, y + 26, values)
+    bottom = panel.top + panel.height
+    at = panel.x(found.stated_um)
+    on.line(at, panel.top - 6, at, bottom + 6, INK, 3, "10 6")
+    on.text(min(at, 400.0), panel.top - 14, f"probe's statement {found.stated_um:.2g} µm", anchor="middle")
+    on.path(f"M{panel.left:g} {bottom + 16:.1f}h22v14h-22Z", fill=BLUE)
+    on.text(panel.left + 30, bottom + 32, "fitted runs, µm")
+    on.path(_circle(panel.left + 250, bottom + 23, _SIGN), fill="white", stroke=ORANGE, width=4)
+    on.text(panel.left + 268, bottom + 32, "(held-out runs)")
+    if any(one.proposed for one in steps):
+        on.text(panel.left, bottom + 32 + 1.25 * LETTER, "empty bar: if it is added", colour=MID)
+    return on.svg()
+
+
+def _shown(steps: tuple[ErrorStep, ...]) -> tuple[ErrorStep, ...]:
+    """The first and the last ones, as many as a page has room for."""
+    return steps if len(steps) <= 8 else (steps[0], *steps[-7:])
+
+
+def _fitting(words: str, width: float) -> str:
+    most = int(width / (WIDE * LETTER))
+    return words if len(words) <= most else words[: most - 1] + "…"
+
+
+def _thousands(value: float) -> str:
+    return f"{value:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
+
+
+def _square(x: float, y: float, half: float) -> str:
+    side = 1.8 * half
+    return f"M{x - side / 2:.1f} {y - side / 2:.1f}h{side:.1f}v{side:.1f}h{-side:.1f}Z"
+
+
+def _circle(x: float, y: float, radius: float) -> str:
+    half = f"a{radius:g} {radius:g} 0 1 0"
+    return f"M{x - radius:.1f} {y:.1f}{half} {2 * radius:g} 0{half} {-2 * radius:g} 0Z"

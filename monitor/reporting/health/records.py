@@ -1,0 +1,240 @@
+"""What a health report states of a machine in one week: typed records, filled by the workflow, printed as they are.
+
+Numbers are in display units, times as the shop's clock showed them. Nothing is computed here, and a statement
+that could not be made is a text that says why, never an empty place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import date, datetime
+from typing import Literal
+
+from monitor.reporting.health.comparison import ModelHealth
+from monitor.reporting.svg.map_slices import Slice
+
+State = Literal[
+    "out of tolerance",
+    "may be out of tolerance",
+    "changed",
+    "model fails",
+    "suspect data",
+    "not measured",
+    "in tolerance",
+    "no change seen",
+]
+#: The states by urgency, the most urgent first, and what each means.
+STATES: dict[State, str] = {
+    "out of tolerance": "a parameter is more likely beyond its tolerance than within it",
+    "may be out of tolerance": "the probability that a parameter is beyond its tolerance exceeds the stated limit",
+    "changed": "a parameter or an artefact changed this week",
+    "model fails": "the model does not explain the measurements: an effect is missing",
+    "suspect data": "bad points were found and left out; nothing else",
+    "not measured": "no run this week",
+    "in tolerance": "every parameter is within its tolerance and nothing changed",
+    "no change seen": "nothing changed; not every parameter has a tolerance to be judged by",
+}
+#: The states that `--fail-on-alarm` answers with exit status 1.
+ALARMS: tuple[State, ...] = ("out of tolerance", "may be out of tolerance")
+
+
+@dataclass(frozen=True)
+class History:
+    """The runs of one parameter: times, values, standard uncertainties and whether each run belongs to the week."""
+
+    times: tuple[datetime, ...]
+    values: tuple[float, ...]
+    u: tuple[float, ...]
+    this_week: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A drift per year, its standard uncertainty and 95 % interval; when the limit is reached (None: no sign of it).
+
+    ``crosses_between`` are the ends of the interval of that time, None where open.
+    """
+
+    per_year: float
+    u_per_year: float
+    between: tuple[float, float]
+    p_value: float
+    crosses_at: date | None
+    crosses_between: tuple[date | None, date | None]
+
+
+@dataclass(frozen=True)
+class ParameterHealth:
+    """One parameter: estimate, standard and expanded uncertainty, tolerance of its absolute value, history.
+
+    ``probability_out`` of lying beyond the tolerance; ``out_since`` the first of the runs without a break whose
+    value lies beyond it. ``changed_at`` are the times of changes that were found.
+    """
+
+    name: str
+    description: str
+    unit: str
+    estimate: float
+    u: float
+    expanded: float
+    tolerance: float | None
+    probability_out: float | None
+    out_since: datetime | None
+    history: History
+    changed_at: tuple[datetime, ...]
+    drift: Drift | None
+
+
+@dataclass(frozen=True)
+class Change:
+    """Something that happened: found by the statistics (with its p-value) or recorded by people (kind ``event``)."""
+
+    kind: Literal["change", "event"]
+    after: datetime | None
+    at: datetime
+    what: str
+    p_value: float | None
+    this_week: bool
+
+
+@dataclass(frozen=True)
+class ConditionRange:
+    """A recorded condition over the runs of the week."""
+
+    name: str
+    unit: str
+    lowest: float
+    mean: float
+    highest: float
+
+
+@dataclass(frozen=True)
+class RefusedImport:
+    """A folder that was refused this week, with its first faults; ``imported_at`` (UTC) where it came in well since."""
+
+    at: datetime
+    folder: str
+    campaign: str | None
+    machine: str | None
+    fault_count: int
+    faults: tuple[str, ...]
+    imported_at: datetime | None
+
+
+@dataclass(frozen=True)
+class DataQuality:
+    """What the data are worth: counts, bad points, what the plan cannot see, what got no number, what never came in."""
+
+    runs: int
+    probings: int
+    warm_up_runs: int
+    suspect: tuple[str, ...]
+    refused: tuple[tuple[str, str], ...]
+    blind_spots: tuple[str, ...]
+    remarks: tuple[str, ...]
+    refused_imports: tuple[RefusedImport, ...]
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """The volumetric error over the linear strokes with the rotary axes at one pose, in µm."""
+
+    pose: str
+    worst_um: float
+    rms_um: float
+
+
+@dataclass(frozen=True)
+class VolumetricMap:
+    """The stored volumetric error map: where it is worst, its expanded uncertainty there, and pose by pose (µm).
+
+    ``slices`` are its middle with the rotary axes at zero; empty where the machine has no three linear axes. Their
+    expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``.
+    """
+
+    run: int
+    region: str
+    worst_at: str
+    worst_um: float
+    expanded_um: float
+    rms_um: float
+    by_pose: tuple[PoseError, ...]
+    slices: tuple[Slice, ...] = ()
+    k: float = 2.0
+    p: float = 0.95
+
+
+@dataclass(frozen=True)
+class MachineHealth:
+    """One machine in one week. ``run`` is the run whose numbers stand in ``parameters``, ``basis`` how they were found.
+
+    ``probability_out`` that any parameter with a tolerance is beyond it, jointly. ``next_check`` in words.
+    """
+
+    machine: str
+    description: str
+    location: str
+    state: State
+    changed: str
+    since: datetime | None
+    probability_out: float | None
+    next_check: str
+    run: str
+    basis: str
+    factor: str
+    parameters: tuple[ParameterHealth, ...]
+    changes: tuple[Change, ...]
+    conditions: tuple[ConditionRange, ...]
+    model: ModelHealth | None
+    quality: DataQuality
+    map: VolumetricMap | None
+
+
+@dataclass(frozen=True)
+class FleetRow:
+    """A machine in the fleet table."""
+
+    machine: str
+    location: str
+    state: State
+    changed: str
+    since: datetime | None
+    probability_out: float | None
+    next_check: str
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """The first page: the week, when the report was made, and the machines by urgency.
+
+    ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known. ``ended``
+    says whether the week had, by the shop's clock, when the report was made.
+    """
+
+    week: str
+    first_day: date
+    last_day: date
+    made_at: datetime
+    software: str
+    risk: float
+    rows: tuple[FleetRow, ...]
+    refused_imports: tuple[RefusedImport, ...] = ()
+    ended: bool = True
+
+
+def fleet_row(health: MachineHealth) -> FleetRow:
+    """A machine's line in the fleet table."""
+    return FleetRow(
+        health.machine,
+        health.location,
+        health.state,
+        health.changed,
+        health.since,
+        health.probability_out,
+        health.next_check,
+    )
+
+
+def by_urgency(row: FleetRow) -> tuple[int, float, str]:
+    """The key that sorts machines: the most urgent state, then the larger probability, then the name."""
+    return list(STATES).index(row.state), -(row.probability_out or 0.0), row.machine

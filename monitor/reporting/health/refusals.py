@@ -1,0 +1,40 @@
+"""Refused imports as a health report prints them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from monitor.reporting.health.records import RefusedImport
+from monitor.reporting.health.words import day
+
+#: Faults of a refused import in words; the others are counted.
+_FAULTS_SHOWN = 3
+
+
+@dataclass(frozen=True)
+class PrintedRefusal:
+    """A refused import as printed."""
+
+    when: str
+    folder: str
+    of: str
+    faults: tuple[str, ...]
+    more: int
+    settled: str
+
+
+def printed_refusal(one: RefusedImport) -> PrintedRefusal:
+    """The first faults in words, the others counted."""
+    shown = one.faults[:_FAULTS_SHOWN]
+    names = [
+        f"campaign {one.campaign}" if one.campaign else "",
+        f"machine {one.machine}" if one.machine else "",
+    ]
+    return PrintedRefusal(
+        when=day(one.at),
+        folder=one.folder,
+        of=", ".join(name for name in names if name),
+        faults=shown,
+        more=one.fault_count - len(shown),
+        settled="" if one.imported_at is None else day(one.imported_at),
+    )

@@ -1,0 +1,153 @@
+"""Signing a certificate: PAdES baseline B-B (ETSI EN 319 142-1:2016, 6) by pyHanko, an optional extra.
+
+With a ``FileKey`` (PKCS#12 file, extra ``sign``) or a ``TokenKey`` (PKCS#11: smart card, hardware module; extra
+``token``), whose private key never leaves the token. The signature is appended to the PDF, which stays as it was below
+it: PDF/A, its attachments, every byte. It certifies the document: no change is allowed afterwards.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from monitor.exceptions import InputError
+from monitor.reporting.signature.signature import need_pyhanko
+
+_FIELD = "Signature"
+#: Where the signature's own bytes are kept; a certificate chain of three with RSA 4096 needs about 12 000.
+_ROOM_BYTES = 32_768
+
+
+@dataclass(frozen=True)
+class FileKey:
+    """The key and certificates of a PKCS#12 file."""
+
+    path: Path
+    passphrase: str | None = None
+
+
+@dataclass(frozen=True)
+class TokenKey:
+    """A key on a PKCS#11 token: the ``library`` of the token's maker, the token by ``slot`` or label, the key by label.
+
+    ``certificate`` is the label of the signer's certificate on the token (that of the key where None); all other
+    certificates on the token go along. ``pin`` opens the token; without one the token has a PIN pad of its own.
+    """
+
+    library: Path
+    key: str
+    token: str | None = None
+    slot: int | None = None
+    certificate: str | None = None
+    pin: str | None = None
+
+
+Key = FileKey | TokenKey
+
+
+def sign(pdf: bytes, key: Key) -> bytes:
+    """The PDF with a signature by ``key``.
+
+    Raises InputError where the extra is not installed, the key cannot be opened, or is not there, and where its
+    certificate is not valid today.
+    """
+    need_pyhanko()
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.sign import fields, signers
+
+    logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
+    meta = signers.PdfSignatureMetadata(
+        field_name=_FIELD,
+        md_algorithm="sha256",
+        subfilter=fields.SigSeedSubFilter.PADES,
+        certify=True,
+        docmdp_permissions=fields.MDPPerm.NO_CHANGES,
+    )
+    out = io.BytesIO()
+    with _token_signer(key) if isinstance(key, TokenKey) else _file_signer(key) as signer:
+        _check_in_force(signer.signing_cert)
+        signers.sign_pdf(
+            IncrementalPdfFileWriter(io.BytesIO(pdf)),
+            meta,
+            signer=signer,
+            output=out,
+            bytes_reserved=_ROOM_BYTES,
+        )
+    return out.getvalue()
+
+
+def _check_in_force(certificate: Any) -> None:
+    """A signature with a certificate that has ended, or has not begun, is accepted by nobody."""
+    first, last, now = certificate.not_valid_before, certificate.not_valid_after, datetime.now(UTC)
+    if not first <= now <= last:
+        raise InputError(
+            f"the signing certificate of {certificate.subject.human_friendly} is valid from {first:%Y-%m-%d} to "
+            f"{last:%Y-%m-%d}, not today ({now:%Y-%m-%d}); sign with one that is"
+        )
+
+
+@contextmanager
+def _file_signer(key: FileKey) -> Iterator[Any]:
+    from pyhanko.sign import signers
+
+    try:
+        content = key.path.read_bytes()
+    except OSError as error:
+        raise InputError(f"the key file {key.path} cannot be read: {error.strerror or error}") from error
+    passphrase = None if key.passphrase is None else key.passphrase.encode()
+    try:
+        signer = signers.SimpleSigner.load_pkcs12_data(content, other_certs=[], passphrase=passphrase)
+    except Exception:  # the library below raises by kind of fault; all mean the same to the user
+        signer = None
+    if signer is None:
+        hint = "; --passphrase-file FILE names the file with its passphrase" if key.passphrase is None else ""
+        raise InputError(f"{key.path} is no PKCS#12 file with a key, or its passphrase is another{hint}")
+    yield signer
+
+
+@contextmanager
+def _token_signer(key: TokenKey) -> Iterator[Any]:
+    try:
+        import pkcs11
+        from pyhanko.config.pkcs11 import TokenCriteria
+        from pyhanko.sign.pkcs11 import PKCS11Signer, open_pkcs11_session
+    except ImportError as error:
+        raise InputError(
+            "keys on a token need python-pkcs11: pip install 'machine-health-monitor[token]'"
+        ) from error
+    if not key.library.is_file():
+        raise InputError(f"there is no PKCS#11 library {key.library}; the token's maker has one")
+    if (key.token is None) == (key.slot is None):
+        raise InputError("name the token either by its label (--token-label) or by its slot (--token-slot)")
+    named = f"slot {key.slot}" if key.token is None else f"token {key.token!r}"
+    try:
+        session = open_pkcs11_session(
+            str(key.library),
+            slot_no=key.slot,
+            token_criteria=None if key.token is None else TokenCriteria(label=key.token),
+            user_pin=key.pin if key.pin is not None else pkcs11.PROTECTED_AUTH,
+        )
+    except Exception as error:  # python-pkcs11 has an exception a return code of the token
+        raise InputError(f"{named} of {key.library.name} does not open: {_why(error)}") from error
+    with session:
+        signer = PKCS11Signer(
+            session, key_label=key.key, cert_label=key.certificate or key.key, other_certs_to_pull=None
+        )
+        try:
+            # Many tokens, SoftHSM among them, sign with elliptic curves only what was hashed before.
+            signer.use_raw_mechanism = signer.signing_cert.public_key.algorithm == "ec"
+            yield signer
+        except pkcs11.PKCS11Error as error:
+            raise InputError(f"{named} does not sign with {key.key!r}: {_why(error)}") from error
+
+
+def _why(error: Exception) -> str:
+    """What the token says; its errors are mostly the names of return codes, such as PinIncorrect."""
+    said = str(error).strip()
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__

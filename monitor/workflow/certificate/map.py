@@ -1,0 +1,64 @@
+"""The volumetric error that a certificate prints: the map of its run, as numbers to be kept with it."""
+
+from __future__ import annotations
+
+from monitor.discovery import fit
+from monitor.methods import method_named
+from monitor.records import Array
+from monitor.reporting.certificate.volumetric_result import Length, Place, VolumetricResult
+from monitor.units import DEGREE, MICROMETRE
+from monitor.workflow.models import as_model
+from monitor.workflow.uncertainty.evaluations import Evaluation
+from monitor.workflow.volumetric.volumetric import Mapped, at_zero, map_of
+
+
+def volumetric_result(found: Evaluation, state: str) -> VolumetricResult:
+    """The map of an evaluated run in display units. Raises InputError where not three linear axes moved."""
+    problem = method_named(found.campaign.method).problem_of(found.campaign, as_model(found.model))
+    mapped = map_of(found, fit(problem))
+    drawn = at_zero(mapped)
+    error, p = mapped.error, found.p
+    k = error.factor(p)
+    worst = error.worst
+    return VolumetricResult(
+        state=state,
+        p=p,
+        k=k,
+        ranges=tuple((name, *ends) for name, ends in sorted(mapped.ranges.items())),
+        from_strokes=mapped.from_strokes,
+        each=mapped.points,
+        poses=len(mapped.poses),
+        points=len(error.lengths),
+        datum=() if error.datum is None else _place(mapped, error.datum),
+        largest=_length(
+            float(error.lengths[worst]),
+            float(error.u_lengths[worst]),
+            k,
+            _place(mapped, error.positions[worst]),
+        ),
+        mean=_length(*error.mean, k),
+        rms=_length(*error.rms, k),
+        left_out=tuple(mapped.left_out.items()),
+        axes=drawn.axes,
+        readings_mm=drawn.readings_mm,
+        vectors_um=drawn.vectors_um,
+        expanded_um=k * drawn.u_um,
+    )
+
+
+def _length(value: float, u: float, k: float, at: Place = ()) -> Length:
+    shown = MICROMETRE.to_display
+    return Length(shown(value), shown(u), shown(k * u), at)
+
+
+def _place(mapped: Mapped, position: Array) -> Place:
+    """Readings of a commanded point, without the spindle's angle."""
+    return tuple(
+        (
+            joint.name,
+            joint.sign * (DEGREE.to_display(float(value)) if joint.turns else float(value)) + 0.0,
+            "°" if joint.turns else "mm",
+        )
+        for joint, value in zip(mapped.known.chain.joints, position, strict=True)
+        if joint.kind != "spindle"
+    )

@@ -1,0 +1,1 @@
+"""The past of a machine: runs, series, changes, drift."""

@@ -1,0 +1,1 @@
+"""The geometric errors of every run of a campaign."""

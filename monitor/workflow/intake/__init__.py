@@ -1,0 +1,1 @@
+"""Campaign folders into the database, and what is there."""

@@ -1,0 +1,127 @@
+"""What could be probed: the balls and indexations that a machine and an artefact allow, and how long it takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from monitor.discovery import fit
+from monitor.exceptions import DataError
+from monitor.machine import Chain
+from monitor.methods import method_named
+from monitor.methods.chain.expected import candidate_touches, planned_context
+from monitor.methods.chain.planning import Candidates, Choice, TimeModel, more_balls, pose_grid
+from monitor.methods.chain.touch import TouchProblem
+from monitor.records import Array, Campaign
+from monitor.store import StoredModel
+from monitor.workflow.models import as_model
+
+# Where the times of a campaign do not tell: five touches of a ball take about a minute on a machining centre (the
+# five-day campaign: 62 centres in 65 min), another indexation of two axes half of that.
+ASSUMED_PROBING_S, ASSUMED_INDEXATION_S = 60.0, 30.0
+# Linear axes without a stroke in the machine file may go this much further than they went.
+STRETCH = 1.25
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What a campaign's machine and artefact allow: everything that could be touched, and the ``present`` plan, that
+    of the first run. ``problem`` is one run, ``places`` (T, 3) mm where the targets are."""
+
+    campaign: Campaign
+    problem: TouchProblem
+    candidates: Candidates
+    present: Choice
+    places: Array
+
+
+def strokes_of(
+    campaign: Campaign, chain: Chain, positions: Array
+) -> tuple[dict[str, tuple[float, float]], ...]:
+    """Positions that axes may take: of the rotary axes with a stroke in the file, and of all linear ones."""
+    rotary: dict[str, tuple[float, float]] = {}
+    linear: dict[str, tuple[float, float]] = {}
+    for place, joint in enumerate(chain.joints):
+        settings = campaign.machine.axes.get(joint.name)
+        stroke = None if settings is None else settings.stroke
+        if stroke is not None:
+            ends = sorted((joint.sign * stroke[0], joint.sign * stroke[1]))
+            (rotary if joint.turns else linear)[joint.name] = (ends[0], ends[1])
+        elif not joint.turns:
+            low, high = float(positions[:, place].min()), float(positions[:, place].max())
+            middle, half = (low + high) / 2.0, (high - low) / 2.0 * STRETCH
+            linear[joint.name] = (middle - half, middle + half)
+    return rotary, linear
+
+
+def _time_model(problem: TouchProblem, pose: Array) -> TimeModel:
+    """Seconds of the first run's own steps: within an indexation, and what a change of it adds."""
+    steps = np.diff(problem.context.time)
+    changed = np.diff(pose) != 0
+    within, between = steps[~changed & (steps > 0)], steps[changed & (steps > 0)]
+    if not len(within) or not len(between):
+        return TimeModel(ASSUMED_PROBING_S, ASSUMED_INDEXATION_S, "assumed")
+    probing = float(np.median(within))
+    return TimeModel(probing, max(0.0, float(np.median(between)) - probing), "the times of this campaign")
+
+
+def _with_found_tip(problem: TouchProblem) -> TouchProblem:
+    """The problem with the stylus tip where the campaign's own readings put it, as far as they determine it."""
+    solution = fit(problem).solution
+    tips = np.where(solution.local_free[:, -3:].all(axis=0), solution.local[:, -3:].mean(axis=0), problem.tip)
+    x, y, z = map(float, tips)
+    return replace(problem, tip=(x, y, z))
+
+
+def planned(loaded: Campaign, stored: StoredModel, most_balls: int) -> Planned:
+    """The candidates of a campaign; where it has fewer than ``most_balls`` balls, places for more are added."""
+    problem = method_named(loaded.method).problem_of(loaded, as_model(stored))
+    if not isinstance(problem, TouchProblem):
+        raise DataError(
+            f"plan weighs where balls are touched, and campaign {loaded.name} was measured by {loaded.method}; what"
+            " its plan cannot tell apart, identify names with what to do"
+        )
+    problem = _with_found_tip(problem)
+    first = problem.context.run == problem.runs[0]
+    one = replace(
+        problem,
+        context=planned_context(
+            problem.context, problem.context.positions[first], problem.context.target[first].tolist(),
+            problem.context.nominal[first], np.zeros(int(first.sum()), dtype=np.int64),
+        ),
+        sigma=problem.sigma[first],
+        distances=tuple(replace(d, length=d.length[:1]) for d in problem.distances),
+    )  # fmt: skip
+    one = replace(one, context=replace(one.context, time=problem.context.time[first]))
+    context, chain = one.context, one.context.chain
+    turning = np.array([joint.turns for joint in chain.joints])
+    own, pose = np.unique(np.round(np.where(turning, context.positions, 0.0), 6), axis=0, return_inverse=True)
+    pose = pose.ravel()
+    targets = list(one.targets)
+    places = np.array([context.nominal[np.flatnonzero(context.target == name)[0]] for name in targets])
+    ends = {name for distance in one.distances for name in distance.between}
+    balls = [name for name in targets if name not in ends]
+    if most_balls > len(balls):
+        new = more_balls(places[[targets.index(name) for name in balls]], most_balls - len(balls))
+        targets += [f"new {number + 1}" for number in range(len(new))]
+        places = np.concatenate([places, new])
+    rotary, linear = strokes_of(loaded, chain, problem.context.positions)
+    poses = np.unique(np.round(np.concatenate([own, pose_grid(chain, context.positions, rotary)]), 6), axis=0)
+    touches = candidate_touches(one, poses, targets, places, linear)
+    place_of = np.array([int(np.flatnonzero((poses == row).all(axis=1))[0]) for row in own])
+    touched = np.zeros(touches.reachable.shape, dtype=bool)
+    for row, target in enumerate(context.target):
+        touched[place_of[pose[row]], targets.index(str(target))] = True
+    touches = replace(touches, reachable=touches.reachable | touched)
+    bar_columns = [targets.index(name) for name in sorted(ends)]
+    candidates = Candidates(
+        touches,
+        balls=tuple(place for place, name in enumerate(targets) if name not in ends),
+        bar_poses=tuple(map(int, np.flatnonzero(touched[:, bar_columns].any(axis=1)))),
+        time=_time_model(one, pose.astype(float)),
+    )
+    present = candidates.choice(
+        tuple(map(int, np.unique(place_of))), tuple(targets.index(name) for name in balls), touched
+    )
+    return Planned(loaded, one, candidates, present, places)

@@ -1,0 +1,1 @@
+"""Statistics of the runs of a campaign."""

@@ -1,0 +1,1 @@
+"""The trend of each parameter of a machine."""

@@ -1,0 +1,1 @@
+"""Uncertainty of a run's results after JCGM 102:2011."""

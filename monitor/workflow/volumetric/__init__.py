@@ -1,0 +1,1 @@
+"""The volumetric error over the stroke, and compensation tables."""
