@@ -15,7 +15,7 @@ import monitor
 
 PACKAGE = Path(monitor.__file__).parent
 
-GROUND = {"exceptions", "units", "records"}
+GROUND = {"exceptions", "units", "records", "documents"}
 ROW = [
     "machine",
     "effects",

@@ -17,10 +17,10 @@ import pypdf
 import pytest
 from jinja2 import UndefinedError
 
+from monitor.documents import to_document
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.record import CertificateRecord, Person
 from monitor.reporting.certificate.results import RefusedParameters
-from monitor.reporting.documents import to_document
 from monitor.reporting.numbers import written_correlation
 from monitor.reporting.pdf.render import UnprintableError, certificate_html, certificate_pdf, html_of, pdf_of
 from monitor.reporting.resources import report_folder
@@ -151,7 +151,7 @@ def test_the_same_record_gives_the_same_bytes_in_another_process(
     script.write_text(
         "import json, sys\n"
         "from monitor.reporting.certificate.record import CertificateRecord\n"
-        "from monitor.reporting.documents import from_document\n"
+        "from monitor.documents import from_document\n"
         "from monitor.reporting.pdf.render import certificate_pdf\n"
         "record = from_document(CertificateRecord, json.load(open(sys.argv[1], encoding='utf-8')))\n"
         "open(sys.argv[2], 'wb').write(certificate_pdf(record))\n",

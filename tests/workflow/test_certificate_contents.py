@@ -14,10 +14,10 @@ import numpy as np
 import pypdf
 import pytest
 
+from monitor.documents import from_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.reporting.certificate.record import CertificateRecord
-from monitor.reporting.documents import from_document
 from monitor.reporting.resources import font_bytes
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate

@@ -12,13 +12,13 @@ import numpy as np
 import pypdf
 import pytest
 
+from monitor.documents import from_document
 from monitor.exceptions import InputError
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.dcc_results import DCC
 from monitor.reporting.certificate.record import CertificateRecord, Replaced
-from monitor.reporting.documents import from_document
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signature import SignatureFinding, check_signature
 from monitor.reporting.signature.signing import FileKey, sign

@@ -11,10 +11,10 @@ import numpy as np
 import pypdf
 import pytest
 
+from monitor.documents import from_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.reporting.certificate.record import CertificateRecord
-from monitor.reporting.documents import from_document
 from monitor.store import Database, import_campaign, load_certificate
 from monitor.workflow.certificate.checks import remake, verify
 from monitor.workflow.certificate.issue import amend, issue

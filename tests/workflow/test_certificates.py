@@ -16,10 +16,10 @@ import pypdf
 import pytest
 
 from monitor.cli import main
+from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
 from monitor.readers import read_campaign
 from monitor.reporting.certificate.record import CertificateRecord, ConformityStatement
-from monitor.reporting.documents import from_document, to_document
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate

@@ -19,9 +19,9 @@ import pytest
 from by_path import load
 
 from monitor.cli import main
+from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
-from monitor.reporting.documents import from_document, to_document
 from monitor.reporting.health.records import STATES, Change, MachineHealth
 from monitor.reporting.health.render import health_html, health_pdf
 from monitor.reporting.health.words import in_words

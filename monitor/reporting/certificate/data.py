@@ -11,12 +11,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from monitor.documents import to_document
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric import POINTS_FILE
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
-from monitor.reporting.documents import to_document
 from monitor.reporting.texts import texts_of
 
 

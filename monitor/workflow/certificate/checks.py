@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from monitor import __version__
+from monitor.documents import from_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.record import CertificateRecord
-from monitor.reporting.documents import from_document
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signature import SignatureFinding, check_signature, is_signed

@@ -9,13 +9,13 @@ from datetime import date
 from pathlib import Path
 from typing import Any, Literal
 
+from monitor.documents import to_document
 from monitor.records import LinearAxes
 from monitor.reporting.certificate.assembly import certificate_record
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
-from monitor.reporting.documents import to_document
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signing import Key, sign
 from monitor.reporting.texts import ENGLISH, texts_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from monitor.reporting.documents import from_document
+from monitor.documents import from_document
 from monitor.reporting.health.records import PoseError, VolumetricMap
 from monitor.reporting.svg.map_slices import Slice
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from monitor.reporting.documents import from_document
+from monitor.documents import from_document
 from monitor.reporting.health.comparison import (
     ErrorStep,
     MissingEffect,

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from monitor import __version__
+from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
-from monitor.reporting.documents import from_document, to_document
 from monitor.reporting.health.records import ALARMS, Fleet, FleetRow, MachineHealth, by_urgency, fleet_row
 from monitor.reporting.health.render import MACHINES_A_PART, health_html, health_pdf
 from monitor.store import Database, list_machines, save_analysis

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import Fit
+from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
 from monitor.records import Array, Campaign
-from monitor.reporting.documents import to_document
 from monitor.reporting.svg.map_slices import slices_of
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
