@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from monitor.discovery.curve.candidates import catalogue as curve_catalogue
+from monitor.discovery.curve.catalogue import catalogue as curve_catalogue
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
 from monitor.effects.curve import SEARCHED

@@ -119,10 +119,10 @@ def _missing(found: ChainMissing) -> Document:
     document: Document = {
         "rank": found.rank,
         "effect": found.effect,
-        "meaning": found.words.meaning,
-        "cause": found.words.cause,
-        "remedy": found.words.remedy,
-        "described_in": found.words.described_in,
+        "meaning": found.description.meaning,
+        "cause": found.description.cause,
+        "remedy": found.description.remedy,
+        "described_in": found.description.described_in,
         "amplitude": unit.to_display(found.amplitude),
         "u": unit.to_display(found.u),
         "unit": unit.name,
@@ -148,7 +148,7 @@ def _missing(found: ChainMissing) -> Document:
         "indistinguishable_from": [rival.effect for rival in found.rivals],
         "coinciding": [rival.effect for rival in found.rivals if rival.coincides],
         "tell_apart_by": [_pose(dict(pose)) for pose in found.separation.poses],
-        "standard_deviations_apart": {"now": found.separation.now, "then": found.separation.then},
+        "standard_deviations_apart": {"now": found.separation.before, "then": found.separation.after},
         "varies_from_run_to_run": found.varies,
     }
     if found.searched is not None:

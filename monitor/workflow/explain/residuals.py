@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import Fit
-from monitor.discovery.machine.anomalies import plan_places
+from monitor.discovery.machine.anomalies import plan_cells
 from monitor.records import Array
 from monitor.units import MICROMETRE
 
@@ -39,7 +39,7 @@ def in_machine_frame(found: Fit, vectors: Array | None = None) -> tuple[Array, A
 
 def mean_over_runs(found: Fit, places: Array, vectors: Array) -> tuple[Array, Array]:
     """Means (m, 3) of places and residuals (n, 3) at the m poses of the plan; probings left out take no part."""
-    numbers = plan_places(found)
+    numbers = plan_cells(found)
     keep = ~found.left_out
     count = np.bincount(numbers[keep]).astype(float)
     count[count == 0] = np.nan

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import Fit, fit
+from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.separate import Separation, separating_poses
 from monitor.discovery.machine.variants import variants_of
-from monitor.discovery.machine.visible import see
 from monitor.effects import parse_effect
 from monitor.effects.catalogue import catalogue
 from monitor.exceptions import InputError
@@ -242,7 +242,9 @@ def _blind(found: Planned, choice: Choice) -> list[str]:
         if axis.scale_pitch is not None
     }
     effects = catalogue(chain, known, (), pitches)
-    seen = see(_fit_of(found, choice), [variant for effect in effects for variant in variants_of(effect)])
+    seen = scene_of(
+        _fit_of(found, choice), [variant for effect in effects for variant in variants_of(effect)]
+    )
     return list(dict.fromkeys(one.family for one in seen.candidates if not one.detectable))
 
 
@@ -268,7 +270,7 @@ def _separate(loaded: Campaign, stored: StoredModel, texts: tuple[str, str]) -> 
             }
             for pose in found.poses
         ],
-        "standard_deviations_apart": {"now": found.now, "then": found.then},
+        "standard_deviations_apart": {"now": found.before, "then": found.after},
         "verdict": _verdict(found),
     }
 

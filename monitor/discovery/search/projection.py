@@ -1,0 +1,30 @@
+"""Columns projected onto, and out of, the span of others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from monitor.records import Array
+
+# Eigenvalues of a candidate's scaled normal matrix below this belong to directions without data.
+RELATIVE_RANK = 1e-9
+
+
+def orthonormal(columns: Array) -> Array:
+    """An orthonormal basis (M, rank) of what columns (M, k) span."""
+    if columns.shape[1] == 0:
+        return columns
+    scale = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(scale == 0, 1.0, scale)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    keep = values > RELATIVE_RANK * max(float(values.max()), 1.0)
+    basis: Array = scaled @ (vectors[:, keep] / np.sqrt(values[keep]))
+    return basis
+
+
+def without(basis: Array, columns: Array) -> Array:
+    """Columns with the span of an orthonormal basis taken out."""
+    if basis.shape[1] == 0:
+        return columns
+    remainder: Array = columns - basis @ (basis.T @ columns)
+    return remainder
