@@ -17,7 +17,7 @@ from monitor.discovery.curve.missing import CurveMissing
 from monitor.discovery.curve.quality import bic
 from monitor.discovery.machine.compare import SOMETHING_IS_MISSING, Part
 from monitor.effects.curve import SEARCHED
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import NAME
 from monitor.records import CurveCampaign
 from monitor.statistics.noise import Assessed, effective_number
