@@ -19,7 +19,7 @@ from monitor.discovery.machine.held_out import held_out_error, pose_parts
 from monitor.discovery.machine.version_error import version_error
 from monitor.discovery.machine.visible import see
 from monitor.methods.model import Model
-from monitor.methods.tracker import method as tracker
+from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
 
 

@@ -91,7 +91,7 @@ def _stepwise(options: Namespace) -> int:
 
 def show(found: dict[str, Any]) -> None:
     """The parameters of the runs, newest last, and what was refused."""
-    if found["method"] == "curve":
+    if "response" in found:
         curve_output.coefficients(found)
         return
     runs = found["runs"][-SHOWN_RUNS:]

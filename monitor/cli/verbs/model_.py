@@ -141,7 +141,7 @@ def _history(options: Namespace) -> int:
         steps = comparison.history(db, options.name, options.campaign)
     files = []
     if options.figures is not None:
-        if steps[0].get("method") == "curve":
+        if "unit" in steps[0]:
             from monitor.workflow.explain.curve_figures import curve_history_figure
 
             files = curve_history_figure(steps, options.figures)
@@ -159,7 +159,7 @@ def _history(options: Namespace) -> int:
 
 
 def _steps(steps: list[comparison.Document]) -> None:
-    if steps[0].get("method") == "curve":
+    if "unit" in steps[0]:
         curve_output.steps(steps)
         return
     rows = [

@@ -16,7 +16,7 @@ from monitor.discovery.machine.visible import Candidate
 from monitor.discovery.search.missing import COINCIDES, UNDECIDED, Missing, Rival, Searched
 from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, coefficient_names
 from monitor.effects.curve_words import calendar_period, describe_curve
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.records import Array
 from monitor.statistics.noise import Assessed
 from monitor.units import Unit
