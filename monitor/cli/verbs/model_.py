@@ -64,7 +64,7 @@ def _list(options: Namespace) -> int:
         ]
         for one in found["models"]
     ]
-    output.table("", ["model", "parent", "effects added to the base", "note"], rows, left=4)
+    output.table("", ["model", "parent", "effects added to the base", "note"], rows, text_columns=4)
     return 0
 
 
@@ -177,5 +177,5 @@ def _steps(steps: list[comparison.Document]) -> None:
         f"on campaign {steps[0]['campaign']}",
         ["model", "added", "RMS / µm", "held-out / µm", "repeatability / µm", "lack of fit p"],
         rows,
-        left=2,
+        text_columns=2,
     )
