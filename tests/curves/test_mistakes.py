@@ -12,7 +12,7 @@ from monitor.discovery.curve.compare import compare_curve
 from monitor.discovery.curve.explain import explain_curve
 from monitor.discovery.search.comparison import Verdict
 from monitor.exceptions import CampaignError
-from monitor.methods.curve.method import fit
+from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import problem_of
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign, Instrument

@@ -19,7 +19,7 @@ from monitor.discovery.machine.held_out import pose_parts
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.version_error import version_error
 from monitor.methods.model import Model
-from monitor.methods.tracker import method as tracker
+from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
 
 

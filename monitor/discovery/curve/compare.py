@@ -28,7 +28,7 @@ from monitor.discovery.search.comparison import (
     verdict_of,
 )
 from monitor.effects.curve import SEQUENCE
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.statistics.noise import Assessed, assess
 
 # A breakdown by an input shows where it fails in so many parts of equal numbers of rows.

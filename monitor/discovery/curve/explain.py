@@ -14,7 +14,7 @@ from monitor.discovery.curve.missing import CurveMissing, missing_effects
 from monitor.discovery.curve.outliers import Outlier
 from monitor.discovery.curve.quality import noise_of
 from monitor.discovery.curve.search import CurveSearch
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.statistics.noise import WHITE, Assessed
 

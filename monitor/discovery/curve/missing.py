@@ -18,7 +18,7 @@ from monitor.discovery.search.rivals import coincides, least_likelihood
 from monitor.discovery.search.scan import Finding
 from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, coefficient_names
 from monitor.effects.curve_words import calendar_period, describe_curve
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.records import Array
 from monitor.statistics.noise import Assessed
 from monitor.units import Unit

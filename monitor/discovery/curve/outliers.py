@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import linalg, special
 
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.records import Array
 
 #: One false alarm in a hundred curves.

@@ -17,7 +17,7 @@ from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Varian
 from monitor.discovery.search.held_out import held_out_rms
 from monitor.discovery.search.projection import without
 from monitor.effects.curve import CurveEffect, curve_columns
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.records import Array
 from monitor.statistics.noise import Noise

@@ -12,7 +12,7 @@ from monitor.discovery.curve.candidates import scene_of
 from monitor.discovery.curve.outliers import Outlier, outliers
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene, whitened_curve
 from monitor.discovery.search.scan import Finding, ScanResult, except_for, scan
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.statistics.noise import Noise
 

@@ -26,7 +26,7 @@ from monitor.discovery import compare as compare_fit
 from monitor.discovery.machine.steps import Step
 from monitor.discovery.search.comparison import Part
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.shared_effects import shared_parameters
 from monitor.records import Campaign
@@ -64,7 +64,7 @@ def fitted(db: Database, campaign: str, model: str | None) -> tuple[Campaign, St
     """A campaign, the stored model, and the model fitted to it."""
     loaded = load_campaign(db, campaign)
     stored = resolve(db, model, loaded.method)
-    return loaded, stored, fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
+    return loaded, stored, fit(campaign_method(loaded).problem_of(loaded, as_model(stored)))
 
 
 def _parts(parts: dict[str, Part]) -> Document:
@@ -295,7 +295,7 @@ def explanation_of(
     """
 
     def problem_of(one: Campaign) -> ChainProblem:
-        found: ChainProblem = method_named(campaign.method).problem_of(one, as_model(model))
+        found: ChainProblem = campaign_method(campaign).problem_of(one, as_model(model))
         return found
 
     try:
@@ -303,7 +303,7 @@ def explanation_of(
     except DataError as error:
         mistakes = find_mistakes(campaign, problem_of, None)
         raise DataError(f"{error}. {mistakes_in_words(mistakes)}" if mistakes else str(error)) from error
-    mistakes = find_mistakes(campaign, problem_of, first) if is_gross(first) else ()
+    mistakes = find_mistakes(campaign, problem_of, first) if is_gross(campaign, first) else ()
     if mistakes:
         comparison = replace(
             compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING
@@ -382,7 +382,7 @@ def error_steps(loaded: Campaign, versions: Sequence[StoredModel]) -> list[Docum
     """The error of every version of a model on a campaign."""
     steps = []
     for version in versions:
-        found = fit(method_named(loaded.method).problem_of(loaded, as_model(version)))
+        found = fit(campaign_method(loaded).problem_of(loaded, as_model(version)))
         error = version_error(found)
         unseen = shared_parameters(found.problem, found.solution).refused
         steps.append(

@@ -16,7 +16,7 @@ from monitor.discovery.curve.explain import CurveExplanation
 from monitor.discovery.curve.missing import CurveMissing
 from monitor.discovery.curve.quality import bic
 from monitor.discovery.search.comparison import Part, Verdict
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import NAME
 from monitor.records import CurveCampaign
 from monitor.statistics.noise import Assessed, effective_number

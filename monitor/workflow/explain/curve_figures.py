@@ -10,7 +10,7 @@ import numpy as np
 
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.effects.curve import SEQUENCE
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.reporting.figures.curve import Residuals, residuals_figure
 from monitor.reporting.figures.models import error_falling
