@@ -30,7 +30,7 @@ MOST_TOGETHER = 5
 #: Effects in company that noise alone would bring forth in at most so many series are reported, as likely and with that
 #: probability; they are certain where it is below the rate of the scan.
 LIKELY = 0.1
-#: A line and a cycle together: slow noise (correlation 0.97 and independent readings) is taken for them at 0.05 in
+#: A line and a cycle together: slow noise (correlation 0.97 and independent readings) is mistaken for them at 0.05 in
 #: every fifth series of 100 rows.
 LINE_AGAINST_NOISE = 1e-6
 
@@ -143,8 +143,8 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         effect = candidate.effect
         if effect.order == 1:
             return None
-        lines = (one for one in self._pool.candidates if one.effect.order == 1)
-        line = next((one for one in lines if one.effect.column == effect.column), None)
+        lines = (line for line in self._pool.candidates if line.effect.order == 1)
+        line = next((other for other in lines if other.effect.column == effect.column), None)
         in_model = line is not None and any(other.effect == line.effect for other in others)
         return None if in_model else line
 

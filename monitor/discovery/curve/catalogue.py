@@ -42,7 +42,7 @@ def _powers(problem: CurveProblem, name: str) -> Iterator[CurveEffect]:
 
 
 def _calendar(problem: CurveProblem, name: str) -> Iterator[CurveEffect]:
-    """The periods that nobody needs to search: those of the calendar that the rows can show."""
+    """The periods that need no search: those of the calendar that the rows can show."""
     if name != _clock(problem):
         return
     x = np.unique(problem.inputs.numbers[name])

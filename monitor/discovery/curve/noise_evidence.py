@@ -22,8 +22,12 @@ HALF = 0.5
 Families = tuple[tuple[str, ...], tuple[str, ...]]
 
 
+def _sorted_families(candidates: Sequence[CurveCandidate]) -> tuple[str, ...]:
+    return tuple(sorted(candidate.family for candidate in candidates))
+
+
 def _families(others: Sequence[CurveCandidate], together: Sequence[CurveCandidate]) -> Families:
-    return tuple(sorted(one.family for one in others)), tuple(sorted(one.family for one in together))
+    return _sorted_families(others), _sorted_families(together)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """A fitted curve as the scan sees it: whitened rows, and effects as columns with the model taken out.
 
 A polynomial is the part of its power that the lower ones cannot do (orthogonal over the measured rows), so that
-neither origin nor unit of the input matters and a line is not taken for a parabola.
+neither origin nor unit of the input matters and a line is not mistaken for a parabola.
 """
 
 from __future__ import annotations

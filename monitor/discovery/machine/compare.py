@@ -27,7 +27,7 @@ from monitor.discovery.search.comparison import (
 )
 from monitor.records import Array
 
-# Poses beyond this number are no indexations that somebody would read one by one.
+# Poses beyond this number are too many indexations to be read one by one.
 MOST_INDEXATIONS = 200
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from monitor.discovery.machine.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.compare import ChainComparison, compare
+from monitor.discovery.machine.cures import Mistake
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import ChainMissing, Surroundings, missing_effects
-from monitor.discovery.machine.mistakes import Mistake
 from monitor.discovery.machine.refine import Refined, refine_all
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain

@@ -21,7 +21,7 @@ from monitor.machine import COMPONENTS, MOTION
 from monitor.records import Array
 
 # From beyond the low harmonics of bearings and wheels to twice the ratio of a reduction gear of robots (50 to 160
-# mostly). Over a travel of half a turn orders closer than one cannot be told apart; the grid is twice as fine.
+# mostly). Over a travel of half a turn orders closer than one cannot be separated; the grid is twice as fine.
 LOWEST, HIGHEST, STEP = 4.0, 330.0, 0.5
 # Fewer different positions than this do not fix an order.
 FEWEST_POSITIONS = 100

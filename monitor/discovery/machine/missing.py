@@ -1,4 +1,4 @@
-"""The effects that a chain lacks as results: size, evidence, error before and after, and what they may be taken for."""
+"""The effects that a chain lacks as results: size, evidence, error before and after, and their rivals."""
 
 from __future__ import annotations
 

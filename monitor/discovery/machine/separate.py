@@ -142,7 +142,7 @@ def separating_poses(
     rows_before = _rows(fit, group, np.flatnonzero(first))
     pairs = _pairs(rows_before, _rows_of_new(fit, new, tip, group), new.run, coefficients)
     selected, start, reached, alike = _choose(pairs, len(problem.runs))
-    together = tuple((group[one].text, group[other].text) for one, other in alike)
+    together = tuple((group[first].text, group[second].text) for first, second in alike)
     turning = [(index, joint.name) for index, joint in enumerate(context.chain.joints) if joint.turns]
     numbers = np.unique(new.run)
     poses = tuple({name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selected)

@@ -24,7 +24,7 @@ class Acceptance(Generic[CandidateT]):
 
     def at_best_value(self, selected: Sequence[CandidateT], index: int) -> CandidateT:
         """The selected candidate at an index with its time constant or period at the best value, so that what the grid
-        misses is not taken for another effect."""
+        misses is not mistaken for another effect."""
         return selected[index]
 
     def separable(self, selected: Sequence[CandidateT], candidate: CandidateT) -> bool:

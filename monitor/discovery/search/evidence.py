@@ -158,7 +158,7 @@ def explained_by(
     gram: Array, onto: Array, total: float = 0.0, dof: int = 1
 ) -> tuple[Array, npt.NDArray[np.int64], Array]:
     """Sum of squares (...) that columns with products ``gram`` (..., k, k) explain, their rank (...) and their
-    coefficients (..., k), as far as these stand out from the noise that ``total`` and ``dof`` tell of."""
+    coefficients (..., k), as far as these stand out from the noise that ``total`` and ``dof`` show."""
     values, vectors = np.linalg.eigh(gram)
     keep = values > SMALLEST_REMAINDER
     along = np.einsum("...ij,...i->...j", vectors, onto)

@@ -1,4 +1,4 @@
-"""A missing effect as a result: size, evidence, error before and after, and what it may be taken for."""
+"""A missing effect as a result: size, evidence, error before and after, and what it may be mistaken for."""
 
 from __future__ import annotations
 

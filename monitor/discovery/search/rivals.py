@@ -1,4 +1,4 @@
-"""What an effect that was found may be taken for."""
+"""What an effect that was found may be mistaken for."""
 
 from __future__ import annotations
 
