@@ -83,7 +83,7 @@ def _promising(curve: WhitenedCurve, residual: Array, effect: CurveEffect, value
     """The values that explain most of the residual, each by itself."""
     explained = np.empty(len(values))
     for index, value in enumerate(values):
-        columns = without(curve.basis, curve.whitened(curve.columns(effect, float(value))))
+        columns = without(curve.basis, curve.whitened(curve.columns(effect.at(float(value)))))
         explained[index] = float(np.sum((orthonormal(columns).T @ residual) ** 2))
     return values[np.sort(np.argsort(-explained)[:most])]
 

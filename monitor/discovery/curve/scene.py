@@ -34,14 +34,12 @@ def variant_of(effect: CurveEffect, tries: int = 1) -> Variant[CurveEffect]:
 class WhitenedCurve:
     """A fitted curve: rows with weight in the order of time, whitened by ``noise``.
 
-    ``design`` (m, c) are the whitened columns of the model and ``basis`` spans them; ``measured`` (m,) is the
-    whitened response.
+    ``basis`` (m, r) spans the whitened columns of the model; ``measured`` (m,) is the whitened response.
     """
 
     fit: CurveFit
     noise: Noise
     measured: Array
-    design: Array
     basis: Array
 
     @property
@@ -74,10 +72,10 @@ class WhitenedCurve:
         """Take the model out of the columns of one effect."""
         return self.candidates([variant])[0]
 
-    def columns(self, effect: CurveEffect, value: float | None = None) -> Array:
+    def columns(self, effect: CurveEffect) -> Array:
         """Columns (n, k) of an effect; of a polynomial the part that the lower powers cannot do."""
         if not effect.order:
-            return curve_columns(effect, self.problem.inputs, value)
+            return curve_columns(effect, self.problem.inputs)
         rows = self.problem.order
         x = self.problem.inputs.numbers[effect.column]
         low, high = x[rows].min(), x[rows].max()
@@ -115,7 +113,7 @@ def whitened_curve(fit: CurveFit, noise: Noise) -> WhitenedCurve:
     """Whiten a fitted curve by a noise."""
     rows = fit.problem.order
     white = noise.whiten(np.column_stack([fit.problem.curve.measured, fit.design])[rows])[0]
-    return WhitenedCurve(fit, noise, white[:, 0], white[:, 1:], orthonormal_to_full_precision(white[:, 1:]))
+    return WhitenedCurve(fit, noise, white[:, 0], orthonormal_to_full_precision(white[:, 1:]))
 
 
 def orthonormal_to_full_precision(columns: Array) -> Array:

@@ -16,17 +16,18 @@ from monitor.discovery.machine.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.compare import ChainComparison, compare
 from monitor.discovery.machine.cures import Mistake
 from monitor.discovery.machine.fit import Fit, fit
-from monitor.discovery.machine.missing import ChainMissing, Surroundings, missing_effects
+from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.refine import Refined, refine_all
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
 from monitor.discovery.machine.steps import Step, find_steps
+from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.machine.suspects import Suspects, find_suspects, with_effects
 from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.machine.variants import cycles_of_unknown_pitch, resolvable, variants_of
 from monitor.discovery.machine.varying import varying_effects
 from monitor.discovery.search.comparison import Verdict
-from monitor.effects.catalogue import catalogue, drivers_of
+from monitor.effects.catalogue import catalogue
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign
 
@@ -70,17 +71,6 @@ class _Search:
         return [finding.candidate.effect for finding in self.refined]
 
 
-def _surroundings(campaign: Campaign, problem: ChainProblem) -> Surroundings:
-    days = {run.run: run.day for run in campaign.runs}
-    axes = campaign.machine.axes.items()
-    return Surroundings(
-        runs=np.arange(len(problem.runs)),
-        days=np.array([days[int(run)] for run in problem.runs]),
-        drivers=drivers_of(problem.context),
-        strokes={name: axis.stroke for name, axis in axes if axis.stroke is not None},
-    )
-
-
 def _variants(campaign: Campaign, problem: ChainProblem, drivers: Sequence[str]) -> list[ChainVariant]:
     """Every effect of the catalogue that the model lacks, with what is searched of it."""
     axes = campaign.machine.axes.items()
@@ -109,7 +99,7 @@ def explain(
     foreseen = problem.for_search()
     # The fit of the problem as it is serves only where nothing else is foreseen.
     first = fit(foreseen) if first is None or foreseen is not problem else first
-    surroundings = _surroundings(campaign, foreseen)
+    surroundings = surroundings_of(campaign, foreseen)
     variants = _variants(campaign, foreseen, surroundings.drivers)
     search = _search(first, foreseen, variants, surroundings.drivers, rate)
     suspects = search.suspects

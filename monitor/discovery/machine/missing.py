@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows, widening
-from monitor.discovery.machine.refine import Refined, refine
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
+from monitor.discovery.machine.refine import Refined
+from monitor.discovery.machine.rivals import RivalSearch
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect
 from monitor.discovery.machine.separate import Separation, separating_poses
+from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.machine.tables import ChainScan
-from monitor.discovery.machine.variants import with_drivers
 from monitor.discovery.search.amplitudes import amplitudes, length_of
-from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
 from monitor.discovery.search.missing import Missing, Rival
 from monitor.discovery.search.projection import orthonormal, without
-from monitor.discovery.search.rivals import coincides, least_likelihood
-from monitor.discovery.search.scan import Finding, except_for
-from monitor.effects import ChainEffect
+from monitor.discovery.search.rivals import least_likelihood
+from monitor.discovery.search.scan import Finding
 from monitor.effects.drivers import EachRun
-from monitor.effects.shapes import Cyclic, Harmonic
 from monitor.effects.words import describe
 from monitor.records import Array
 
-# A time constant between two of the grid may lose so much there; rivals are compared at their best value.
-GRID_LOSS = 12.0
 # An effect of less than twice its standard uncertainty is no answer.
 SMALLEST_RATIO = 2.0
-# Orders of a gear closer than this are the same: less than a turn of the joint shows no more.
-ONE_ORDER = 2.0
 
 
 @dataclass(frozen=True)
@@ -47,20 +41,6 @@ class ChainMissing(Missing):
     held_out_days_after: float | None
     separation: Separation
     varies: bool
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What the campaign says besides its probings.
-
-    ``runs`` and ``days`` (R,) are the fold of every run for held-out errors: itself, and its day; ``drivers`` are
-    those that the recorded columns allow; ``strokes`` the ranges of axes in mm or rad that the machine file gives.
-    """
-
-    runs: npt.NDArray[np.int64]
-    days: npt.NDArray[np.int64]
-    drivers: tuple[str, ...]
-    strokes: Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -147,18 +127,6 @@ def _name(candidate: ChainCandidate) -> str:
     return candidate.effect.text if searched else candidate.family
 
 
-def _same_cycle(rival: ChainCandidate, candidate: ChainCandidate) -> bool:
-    """Whether a rival is the search for the pitch, or has all but the order, that a candidate has."""
-    effect, other = candidate.effect, rival.effect
-    if not isinstance(effect, ChainEffect):
-        return False
-    if isinstance(other, ChainEffect) and effect.term == other.term:
-        orders = [part.shape.order for part in (effect, other) if isinstance(part.shape, Harmonic)]
-        if len(orders) == 2 and max(orders) > 3 and abs(orders[0] - orders[1]) < ONE_ORDER:
-            return True
-    return isinstance(effect.shape, Cyclic) and rival.family == f"{effect.term.symbol}:cyclic"
-
-
 def _missing(
     selection: _Selection,
     index: int,
@@ -173,7 +141,8 @@ def _missing(
     amplitude, u = _amplitude(effect, coefficients, covariance)
     p_value, q_value = _p_and_q(selection, finding, candidate)
     before, after = selection.candidates[:index], selection.candidates[: index + 1]
-    rivals = _rivals(selection, index, finding, coefficients)
+    search = RivalSearch(scene, selection.candidates, surroundings.drivers)
+    rivals = search.rivals(index, least_likelihood(finding.evidence), coefficients)
     return ChainMissing(
         rank=index + 1,
         effect=_name(candidate),
@@ -213,52 +182,6 @@ def _p_and_q(
     by_poses = p_value_by_poses(candidate, selection.scene, others, selection.poses)
     q_value = max(q_value, min(1.0, by_poses * q_value / p_value)) if p_value > 0.0 else by_poses
     return max(p_value, by_poses), q_value
-
-
-def _rivals(
-    selection: _Selection, index: int, finding: Finding[ChainCandidate], coefficients: Array
-) -> list[tuple[ChainCandidate, bool]]:
-    """Effects that the data do not rule out, and whether they coincide with the finding; these first."""
-    scene, candidate = selection.scene, selection.candidates[index]
-    others = except_for(selection.candidates, index)
-    basis = orthonormal(scene.columns(others))
-    remainder = without(basis, candidate.columns) @ coefficients
-    least = least_likelihood(finding.evidence)
-    rivals = []
-    for evidence in best_of_families(weigh_beside(scene, _rival_pool(selection, candidate), others)):
-        if evidence.likelihood >= least - GRID_LOSS:
-            best = _at_best_value(selection, index, evidence)
-            if best.likelihood >= least:
-                rivals.append((best.candidate, coincides(basis, best.candidate, remainder[:, None])))
-    return sorted(rivals, key=lambda pair: not pair[1])
-
-
-def _rival_pool(selection: _Selection, candidate: ChainCandidate) -> list[ChainCandidate]:
-    """The candidates that may be rivals: all that were searched, and the effect with each driver."""
-    scene = selection.scene
-    families = {other.family for other in selection.candidates}
-    pool = [
-        rival
-        for rival in scene.candidates
-        if rival.family not in families and np.any(rival.columns) and not _same_cycle(rival, candidate)
-    ]
-    families |= {rival.family for rival in pool}
-    driven = scene_of(scene.fit, with_drivers(candidate.effect, selection.surroundings.drivers))
-    return pool + [
-        rival for rival in driven.candidates if rival.family not in families and np.any(rival.columns)
-    ]
-
-
-def _at_best_value(
-    selection: _Selection, index: int, evidence: Evidence[ChainCandidate]
-) -> Evidence[ChainCandidate]:
-    """Evidence for a rival of the finding at an index with its searched value at its best."""
-    if evidence.candidate.variant.tries == 1:
-        return evidence
-    others = except_for(selection.candidates, index)
-    trial = [*selection.candidates[:index], evidence.candidate, *selection.candidates[index + 1 :]]
-    best = refine(selection.scene, trial, index).candidate
-    return weigh_beside(selection.scene, [best], others)[0]
 
 
 def _rms(scene: ChainScene, candidates: Sequence[ChainCandidate]) -> float:

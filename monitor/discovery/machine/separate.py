@@ -14,14 +14,13 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
+from monitor.discovery.machine.distances import PlanRows, pairs_of, select_poses
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import MachineEffect
-from monitor.discovery.search.candidate import SMALLEST_SHARE
 from monitor.effects import ChainEffect, Context
 from monitor.effects.drivers import Always
 from monitor.exceptions import DataError
 from monitor.machine import Chain, Joint, evaluate, touching_positions
-from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
 
@@ -31,14 +30,8 @@ STEP_RAD = np.pi / 6.0
 QUARTERS, EIGHTHS = 4, 8
 # Effects of a group that are separated from each other, the most convincing ones.
 MOST_EFFECTS = 6
-MOST_POSES = 3
 # Linear axes without a stroke in the machine file may go this much further than they went.
 STRETCH = 1.25
-# A decision with five standard deviations is as good as certain.
-DECIDES = 5.0
-# Poses that bring less than half as much again are not worth the time.
-WORTHWHILE = 1.5
-RIDGE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -139,14 +132,16 @@ def separating_poses(
         return NO_POSES
     new = touches.context(context)
     first = context.run == problem.runs[0]
-    rows_before = _rows(fit, group, np.flatnonzero(first))
-    pairs = _pairs(rows_before, _rows_of_new(fit, new, tip, group), new.run, coefficients)
-    selected, start, reached, alike = _choose(pairs, len(problem.runs))
-    together = tuple((group[first].text, group[second].text) for first, second in alike)
+    present = _rows(fit, group, np.flatnonzero(first))
+    pairs = pairs_of(present, _rows_of_new(fit, new, tip, group), new.run, coefficients)
+    selection = select_poses(pairs, len(problem.runs))
+    together = tuple((group[first].text, group[second].text) for first, second in selection.alike)
     turning = [(index, joint.name) for index, joint in enumerate(context.chain.joints) if joint.turns]
     numbers = np.unique(new.run)
-    poses = tuple({name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selected)
-    return Separation(poses, start, reached, together)
+    poses = tuple(
+        {name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selection.poses
+    )
+    return Separation(poses, selection.before, selection.after, together)
 
 
 def _is_plain(effect: MachineEffect) -> bool:
@@ -191,8 +186,8 @@ def _reachable(
     return inside
 
 
-def _rows(fit: Fit, effects: Sequence[ChainEffect], rows: npt.NDArray[np.int64]) -> tuple[Array, list[Array]]:
-    """Whitened nuisance (N, p) and effect columns (N, k) of the first run, calibrated lengths included."""
+def _rows(fit: Fit, effects: Sequence[ChainEffect], rows: npt.NDArray[np.int64]) -> PlanRows:
+    """Whitened rows (N, p) of the first run, calibrated lengths included."""
     last = fit.solution.last.local[0]
     columns = []
     for effect in effects:
@@ -201,12 +196,11 @@ def _rows(fit: Fit, effects: Sequence[ChainEffect], rows: npt.NDArray[np.int64])
         padded = np.zeros((len(last), white.shape[1]))
         padded[: len(white)] = white
         columns.append(padded)
-    return last, columns
+    return PlanRows(last, columns)
 
 
-def _rows_of_new(
-    fit: Fit, new: Context, tip: Array, effects: Sequence[ChainEffect]
-) -> tuple[Array, list[Array]]:
+def _rows_of_new(fit: Fit, new: Context, tip: Array, effects: Sequence[ChainEffect]) -> PlanRows:
+    """Whitened rows (n, 3, p) of touches at new poses."""
     problem = fit.problem
     names = problem.local_names
     sigma = float(np.mean(problem.sigma[~fit.left_out]))
@@ -224,111 +218,4 @@ def _rows_of_new(
             nuisance[row, axis, names.index(f"ball {target} {'xyz'[axis]}")] = -1.0
     nuisance[:, :, -3:] = pose.by_tip
     columns = [effect.basis(new).displacement(pose.by_error) / sigma for effect in effects]
-    return nuisance / sigma, columns
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """Two effects: products (q, q) of [everything free, the second effect, the first one at its size] over the
-    present plan of one run, and what every pose adds to them (P, q, q)."""
-
-    effects: tuple[int, int]
-    present: Array
-    additions: Array
-
-
-def _pairs(
-    present: tuple[Array, list[Array]],
-    new: tuple[Array, list[Array]],
-    pose: npt.NDArray[np.int64],
-    coefficients: Array,
-) -> list[_Pair]:
-    """All pairs of a group whose first effect has the given coefficients, the others those that mimic it best."""
-    poses = np.unique(pose)
-    wanted = present[1][0] @ coefficients
-    sizes = [coefficients]
-    for columns in present[1][1:]:
-        both = np.concatenate([columns, present[0]], axis=1)
-        scale = np.linalg.norm(both, axis=0)
-        scale[scale == 0] = 1.0
-        mimic = np.linalg.lstsq(both / scale, wanted, rcond=1e-6)[0] / scale
-        sizes.append(mimic[: columns.shape[1]])
-    pairs = []
-    for first in range(len(sizes)):
-        for second in range(first + 1, len(sizes)):
-            at_size, new_at_size = present[1][first] @ sizes[first], new[1][first] @ sizes[first]
-            # What the present plan does not see of the first effect may have any size.
-            unseen = _unseen(present[0], present[1][first])
-            whole = np.concatenate(
-                [present[0], present[1][second], present[1][first] @ unseen, at_size[:, None]], axis=1
-            )
-            fresh = np.concatenate(
-                [new[0], new[1][second], new[1][first] @ unseen, new_at_size[..., None]], axis=-1
-            )
-            scale = np.sqrt(np.sum(whole**2, axis=0) + np.mean(np.sum(fresh**2, axis=1), axis=0))
-            scale[-1] = 1.0
-            scale[scale == 0] = 1.0
-            whole, fresh = whole / scale, fresh / scale
-            each = np.swapaxes(fresh, 1, 2) @ fresh
-            starts = np.searchsorted(pose, poses)
-            pairs.append(_Pair((first, second), whole.T @ whole, np.add.reduceat(each, starts, axis=0)))
-    return pairs
-
-
-def _unseen(nuisance: Array, columns: Array) -> Array:
-    """Directions (k, u) of an effect's coefficients of which the nuisance leaves nothing."""
-    scale = np.linalg.norm(nuisance, axis=0)
-    basis, values, _ = np.linalg.svd(nuisance / np.where(scale == 0, 1.0, scale), full_matrices=False)
-    basis = basis[:, values > RANK_TOLERANCE * values.max(initial=0.0)]
-    remainder = columns - basis @ (basis.T @ columns)
-    size = max(float(np.linalg.norm(columns, axis=0).max(initial=0.0)), 1e-300)
-    values, directions = np.linalg.eigh(remainder.T @ remainder / size**2)
-    hidden: Array = directions[:, values <= SMALLEST_SHARE**2]
-    return hidden
-
-
-def _choose(pairs: Sequence[_Pair], runs: int) -> tuple[list[int], float, float, tuple[tuple[int, int], ...]]:
-    """Indices of the selected poses, standard deviations between the closest pair before and after, pairs that no pose
-    separates."""
-
-    def apart(grams: Array) -> Array:
-        return np.sqrt(runs * _remainder(grams))
-
-    alike, open_pairs = [], []
-    for pair in pairs:
-        before = float(apart(pair.present[None])[0])
-        best = float(apart((pair.present + pair.additions.sum(axis=0))[None])[0])
-        if before > DECIDES:
-            continue
-        if best < DECIDES or best < WORTHWHILE * before:
-            alike.append(pair.effects)
-        else:
-            open_pairs.append(pair)
-    if not open_pairs:
-        return [], 0.0, 0.0, tuple(alike)
-    grams = [pair.present for pair in open_pairs]
-    start = min(float(apart(gram[None])[0]) for gram in grams)
-    picked: list[int] = []
-    reached = start
-    for _ in range(MOST_POSES):
-        each = [apart(gram + pair.additions) for gram, pair in zip(grams, open_pairs, strict=True)]
-        # The pair that is closest counts; what lies far enough apart already does not.
-        worst = np.min(np.minimum(each, 2.0 * DECIDES), axis=0)
-        best_pose = int((worst + 1e-9 * np.sum(np.minimum(each, 1e3 * DECIDES), axis=0)).argmax())
-        picked.append(best_pose)
-        grams = [gram + pair.additions[best_pose] for gram, pair in zip(grams, open_pairs, strict=True)]
-        reached = min(float(distances[best_pose]) for distances in each)
-        if reached > 2.0 * DECIDES:
-            break
-    if reached < DECIDES or reached < WORTHWHILE * start:
-        return [], start, reached, tuple(alike)
-    return picked, start, reached, tuple(alike)
-
-
-def _remainder(grams: Array) -> Array:
-    """What of the last column the others cannot do, squared, for every Gram matrix (P, q, q)."""
-    inner = grams[:, :-1, :-1] + RIDGE * np.eye(grams.shape[-1] - 1)
-    onto = grams[:, :-1, -1:]
-    solved = np.linalg.solve(inner, onto)
-    remainder: Array = np.maximum(grams[:, -1, -1] - np.einsum("pij,pij->p", onto, solved), 0.0)
-    return remainder
+    return PlanRows(nuisance / sigma, columns)
