@@ -12,10 +12,9 @@ import numpy as np
 from monitor.discovery.curve.candidates import at_best_value
 from monitor.discovery.curve.catalogue import POWERS
 from monitor.discovery.curve.noise_evidence import HALF, NoiseEvidence
-from monitor.discovery.curve.periods import SeparablePeriods
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene, orthonormal_to_full_precision
 from monitor.discovery.search.acceptance import Acceptance, lowers_held_out_error
-from monitor.discovery.search.evidence import Pool, weigh_beside
+from monitor.discovery.search.evidence import Evidence, Pool, weigh_beside
 from monitor.discovery.search.projection import without
 from monitor.discovery.search.scene import family_count
 from monitor.effects.curve import SEARCHED, CurveEffect
@@ -23,6 +22,8 @@ from monitor.records import Array
 
 #: Fewer cycles than these over the range of an input can be a bend.
 MOST_BENDS = 2.0
+#: Two periods of one input are separated from a whole cycle over its range on (Rayleigh's criterion).
+APART = 1.0
 #: An effect that stands out of the noise by itself has to be likelier than noise alone at this level too.
 AGAINST_NOISE = 0.05
 #: Effects that are asked together whether they, rather than noise, make neighbours resemble each other.
@@ -45,7 +46,6 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         self.families = family_count(scene)
         self.evidence = NoiseEvidence(scene)
         self.doubts: dict[str, float] = {}
-        self._periods = SeparablePeriods(scene.curve.problem)
 
     def accepts(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
         """Whether an effect stands in noise, beside a line too, and lowers Schwarz's criterion and the held-out
@@ -61,9 +61,24 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         """The selected candidate at an index with its period or constant at the best value."""
         return at_best_value(self.scene, selected, index)
 
-    def separable(self, selected: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
-        """Whether a period lies far enough from those of the model and of the selected candidates."""
-        return self._periods.includes(selected, candidate)
+    def separable(
+        self, selected: Sequence[CurveCandidate], weighed: list[Evidence[CurveCandidate]]
+    ) -> list[Evidence[CurveCandidate]]:
+        """Evidence for candidates whose period, if any, lies far enough from those in the model and selected."""
+        problem = self.scene.curve.problem
+        least = {name: APART / float(np.ptp(values)) for name, values in problem.inputs.numbers.items()}
+        rates: dict[str, list[float]] = {name: [] for name in least}
+        for effect in (*problem.effects, *(candidate.effect for candidate in selected)):
+            if effect.shape == "sin" and effect.value:
+                rates[effect.column].append(1.0 / effect.value)
+
+        def is_apart(effect: CurveEffect) -> bool:
+            if effect.shape != "sin" or not effect.value:
+                return True
+            rate = 1.0 / effect.value
+            return all(abs(other - rate) >= least[effect.column] for other in rates[effect.column])
+
+        return [evidence for evidence in weighed if is_apart(evidence.candidate.effect)]
 
     def outdoes(self, selected: Sequence[CurveCandidate], rival: CurveCandidate) -> bool:
         """Whether a rival still says something beside the selected ones, noise allowed for."""
@@ -125,13 +140,17 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         """The most convincing cycle of an input beside the selected candidates, at its best period."""
         families = {candidate.family for candidate in selected}
         weighed = weigh_beside(self.scene, self._pool, selected)
+        cycles = [
+            evidence
+            for evidence in self.separable(selected, weighed)
+            if _is_cycle(evidence.candidate, column)
+            and (evidence.candidate.effect.free or evidence.candidate.family not in families)
+        ]
+        if not cycles:
+            return None
         # What explains most, whatever its price: the price is paid for all together.
-        for evidence in sorted(weighed, key=lambda evidence: -evidence.explained):
-            candidate = evidence.candidate
-            repeated = candidate.family in families and not candidate.effect.free
-            if _is_cycle(candidate, column) and not repeated and self.separable(selected, candidate):
-                return self.at_best_value([*selected, candidate], len(selected))
-        return None
+        best = max(cycles, key=lambda evidence: evidence.explained).candidate
+        return self.at_best_value([*selected, best], len(selected))
 
     @cached_property
     def _pool(self) -> Pool[CurveCandidate]:

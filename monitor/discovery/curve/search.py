@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from monitor.discovery.curve.acceptance import CurveAcceptance
 from monitor.discovery.curve.candidates import scene_of
 from monitor.discovery.curve.outliers import Outlier, outliers
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene, whitened_curve
-from monitor.discovery.search.scan import Finding, ScanResult, except_for, scan
+from monitor.discovery.search.scan import Finding, ScanResult, except_for, reduced, scan
 from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.statistics.noise import Noise
@@ -33,38 +33,33 @@ class SearchRound:
 
     def alone(self) -> SearchRound:
         """The round with those findings only that stand out from correlated noise by themselves."""
-        findings = list(self.result.findings)
-        while findings:
-            weakest, others, candidate = _weakest(self.acceptance, findings)
-            if self.acceptance.stands_alone(others, candidate):
-                break
-            findings.pop(weakest)
-        if len(findings) == len(self.result.findings):
-            return self
-        return replace(
-            self,
-            result=replace(self.result, findings=tuple(findings)),
-            under=_fit_with(self.scene.curve.fit, findings),
+        result = reduced(
+            self.result, lambda findings: _weakest(self.acceptance, findings, self.acceptance.stands_alone)
         )
+        if len(result.findings) == len(self.result.findings):
+            return self
+        return replace(self, result=result, under=_fit_with(self.scene.curve.fit, result.candidates))
 
 
-def _fit_with(base: CurveFit, findings: Sequence[Finding[CurveCandidate]]) -> CurveFit:
-    """A fit with the findings in its model."""
-    effects = [finding.candidate.effect for finding in findings]
+def _fit_with(base: CurveFit, candidates: Sequence[CurveCandidate]) -> CurveFit:
+    """A fit with candidates in its model."""
+    effects = [candidate.effect for candidate in candidates]
     return fit(base.settled.with_effects(effects)) if effects else base
 
 
 def _weakest(
-    acceptance: CurveAcceptance, findings: Sequence[Finding[CurveCandidate]]
-) -> tuple[int, list[CurveCandidate], CurveCandidate]:
-    """Index of the finding that stands out least from correlated noise beside the others, the others, and itself."""
+    acceptance: CurveAcceptance,
+    findings: Sequence[Finding[CurveCandidate]],
+    stands: Callable[[Sequence[CurveCandidate], CurveCandidate], bool],
+) -> int | None:
+    """Index of the finding that stands out least from correlated noise beside the others; None where it ``stands``."""
     candidates = [finding.candidate for finding in findings]
     p_values = [
         acceptance.evidence.p_value(except_for(candidates, index), candidate)
         for index, candidate in enumerate(candidates)
     ]
     weakest = int(np.argmax(p_values))
-    return weakest, except_for(candidates, weakest), candidates[weakest]
+    return None if stands(except_for(candidates, weakest), candidates[weakest]) else weakest
 
 
 class CurveSearch:
@@ -87,11 +82,11 @@ class CurveSearch:
     def _round(self, suspect: Sequence[Outlier], most: int) -> SearchRound:
         """One scan, and the model with its findings."""
         acceptance = self._rules_without(suspect)
-        result = scan(acceptance.scene, acceptance, rate=self.rate, most=most)
-        findings = _standing(acceptance, result.findings)
-        under = _fit_with(acceptance.scene.curve.fit, findings)
-        standing = replace(result, findings=tuple(findings))
-        return SearchRound(acceptance.scene, acceptance, standing, under, len(result.findings))
+        scanned = scan(acceptance.scene, acceptance, rate=self.rate, most=most)
+        # What still stands with all the others in the model: the weakest is asked first.
+        result = reduced(scanned, lambda findings: _weakest(acceptance, findings, acceptance.stands))
+        under = _fit_with(acceptance.scene.curve.fit, result.candidates)
+        return SearchRound(acceptance.scene, acceptance, result, under, len(scanned.findings))
 
     def exhausted(self, suspect: tuple[Outlier, ...], most: int) -> tuple[SearchRound, tuple[Outlier, ...]]:
         """One effect after the other, until nothing stands: readings that look like outliers are judged under the most
@@ -115,16 +110,3 @@ class CurveSearch:
                 break
             short = (latest, suspect) if standing < count else None
         return latest, suspect
-
-
-def _standing(
-    acceptance: CurveAcceptance, findings: Sequence[Finding[CurveCandidate]]
-) -> list[Finding[CurveCandidate]]:
-    """Findings that still stand in correlated noise with all the others in the model: the weakest is asked first."""
-    remaining = list(findings)
-    while remaining:
-        weakest, others, candidate = _weakest(acceptance, remaining)
-        if acceptance.stands(others, candidate):
-            break
-        remaining.pop(weakest)
-    return remaining

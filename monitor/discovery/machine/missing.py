@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.missing import Missing, Rival
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import least_likelihood
-from monitor.discovery.search.scan import Finding
+from monitor.discovery.search.scan import Finding, reduced
 from monitor.effects.drivers import EachRun
 from monitor.effects.words import describe
 from monitor.records import Array
@@ -94,19 +94,20 @@ def standing_out(scene: ChainScene, result: ChainScan) -> ChainScan:
     Two effects that can hardly be separated may each stand the scan and be fitted with sizes that cancel; the
     weaker one is taken out, and the other's size is determined again.
     """
-    findings = list(result.findings)
-    while findings:
-        candidates = [finding.candidate for finding in findings]
-        sizes = amplitudes(scene, candidates)
-        ratios = []
-        for candidate, part in zip(candidates, _parts(candidates), strict=True):
-            size, u = _amplitude(candidate.effect, sizes.estimate[part], sizes.covariance[part, part])
-            ratios.append(abs(size) / u if u > 0 else np.inf)
-        weak = [index for index, ratio in enumerate(ratios) if ratio < SMALLEST_RATIO]
-        if not weak:
-            break
-        del findings[max(weak, key=lambda index: -findings[index].evidence.score)]
-    return replace(result, findings=tuple(findings))
+    return reduced(result, lambda findings: _too_small(scene, findings))
+
+
+def _too_small(scene: ChainScene, findings: Sequence[Finding[ChainCandidate]]) -> int | None:
+    """Index of the least convincing finding that is no larger than its uncertainty allows; None where all are."""
+    candidates = [finding.candidate for finding in findings]
+    sizes = amplitudes(scene, candidates)
+    weak = []
+    for index, part in enumerate(_parts(candidates)):
+        effect = candidates[index].effect
+        size, u = _amplitude(effect, sizes.estimate[part], sizes.covariance[part, part])
+        if u > 0 and abs(size) / u < SMALLEST_RATIO:
+            weak.append(index)
+    return max(weak, key=lambda index: -findings[index].evidence.score, default=None)
 
 
 def _amplitude(effect: MachineEffect, coefficients: Array, covariance: Array) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from typing import Generic
 import numpy as np
 
 from monitor.discovery.search.candidate import Candidate
+from monitor.discovery.search.evidence import Evidence
 from monitor.discovery.search.scene import CandidateT, Scene
 
 
@@ -27,9 +28,11 @@ class Acceptance(Generic[CandidateT]):
         misses is not mistaken for another effect."""
         return selected[index]
 
-    def separable(self, selected: Sequence[CandidateT], candidate: CandidateT) -> bool:
-        """Whether the data can separate a candidate from the selected ones (a period from another close to it)."""
-        return True
+    def separable(
+        self, selected: Sequence[CandidateT], weighed: list[Evidence[CandidateT]]
+    ) -> list[Evidence[CandidateT]]:
+        """Evidence for those candidates that the data can separate from the selected ones (a period from another)."""
+        return weighed
 
     def outdoes(self, selected: Sequence[CandidateT], rival: CandidateT) -> bool:
         """Whether a rival with better evidence may replace one of the selected candidates."""

@@ -7,8 +7,8 @@ candidate would do better: a mimic selected early is exchanged. The scan ends wh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Generic
 
@@ -114,11 +114,7 @@ class _Steps(Generic[CandidateT]):
 
     def weighed(self, pool: Pool[CandidateT], selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
         """Evidence for the candidates of a pool that can be separated from the selected ones, given these."""
-        return [
-            evidence
-            for evidence in weigh_beside(self.scene, pool, selected)
-            if self.rules.separable(selected, evidence.candidate)
-        ]
+        return self.rules.separable(selected, weigh_beside(self.scene, pool, selected))
 
     def best(
         self, weighed: Sequence[Evidence[CandidateT]], selected: Sequence[CandidateT], rate: float
@@ -184,6 +180,16 @@ class _Steps(Generic[CandidateT]):
         # The smallest of m p-values times m bounds its q-value from above, whatever their dependence.
         rivals = sorted([evidence, *others], key=lambda rival: -rival.score)
         return Finding(evidence, min(1.0, evidence.p_value * families), tuple(rivals))
+
+
+def reduced(
+    result: ScanResult[CandidateT], weakest: Callable[[Sequence[Finding[CandidateT]]], int | None]
+) -> ScanResult[CandidateT]:
+    """Take out the ``weakest`` finding (its index), one after the other, until none is too weak."""
+    findings = list(result.findings)
+    while findings and (index := weakest(findings)) is not None:
+        del findings[index]
+    return replace(result, findings=tuple(findings))
 
 
 def except_for(selected: Sequence[CandidateT], index: int) -> list[CandidateT]:
