@@ -46,7 +46,14 @@ from monitor.store.identifications import (
     save_identification,
 )
 from monitor.store.import_notes import campaign_notes, run_fingerprints
-from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
+from monitor.store.models import (
+    StoredModel,
+    last_used_campaign,
+    list_models,
+    load_model,
+    model_history,
+    save_model,
+)
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
@@ -83,6 +90,7 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "last_used_campaign",
     "latest_documents",
     "latest_tolerances",
     "list_analyses",
