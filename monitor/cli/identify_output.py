@@ -29,7 +29,7 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
         f"{answer.campaign}, model {answer.model}{before}",
         ["parameter", "unit", *(f"run {run.run}" for run in shown), "u"],
         [*_rows(shown), ["RMS", "µm", *(f"{run.rms_um:.2f}" for run in shown), ""]],
-        left=2,
+        text_columns=2,
     )
     notes = [run.note for run in shown if run.note]
     if notes:
@@ -101,7 +101,7 @@ def stepwise(answer: StepwiseAnswer) -> None:
         f"{answer.campaign}, run {answer.run}: step by step and all at once",
         ["parameter", "unit", "stepwise", "u", "at once", "u", "by method", "", "what tells them apart"],
         rows,
-        left=2,
+        text_columns=2,
     )
     output.say(
         "by method: what of the difference remains without noise; 'differs': the rest exceeds 2 u of it"

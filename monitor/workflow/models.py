@@ -7,13 +7,12 @@ A model is the complete set of base effects of the method (free in every run) an
 from __future__ import annotations
 
 from monitor.exceptions import InputError, NotFoundError
-from monitor.methods import METHODS
-from monitor.methods.curve.problem import NAME as CURVE
+from monitor.methods import methods
 from monitor.methods.model import Model
 from monitor.store import Database, StoredModel, list_models, load_model, save_model
 
 
-def resolve(db: Database, name: str | None, method: str = "samba") -> StoredModel:
+def resolve(db: Database, name: str | None, method: str = "") -> StoredModel:
     """The stored model of a name, ``NAME`` (its latest version) or ``NAME@VERSION``; the method's own by default."""
     model, _, version = (name or method).partition("@")
     if version and not version.isdigit():
@@ -21,14 +20,13 @@ def resolve(db: Database, name: str | None, method: str = "samba") -> StoredMode
     try:
         return load_model(db, model, int(version) if version else None)
     except NotFoundError as error:
-        methods = (*METHODS, CURVE)
-        if model in methods and not version.strip("1"):
+        if model in methods() and not version.strip("1"):
             # The method's own model needs nobody to make it.
             return save_model(db, model, (), note="the method's own model")
         if list_models(db).empty:
-            if model in methods:
+            if model in methods():
                 raise NotFoundError(f"model '{model}' has no version {version}; it has 1") from error
-            raise NotFoundError(f"there is no model '{model}'; there are {', '.join(methods)}") from error
+            raise NotFoundError(f"there is no model '{model}'; there are {', '.join(methods())}") from error
         raise
 
 

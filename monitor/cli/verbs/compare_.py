@@ -9,7 +9,6 @@ from pathlib import Path
 from monitor.cli import output, residual_output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachinePart
 from monitor.workflow.explain.request import CompareRequest
@@ -36,7 +35,7 @@ def run(options: Namespace) -> int:
     with opened(options) as db, output.working("comparing"), db.transaction():
         answer = compare(db, request)
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0
     residual_output.summary(answer.comparison)
     _breakdown(answer)

@@ -8,7 +8,6 @@ from pathlib import Path
 from monitor.cli import explain_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.request import RATE, ExplainRequest
 
@@ -32,7 +31,7 @@ def run(options: Namespace) -> int:
     with opened(options) as db, output.working("searching"), db.transaction():
         answer = explain(db, ExplainRequest(options.campaign, options.model, options.rate, options.figures))
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
     else:
         explain_output.show(answer)
     return 0

@@ -7,8 +7,8 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import identify_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.exceptions import InputError
+from monitor.workflow.identify.answer import IdentificationsAnswer
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest, StepwiseRequest
 from monitor.workflow.identify.stepwise import identify_stepwise
@@ -42,8 +42,7 @@ def run(options: Namespace) -> int:
             for campaign in campaigns.chosen(db, options.campaign)
         ]
     if options.json:
-        documents = [to_document(answer) for answer in answers]
-        output.document(documents[0] if options.campaign is not None else {"identifications": documents})
+        output.document(answers[0] if options.campaign is not None else IdentificationsAnswer(tuple(answers)))
         return 0
     for answer in answers:
         identify_output.show(answer)
@@ -56,7 +55,7 @@ def _stepwise(options: Namespace) -> int:
     with opened(options) as db, output.working("identifying step by step"):
         answer = identify_stepwise(db, StepwiseRequest(options.campaign, options.model, options.number))
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
     else:
         identify_output.stepwise(answer)
     return 0

@@ -10,7 +10,6 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common, told
 from monitor.cli.residual_output import files, four_digits
-from monitor.documents import to_document
 from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.versions import CurveVersion, MachineVersion, history
 from monitor.workflow.model.answer import ChangeModelAnswer
@@ -59,7 +58,7 @@ def _list(options: Namespace) -> int:
     with opened(options) as db:
         answer = list_all_models(db)
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0
     rows = [
         [
@@ -70,7 +69,7 @@ def _list(options: Namespace) -> int:
         ]
         for model in answer.models
     ]
-    output.table("", ["model", "parent", "effects added to the base", "note"], rows, left=4)
+    output.table("", ["model", "parent", "effects added to the base", "note"], rows, text_columns=4)
     return 0
 
 
@@ -78,7 +77,7 @@ def _show(options: Namespace) -> int:
     with opened(options) as db:
         answer = show_model(db, ShowModelRequest(options.name))
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0
     version = answer.version
     output.say(version.model + (f", from {version.parent}" if version.parent else ""))
@@ -106,7 +105,7 @@ def _remove(options: Namespace) -> int:
 
 def _changed(answer: ChangeModelAnswer, as_json: bool) -> int:
     if as_json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0
     version = answer.model.version
     output.say(f"model {version.model} now has: {', '.join(version.effects) or 'the base effects alone'}")
@@ -123,7 +122,7 @@ def _history(options: Namespace) -> int:
     with opened(options) as db, output.working("fitting every version"):
         answer = history(db, HistoryRequest(options.name, options.campaign, options.figures))
     if options.json:
-        output.document(to_document(answer)["steps"])
+        output.document(answer.steps)
         return 0
     _steps(answer.steps)
     files(answer.figures)
@@ -146,7 +145,7 @@ def _steps(steps: Sequence[MachineVersion | CurveVersion]) -> None:
         f"on campaign {steps[0].campaign}",
         [*columns, "BIC"] if curve else columns,
         [_step(step) for step in steps],
-        left=2,
+        text_columns=2,
     )
 
 

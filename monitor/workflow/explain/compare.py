@@ -9,7 +9,7 @@ from monitor.discovery import Fit
 from monitor.discovery import compare as compare_fit
 from monitor.discovery.curve.compare import compare_curve
 from monitor.documents import to_document
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.store import Database, save_analysis
 from monitor.workflow.explain.compare_answer import CompareAnswer
 from monitor.workflow.explain.curve_answer import curve_comparison

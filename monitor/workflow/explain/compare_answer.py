@@ -8,18 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 
+from monitor.discovery import Verdict
 from monitor.documents import INLINED, OMITTED
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.answer import CurveNoise
-
-
-class Verdict(Enum):
-    """What a comparison says of a model."""
-
-    EXPLAINED = "explained"
-    SOMETHING_IS_MISSING = "something is missing"
 
 
 @dataclass(frozen=True)

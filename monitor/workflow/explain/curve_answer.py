@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,21 +11,23 @@ from monitor.discovery.curve.compare import compare_curve
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.discovery.curve.missing import CurveMissing as Missing
 from monitor.discovery.curve.quality import bic
-from monitor.discovery.machine.compare import Part
-from monitor.effects.curve import SEARCHED, CurveEffect
-from monitor.methods.curve.problem import NAME
+from monitor.discovery.search.comparison import Part
 from monitor.records import CurveCampaign
-from monitor.workflow.explain.compare_answer import CurveComparison, CurvePart, Verdict
+from monitor.workflow.explain.compare_answer import CurveComparison, CurvePart
 from monitor.workflow.explain.curve_sentences import curve_sentences
 from monitor.workflow.explain.explain_answer import (
     BadRow,
     CurveMissing,
     ExplainAnswer,
-    SearchedValue,
 )
-from monitor.workflow.explain.machine_answer import lack_of_fit_test
-from monitor.workflow.identify.answer import Estimate
-from monitor.workflow.identify.curve import curve_noise, in_micrometres, input_unit, response_unit
+from monitor.workflow.explain.shared_answer import (
+    coefficients,
+    coinciding,
+    lack_of_fit_test,
+    rivals,
+    searched_value,
+)
+from monitor.workflow.identify.curve import curve_noise, in_micrometres, response_unit
 
 
 def _part(curve: CurveCampaign, part: Part) -> CurvePart:
@@ -47,7 +48,7 @@ def curve_comparison(comparison: Comparison, model: str) -> CurveComparison:
     return CurveComparison(
         campaign=curve.name,
         model=model,
-        method=NAME,
+        method=curve.method,
         base=curve.base,
         response=curve.response,
         unit=response_unit(curve),
@@ -69,7 +70,7 @@ def curve_comparison(comparison: Comparison, model: str) -> CurveComparison:
         lack_of_fit=lack_of_fit_test(comparison.lack_of_fit),
         excess_over_statement_p=comparison.excess_p_value,
         autocorrelation=curve_noise(comparison.noise, fit),
-        verdict=Verdict(comparison.verdict),
+        verdict=comparison.verdict,
         by={
             column: {name: _part(curve, part) for name, part in parts.items()}
             for column, parts in comparison.by.items()
@@ -77,10 +78,10 @@ def curve_comparison(comparison: Comparison, model: str) -> CurveComparison:
     )
 
 
-def _curve_missing(curve: CurveCampaign, rank: int, effect: Missing) -> CurveMissing:
+def _curve_missing(curve: CurveCampaign, effect: Missing) -> CurveMissing:
     return CurveMissing(
-        rank=rank,
-        effect=effect.written,
+        rank=effect.rank,
+        effect=effect.effect,
         certain=effect.certain,
         noise_alone_p=effect.noise_alone,
         meaning=effect.words.meaning,
@@ -88,9 +89,9 @@ def _curve_missing(curve: CurveCampaign, rank: int, effect: Missing) -> CurveMis
         remedy=effect.words.remedy,
         described_in=effect.words.described_in,
         amplitude=effect.amplitude,
-        u=effect.u_amplitude,
-        unit=effect.units[0],
-        coefficients=_coefficients(effect),
+        u=effect.u,
+        unit=effect.units[0].name,
+        coefficients=coefficients(effect),
         peak_um=in_micrometres(curve, effect.peak),
         peak=effect.peak,
         p_value=effect.p_value,
@@ -105,32 +106,11 @@ def _curve_missing(curve: CurveCampaign, rank: int, effect: Missing) -> CurveMis
         heldout_after=effect.held_out_after,
         bic_before=effect.bic_before,
         bic_after=effect.bic_after,
-        indistinguishable_from=tuple(name for name, _ in effect.rivals),
-        coinciding=tuple(name for name, coincides in effect.rivals if coincides),
+        indistinguishable_from=rivals(effect),
+        coinciding=coinciding(effect),
         tell_apart_by=(),
         varies_from_run_to_run=False,
-        searched=_searched(curve, effect.effect, effect.u_value),
-    )
-
-
-def _coefficients(effect: Missing) -> Mapping[str, Estimate]:
-    rows = zip(effect.names, effect.coefficients, effect.u, effect.units, strict=True)
-    return {name: Estimate(float(value), float(u), unit) for name, value, u, unit in rows}
-
-
-def _searched(curve: CurveCampaign, effect: CurveEffect, u: float | None) -> SearchedValue | None:
-    """The value that was searched for in the data, or the period of the calendar that an effect has."""
-    cycle = effect.shape == "sin"
-    if effect.value is None or not (effect.free or cycle):
-        return None
-    if not effect.free:
-        return SearchedValue(SEARCHED["sin"], effect.value, None, curve.units.get(effect.column, "") or "1")
-    return SearchedValue(
-        SEARCHED[effect.shape],
-        effect.value,
-        u,
-        input_unit(curve, effect.column),
-        1.0 / effect.value if cycle else None,
+        searched=searched_value(effect),
     )
 
 
@@ -140,11 +120,9 @@ def curve_explain_answer(explanation: CurveExplanation, model: str) -> ExplainAn
     comparison = curve_comparison(compare_curve(explanation.first, lacks=bool(explanation.missing)), model)
     if explanation.suspect and not explanation.missing:
         # An outlier is named as such: the verdict is the one without it.
-        verdict = Verdict(compare_curve(explanation.final, lacks=False).verdict)
+        verdict = compare_curve(explanation.final, lacks=False).verdict
         comparison = replace(comparison, verdict=verdict)
-    missing = tuple(
-        _curve_missing(curve, rank, effect) for rank, effect in enumerate(explanation.missing, start=1)
-    )
+    missing = tuple(_curve_missing(curve, effect) for effect in explanation.missing)
     suspect_data = tuple(
         BadRow(
             run=1,

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from monitor.discovery import Verdict
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.methods.curve.problem import problem_of
 from monitor.records import CurveCampaign
-from monitor.workflow.explain.compare_answer import CurveComparison, Verdict
+from monitor.workflow.explain.compare_answer import CurveComparison
 from monitor.workflow.explain.explain_answer import CurveMissing
 from monitor.workflow.identify.answer import CurveNoise
 

@@ -8,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from monitor.discovery import Explanation, Fit, find_mistakes, fit, is_gross
+from monitor.discovery import Explanation, Fit, Verdict, find_mistakes, fit, is_gross
 from monitor.discovery import compare as compare_fit
 from monitor.discovery import explain as search
 from monitor.discovery.curve.explain import CurveExplanation, explain_curve
-from monitor.discovery.machine.compare import SOMETHING_IS_MISSING
 from monitor.documents import to_document
 from monitor.exceptions import DataError
-from monitor.methods.curve.problem import problem_of as curve_problem_of
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -24,8 +22,8 @@ from monitor.workflow.explain.explain_answer import ExplainAnswer
 from monitor.workflow.explain.machine_answer import explain_answer
 from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sentence
 from monitor.workflow.explain.request import RATE, ExplainRequest
-from monitor.workflow.identify.fitting import load_measured, machine_problem
-from monitor.workflow.models import as_model, label, resolve
+from monitor.workflow.identify.fitting import curve_problem, load_measured, machine_problem
+from monitor.workflow.models import label, resolve
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.
 SEED = 20260302
@@ -47,11 +45,13 @@ def explanation_of(campaign: Campaign, model: StoredModel, first: Fit, rate: flo
     """Which physical effect a model lacks, or what looks wrong in the file; ``first`` is its fit to the campaign."""
     mistakes = (
         find_mistakes(campaign, lambda changed: machine_problem(changed, model), first)
-        if is_gross(first)
+        if is_gross(campaign, first)
         else ()
     )
     if mistakes:
-        comparison = replace(compare_fit(first, campaign.name, label(model)), verdict=SOMETHING_IS_MISSING)
+        comparison = replace(
+            compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING
+        )
         return Explanation(comparison, (), (), (), (), (), (), first, mistakes)
     rng = np.random.default_rng(SEED)
     explanation = search(campaign, first.problem, label(model), rate=rate, rng=rng, first=first)
@@ -69,7 +69,7 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
     measured = load_measured(db, request.campaign)
     model = resolve(db, request.model, measured.method)
     if isinstance(measured, CurveCampaign):
-        curve = explain_curve(curve_problem_of(measured, as_model(model)), rate=request.rate)
+        curve = explain_curve(curve_problem(measured, model), rate=request.rate)
         answer = curve_explain_answer(curve, label(model))
         save_explanation(db, answer, measured.method, model)
         return _with_figures(answer, curve, None, request.figures)

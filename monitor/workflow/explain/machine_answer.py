@@ -6,11 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from monitor.discovery import Comparison, Explanation, Missing
-from monitor.discovery.machine.compare import LackOfFit
+from monitor.discovery import ChainComparison, ChainMissing, Explanation, Verdict
 from monitor.discovery.machine.steps import Step
 from monitor.units import DEGREE, MICROMETRE, Unit
-from monitor.workflow.explain.compare_answer import LackOfFitTest, MachineComparison, MachinePart, Verdict
+from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
     ChangedParameter,
@@ -22,11 +21,16 @@ from monitor.workflow.explain.explain_answer import (
     MachineMissing,
     MovedTarget,
     Pictures,
-    SearchedValue,
 )
 from monitor.workflow.explain.machine_sentences import ONE_RUN, machine_sentences
 from monitor.workflow.explain.residuals_against import pictures_of
-from monitor.workflow.identify.answer import Estimate
+from monitor.workflow.explain.shared_answer import (
+    coefficients,
+    coinciding,
+    lack_of_fit_test,
+    rivals,
+    searched_value,
+)
 
 
 def micrometres(length: float | None) -> float | None:
@@ -34,14 +38,7 @@ def micrometres(length: float | None) -> float | None:
     return None if length is None else MICROMETRE.to_display(length)
 
 
-def lack_of_fit_test(test: LackOfFit | None) -> LackOfFitTest:
-    """The test of lack of fit, empty where it could not be made."""
-    if test is None:
-        return LackOfFitTest()
-    return LackOfFitTest(test.f, test.p_value, test.degrees_of_freedom, test.pure_error_degrees_of_freedom)
-
-
-def machine_comparison(comparison: Comparison, verdict: Verdict | None = None) -> MachineComparison:
+def machine_comparison(comparison: ChainComparison, verdict: Verdict | None = None) -> MachineComparison:
     """The comparison of a machine in micrometres, with another ``verdict`` where one is named."""
     um = MICROMETRE.to_display
     return MachineComparison(
@@ -55,7 +52,7 @@ def machine_comparison(comparison: Comparison, verdict: Verdict | None = None) -
         stated_uncertainty_um=um(comparison.stated_uncertainty),
         lack_of_fit=lack_of_fit_test(comparison.lack_of_fit),
         excess_over_statement_p=comparison.excess_p_value,
-        verdict=verdict or Verdict(comparison.verdict),
+        verdict=verdict or comparison.verdict,
         by={
             kind: {
                 name: MachinePart(um(part.rms), um(part.largest), part.count) for name, part in parts.items()
@@ -65,9 +62,8 @@ def machine_comparison(comparison: Comparison, verdict: Verdict | None = None) -
     )
 
 
-def _machine_missing(effect: Missing) -> MachineMissing:
-    unit, um = Unit(effect.unit_name, effect.unit_factor), MICROMETRE.to_display
-    uncertainties = np.sqrt(np.diag(effect.covariance))
+def _machine_missing(effect: ChainMissing) -> MachineMissing:
+    unit, um = effect.units[0], MICROMETRE.to_display
     return MachineMissing(
         rank=effect.rank,
         effect=effect.effect,
@@ -78,10 +74,7 @@ def _machine_missing(effect: Missing) -> MachineMissing:
         amplitude=unit.to_display(effect.amplitude),
         u=unit.to_display(effect.u),
         unit=unit.name,
-        coefficients={
-            name: Estimate(unit.to_display(float(estimate)), unit.to_display(float(u)), unit.name)
-            for name, estimate, u in zip(effect.parameters, effect.coefficients, uncertainties, strict=True)
-        },
+        coefficients=coefficients(effect),
         peak_um=um(effect.peak),
         p_value=effect.p_value,
         q_value=effect.q_value,
@@ -91,24 +84,16 @@ def _machine_missing(effect: Missing) -> MachineMissing:
         heldout_after_um=micrometres(effect.held_out_after),
         heldout_days_before_um=micrometres(effect.held_out_days_before),
         heldout_days_after_um=micrometres(effect.held_out_days_after),
-        indistinguishable_from=tuple(rival.effect for rival in effect.rivals),
-        coinciding=tuple(rival.effect for rival in effect.rivals if rival.coincides),
+        indistinguishable_from=rivals(effect),
+        coinciding=coinciding(effect),
         tell_apart_by=tuple(
             {f"{axis.lower()}_deg": round(DEGREE.to_display(angle), 6) for axis, angle in pose.items()}
             for pose in effect.separation.poses
         ),
         standard_deviations_apart=DeviationsApart(effect.separation.now, effect.separation.then),
         varies_from_run_to_run=effect.varies,
-        searched=_searched(effect),
+        searched=searched_value(effect),
     )
-
-
-def _searched(effect: Missing) -> SearchedValue | None:
-    searched = effect.searched
-    if searched is None:
-        return None
-    u = searched.u if np.isfinite(searched.u) else None
-    return SearchedValue(searched.name, searched.value, u, searched.unit)
 
 
 def _step(step: Step, units: Mapping[str, Unit]) -> ChangedTarget | ChangedParameter:

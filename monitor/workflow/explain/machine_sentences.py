@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from monitor.discovery import Explanation, Mistake
+from monitor.discovery import Explanation, Mistake, Verdict
 from monitor.units import MICROMETRE
-from monitor.workflow.explain.compare_answer import Verdict
 from monitor.workflow.explain.explain_answer import (
     ChangedParameter,
     ChangedTarget,

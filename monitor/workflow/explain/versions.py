@@ -13,8 +13,7 @@ from monitor.documents import OMITTED, to_document
 from monitor.exceptions import NotFoundError
 from monitor.methods.chain.identification import Refusal
 from monitor.methods.chain.shared_effects import shared_parameters
-from monitor.methods.curve.method import CurveFit
-from monitor.methods.curve.problem import NAME
+from monitor.methods.curve.fit import CurveFit
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, last_used_campaign, model_history
 from monitor.units import MICROMETRE
@@ -147,7 +146,7 @@ def _curve_step(fit: CurveFit, version: StoredModel) -> CurveVersion:
     return CurveVersion(
         model=label(version),
         campaign=curve.name,
-        method=NAME,
+        method=curve.method,
         unit=response_unit(curve),
         added=" + ".join(version.added) or None,
         removed=" + ".join(version.removed) or None,

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from monitor.discovery import Fit, fit
 from monitor.documents import to_document
 from monitor.exceptions import MonitorError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
@@ -96,7 +96,7 @@ class _Fitted:
     @cached_property
     def fit(self) -> Fit:
         known = self._work.known
-        return fit(method_named(known.method).problem_of(known, as_model(self._work.model)))
+        return fit(campaign_method(known).problem_of(known, as_model(self._work.model)))
 
     @cached_property
     def evaluated(self) -> Evaluated:

@@ -113,6 +113,13 @@ class IdentifyAnswer:
 
 
 @dataclass(frozen=True)
+class IdentificationsAnswer:
+    """The identifications of several campaigns."""
+
+    identifications: tuple[IdentifyAnswer, ...]
+
+
+@dataclass(frozen=True)
 class StepwiseParameter:
     """A parameter by both ways, and what of their difference remains without noise."""
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from monitor.discovery.curve.quality import allowed_for, bic, inflation, noise_of
 from monitor.effects.curve import SEARCHED
-from monitor.methods.curve.method import CurveFit
-from monitor.methods.curve.problem import NAME
+from monitor.methods.curve.fit import CurveFit
 from monitor.records import CurveCampaign
 from monitor.statistics.noise import Assessed, effective_number
 from monitor.units import MICROMETRE
@@ -59,7 +58,7 @@ def curve_answer(fit: CurveFit, model: str) -> IdentifyAnswer:
         campaign=curve.name,
         model=model,
         machine=curve.instrument.id,
-        method=NAME,
+        method=curve.method,
         curve=ResponseOverInputs(curve.base, curve.response, response_unit(curve)),
         runs=(_run(fit, parameters),),
         added={name: estimate for name, estimate in parameters.items() if name not in base},

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from monitor.discovery import Fit, fit
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.curve.method import CurveFit
-from monitor.methods.curve.method import fit as fit_curve
-from monitor.methods.curve.problem import problem_of as curve_problem_of
+from monitor.methods.curve.fit import CurveFit
+from monitor.methods.curve.problem import CurveProblem
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, is_curve, load_campaign, load_curve
 from monitor.workflow.models import as_model, resolve
@@ -31,14 +30,18 @@ def load_measured(db: Database, name: str) -> Campaign | CurveCampaign:
 
 def machine_problem(campaign: Campaign, model: StoredModel) -> ChainProblem:
     """The least-squares problem of a machine's campaign under a model."""
-    problem: ChainProblem = method_named(campaign.method).problem_of(campaign, as_model(model))
-    return problem
+    return campaign_method(campaign).problem_of(campaign, as_model(model))
+
+
+def curve_problem(curve: CurveCampaign, model: StoredModel) -> CurveProblem:
+    """The least-squares problem of a curve under a model."""
+    return campaign_method(curve).problem_of(curve, as_model(model))
 
 
 def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | CurveFit:
     """A version of a model fitted to a campaign. Raises DataError where the readings do not suffice."""
     if isinstance(campaign, CurveCampaign):
-        return fit_curve(curve_problem_of(campaign, as_model(model)))
+        return campaign_method(campaign).fit(curve_problem(campaign, model))
     return fit(machine_problem(campaign, model))
 
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from monitor.documents import to_document
 from monitor.exceptions import DataError
-from monitor.methods.curve.method import fit as fit_curve
-from monitor.methods.curve.problem import problem_of as curve_problem_of
+from monitor.methods import campaign_method
 from monitor.records import CurveCampaign
-from monitor.store import Database, StoredModel, save_analysis, save_identification
+from monitor.store import Database, save_analysis, save_identification
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.curve import curve_answer
-from monitor.workflow.identify.fitting import load_measured
+from monitor.workflow.identify.fitting import curve_problem, load_measured
 from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.identify.request import IdentifyRequest
-from monitor.workflow.models import as_model, label, resolve
+from monitor.workflow.models import label, resolve
 
 
 def identify(db: Database, request: IdentifyRequest) -> IdentifyAnswer:
@@ -35,8 +34,8 @@ def identify(db: Database, request: IdentifyRequest) -> IdentifyAnswer:
 def _identify_curve(db: Database, curve: CurveCampaign, request: IdentifyRequest) -> IdentifyAnswer:
     if request.run not in (None, 1):
         raise DataError(f"campaign {curve.name} is a curve with one run, number 1, not {request.run}")
-    model: StoredModel = resolve(db, request.model, curve.method)
-    answer = curve_answer(fit_curve(curve_problem_of(curve, as_model(model))), label(model))
+    model = resolve(db, request.model, curve.method)
+    answer = curve_answer(campaign_method(curve).fit(curve_problem(curve, model)), label(model))
     save_analysis(
         db, "identification", to_document(answer), method=curve.method, campaign=curve.name,
         model=model.name, model_version=model.version,

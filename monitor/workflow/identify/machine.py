@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.problem import Solver, solve_problem
 from monitor.records import Array, Campaign, Machine
@@ -22,7 +22,7 @@ def identified(
 
     ``solve`` gives the solution of the method's problem. Raises DataError, EffectError as ``identify``.
     """
-    identification: Identification = method_named(campaign.method).identify(campaign, as_model(model), solve)
+    identification = campaign_method(campaign).identify(campaign, as_model(model), solve)
     return identification, _stored(campaign, identification, model)
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.exceptions import DataError
+from monitor.methods import Unable, campaign_method, methods
+from monitor.methods.chain.identification import StepwiseCoefficient
 from monitor.methods.chain.problem import solve_problem
-from monitor.methods.l_shape.method import NAME, LShapeProblem
-from monitor.methods.l_shape.stepwise import Step, stepwise
 from monitor.store import Database, load_campaign
-from monitor.units import Unit
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.identify.answer import StepwiseAnswer, StepwiseParameter
 from monitor.workflow.identify.fitting import machine_problem
@@ -23,33 +22,38 @@ def identify_stepwise(db: Database, request: StepwiseRequest) -> StepwiseAnswer:
     Raises NotFoundError for an unknown campaign or run, DataError for a campaign of another method.
     """
     campaign = load_campaign(db, request.campaign)
-    if campaign.method != NAME:
+    stepwise = campaign_method(campaign).stepwise
+    if isinstance(stepwise, Unable):
+        able = (name for name, method in methods().items() if not isinstance(method.stepwise, Unable))
         raise DataError(
-            f"campaign {request.campaign} was measured by {campaign.method}; only {NAME} has a stepwise way"
+            f"campaign {request.campaign} was measured by {campaign.method}; only {' and '.join(able)} has a "
+            "stepwise way"
         )
     number = max(run.run for run in campaign.runs) if request.run is None else request.run
     campaign = only_run(campaign, number)
     problem = machine_problem(campaign, resolve(db, request.model, campaign.method))
-    assert isinstance(problem, LShapeProblem)
-    steps = stepwise(problem, solve_problem(problem), number)
-    units = {effect.text: effect.unit for effect in problem.all_orders()}
+    coefficients = stepwise.coefficients(problem, solve_problem(problem), number)
     return StepwiseAnswer(
-        request.campaign, number, {step.parameter: _parameter(step, units[step.parameter]) for step in steps}
+        request.campaign,
+        number,
+        {coefficient.parameter: _parameter(coefficient) for coefficient in coefficients},
     )
 
 
-def _parameter(step: Step, unit: Unit) -> StepwiseParameter:
+def _parameter(coefficient: StepwiseCoefficient) -> StepwiseParameter:
+    unit = coefficient.unit
+
     def displayed(value: float) -> float | None:
         return unit.to_display(value) if np.isfinite(value) else None
 
     return StepwiseParameter(
         unit=unit.name,
-        stepwise=displayed(step.stepwise),
-        u_stepwise=displayed(step.u_stepwise),
-        at_once=displayed(step.at_once),
-        u_at_once=displayed(step.u_at_once),
-        difference_by_method=displayed(step.by_method),
-        u_difference_by_noise=displayed(step.u_noise),
-        agrees=step.agrees,
-        why=step.why,
+        stepwise=displayed(coefficient.stepwise),
+        u_stepwise=displayed(coefficient.u_stepwise),
+        at_once=displayed(coefficient.at_once),
+        u_at_once=displayed(coefficient.u_at_once),
+        difference_by_method=displayed(coefficient.by_method),
+        u_difference_by_noise=displayed(coefficient.u_noise),
+        agrees=coefficient.agrees,
+        why=coefficient.why,
     )

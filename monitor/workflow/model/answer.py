@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 
-from monitor.documents import INLINED
+from monitor.documents import IN_UTC, INLINED
 from monitor.store import StoredModel
 from monitor.workflow.explain.versions import CurveVersion, MachineVersion
 from monitor.workflow.models import label, label_of
@@ -13,7 +14,7 @@ from monitor.workflow.models import label, label_of
 
 @dataclass(frozen=True)
 class ModelVersion:
-    """A version of a model; ``added`` and ``removed`` are against its parent. ``created_at`` is in UTC, ISO 8601."""
+    """A version of a model; ``added`` and ``removed`` are against its parent."""
 
     model: str
     name: str
@@ -23,7 +24,7 @@ class ModelVersion:
     added: tuple[str, ...]
     removed: tuple[str, ...]
     note: str
-    created_at: str
+    created_at: datetime = field(metadata=IN_UTC)
 
 
 @dataclass(frozen=True)
@@ -65,5 +66,5 @@ def model_version(stored: StoredModel) -> ModelVersion:
         added=stored.added,
         removed=stored.removed,
         note=stored.note,
-        created_at=stored.created_at.isoformat() + "Z",
+        created_at=stored.created_at,
     )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from monitor.methods import METHODS
-from monitor.methods.curve.problem import NAME as CURVE
+from monitor.methods import CurveMethod, methods
 from monitor.store import Database, StoredModel, curve_names, list_models, load_model
 from monitor.workflow.model.answer import ModelsAnswer, ShowModelAnswer, model_version
 from monitor.workflow.model.request import ShowModelRequest
@@ -13,8 +12,10 @@ from monitor.workflow.models import resolve
 
 def list_all_models(db: Database) -> ModelsAnswer:
     """All models with their versions; the methods' own are made where they are not there yet."""
-    for method in (*METHODS, *([CURVE] if curve_names(db) else [])):
-        resolve(db, method)
+    curves = bool(curve_names(db))
+    for method in methods().values():
+        if curves or not isinstance(method, CurveMethod):
+            resolve(db, method.name)
     frame = list_models(db)
     return ModelsAnswer(
         tuple(

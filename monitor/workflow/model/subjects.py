@@ -12,10 +12,8 @@ from monitor.effects.curve_words import describe_curve
 from monitor.effects.words import describe
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
-from monitor.methods import METHODS
+from monitor.methods import ChainMethod, CurveMethod, methods
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.curve.problem import NAME as CURVE
-from monitor.methods.curve.problem import problem_of
 from monitor.methods.model import Model, chain_of
 from monitor.store import Database, StoredModel, curve_names, described_machines, load_curve, load_model
 
@@ -40,10 +38,10 @@ class Subjects(Protocol):
 
 @dataclass(frozen=True)
 class Machines:
-    """The machines that a calibration method applies to."""
+    """The machines that a calibration method applies to; with None a model that descends from no method's own."""
 
     db: Database
-    method: str
+    method: ChainMethod | None
 
     def base(self) -> dict[str, tuple[str, ...]]:
         base: dict[str, tuple[str, ...]] = {}
@@ -80,9 +78,8 @@ class Machines:
         return text
 
     def _base_of(self, chain: Chain) -> tuple[str, ...]:
-        """The effects that are free in every run; a method that names none has the complete model's."""
-        base: tuple[str, ...] = getattr(METHODS[self.method], "base_effects", base_effects)(chain)
-        return base
+        """The effects that are free in every run of the method; those of the complete model for no method."""
+        return (base_effects if self.method is None else self.method.base_effects)(chain)
 
     def _is_base(self, effect: str, chains: Sequence[Chain]) -> bool:
         """Whether an effect is a base effect on every machine that the method can calibrate."""
@@ -100,6 +97,7 @@ class Curves:
     """The curves of the database."""
 
     db: Database
+    method: CurveMethod
 
     def base(self) -> dict[str, tuple[str, ...]]:
         return {name: (load_curve(self.db, name).base,) for name in curve_names(self.db)}
@@ -128,7 +126,7 @@ class Curves:
         def text_on(name: str) -> str:
             curve = load_curve(self.db, name)
             text = parse_curve_effect(effect, inputs_of(curve)).text
-            problem_of(curve, Model(name, added=(text,)))
+            self.method.problem_of(curve, Model(name, added=(text,)))
             return text
 
         return _first(names, text_on)
@@ -150,6 +148,5 @@ def subjects_of(db: Database, model: StoredModel) -> Subjects:
     """The subjects of the method that a model descends from."""
     while model.parent is not None:
         model = load_model(db, *model.parent)
-    if model.name == CURVE:
-        return Curves(db)
-    return Machines(db, model.name if model.name in METHODS else next(iter(METHODS)))
+    method = methods().get(model.name)
+    return Curves(db, method) if isinstance(method, CurveMethod) else Machines(db, method)
