@@ -14,8 +14,9 @@ from monitor.discovery.machine.evidence import Evidence, orthonormal, without
 from monitor.discovery.machine.scan import Finding
 from monitor.discovery.machine.visible import Candidate
 from monitor.effects.curve import CurveEffect, coefficient_names
-from monitor.effects.curve_words import calendar_period, describe_curve
-from monitor.effects.words import Words
+from monitor.effects.curve.calendar import calendar_period
+from monitor.effects.curve.words import describe_curve
+from monitor.effects.description import Description
 from monitor.methods.curve.method import CurveFit, fit
 from monitor.records import Array
 from monitor.statistics.noise import Assessed
@@ -39,7 +40,7 @@ class CurveMissing:
     certain: bool
     noise_alone: float
     written: str
-    words: Words
+    words: Description
     names: tuple[str, ...]
     units: tuple[str, ...]
     coefficients: Array

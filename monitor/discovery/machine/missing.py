@@ -18,9 +18,10 @@ from monitor.discovery.machine.separate import Separation, separating_poses
 from monitor.discovery.machine.variants import with_drivers
 from monitor.discovery.machine.visible import Candidate, Visible, see
 from monitor.effects import ChainEffect
+from monitor.effects.description import Description
 from monitor.effects.drivers import EachRun
 from monitor.effects.shapes import Cyclic, Harmonic
-from monitor.effects.words import Words, describe
+from monitor.effects.words import describe
 from monitor.records import Array
 
 # Rivals whose evidence comes this close are not ruled out. Where two effects are s standard deviations apart,
@@ -56,7 +57,7 @@ class Missing:
 
     rank: int
     effect: str
-    words: Words
+    words: Description
     parameters: tuple[str, ...]
     coefficients: Array
     covariance: Array
