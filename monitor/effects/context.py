@@ -151,7 +151,8 @@ def _day_time(campaign: Campaign) -> Array:
         for run in campaign.runs
     }
     starts = {run.run: (run.started_at - first_of_day[run.day]).total_seconds() for run in campaign.runs}
-    return campaign.probings.time + np.array([starts[int(run)] for run in campaign.probings.run])
+    day_time: Array = campaign.probings.time + np.array([starts[int(run)] for run in campaign.probings.run])
+    return day_time
 
 
 def _run_time(probings: Probings) -> Array:

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import (
-    Comparison,
+    ChainComparison,
+    ChainMissing,
     Explanation,
     Fit,
-    Missing,
     Mistake,
+    Verdict,
     explain,
     find_mistakes,
     fit,
@@ -22,8 +23,8 @@ from monitor.discovery import (
     version_error,
 )
 from monitor.discovery import compare as compare_fit
-from monitor.discovery.machine.compare import SOMETHING_IS_MISSING, Part
 from monitor.discovery.machine.steps import Step
+from monitor.discovery.search.comparison import Part
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.methods import method_named
 from monitor.methods.chain.problem import ChainProblem
@@ -73,7 +74,7 @@ def _parts(parts: dict[str, Part]) -> Document:
     }
 
 
-def comparison_document(found: Comparison) -> Document:
+def comparison_document(found: ChainComparison) -> Document:
     """A comparison as people see it."""
     test = found.lack_of_fit
     return {
@@ -113,8 +114,8 @@ def _pose(pose: dict[str, float]) -> Document:
     return {f"{axis.lower()}_deg": round(DEGREE.to_display(value), 6) for axis, value in pose.items()}
 
 
-def _missing(found: Missing) -> Document:
-    unit = Unit(found.unit_name, found.unit_factor)
+def _missing(found: ChainMissing) -> Document:
+    unit = found.units[0]
     document: Document = {
         "rank": found.rank,
         "effect": found.effect,
@@ -154,7 +155,7 @@ def _missing(found: Missing) -> Document:
         document["searched"] = {
             "what": found.searched.name,
             "value": found.searched.value,
-            "u": found.searched.u if np.isfinite(found.searched.u) else None,
+            "u": found.searched.u,
             "unit": found.searched.unit,
         }
     return document
@@ -191,7 +192,7 @@ def explanation_document(found: Explanation) -> Document:
         }
         for move in found.moves
     ] + [_change(step, units) for step in found.steps]
-    document["verdict"] = "something is missing" if missing else document["verdict"]
+    document["verdict"] = Verdict.SOMETHING_IS_MISSING if missing else document["verdict"]
     document |= {
         "missing": missing,
         "suspect_data": [
@@ -229,7 +230,7 @@ def explanation_document(found: Explanation) -> Document:
     # Where nothing is missing there is nothing to picture.
     document |= (
         picture_documents(found, missing[0]["effect"] if missing else None)
-        if document["verdict"] == SOMETHING_IS_MISSING
+        if document["verdict"] == Verdict.SOMETHING_IS_MISSING
         else {"residual_map": None, "residual_against": None}
     )
     return document
@@ -246,7 +247,7 @@ def _answer(document: Document) -> str:
         if first["indistinguishable_from"]:
             others = ", ".join(first["indistinguishable_from"])
             parts.append(f"These data cannot tell it apart from {others}.")
-    elif document["verdict"] == "something is missing":
+    elif document["verdict"] == Verdict.SOMETHING_IS_MISSING:
         parts.append(
             "The model does not explain the measurements, but no effect of the catalogue explains more."
         )
@@ -304,7 +305,9 @@ def explanation_of(
         raise DataError(f"{error}. {mistakes_in_words(mistakes)}" if mistakes else str(error)) from error
     mistakes = find_mistakes(campaign, problem_of, first) if is_gross(first) else ()
     if mistakes:
-        comparison = replace(compare_fit(first, campaign.name, label(model)), verdict=SOMETHING_IS_MISSING)
+        comparison = replace(
+            compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING
+        )
         return Explanation(comparison, (), (), (), (), (), (), first, mistakes)
     rng = np.random.default_rng(SEED)
     found = explain(campaign, first.problem, label(model), rate=rate, rng=rng, first=first)
