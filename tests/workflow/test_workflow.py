@@ -13,7 +13,7 @@ from monitor.methods import METHODS
 from monitor.store import Database, load_campaign, load_identification
 from monitor.workflow import keeping, models
 from monitor.workflow.explain import comparison
-from monitor.workflow.figures import comparison_figures, explanation_figures
+from monitor.workflow.explain.figures import comparison_figures, explanation_figures
 from monitor.workflow.identify.identification import identify
 from monitor.workflow.intake import campaigns
 from monitor.workflow.run_statistics.columns import run_columns

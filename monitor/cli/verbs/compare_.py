@@ -33,7 +33,7 @@ def run(options: Namespace) -> int:
             return curve_output.compare(db, options)
         found, fitted = compare(db, options.campaign, options.model)
         if options.figures is not None:
-            from monitor.workflow.figures import comparison_figures
+            from monitor.workflow.explain.figures import comparison_figures
 
             found["figures"] = comparison_figures(found, fitted, options.figures)
     if options.json:

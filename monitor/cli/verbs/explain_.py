@@ -35,7 +35,7 @@ def run(options: Namespace) -> int:
             return curve_output.explain(db, options)
         found, explanation = explain_campaign(db, options.campaign, options.model, options.rate)
         if options.figures is not None:
-            from monitor.workflow.figures import comparison_figures, explanation_figures
+            from monitor.workflow.explain.figures import comparison_figures, explanation_figures
 
             # Where the model fails as it is; the fit of the explanation has the missing effects already.
             as_it_is = fitted(db, options.campaign, options.model)[2]

@@ -146,7 +146,7 @@ def _history(options: Namespace) -> int:
 
             files = curve_history_figure(steps, options.figures)
         else:
-            from monitor.workflow.figures import history_figure
+            from monitor.workflow.explain.figures import history_figure
 
             files = history_figure(steps, options.figures)
     if options.json:
