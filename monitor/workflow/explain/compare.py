@@ -45,7 +45,7 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
 def _figures(answer: CompareAnswer, fit: Fit | CurveFit, folder: Path) -> tuple[str, ...]:
     # Loaded here: drawing costs a second that a comparison without figures need not wait.
     from monitor.workflow.explain.curve_figures import curve_figures
-    from monitor.workflow.figures import comparison_figures
+    from monitor.workflow.explain.figures import comparison_figures
 
     if isinstance(fit, CurveFit):
         return tuple(curve_figures(fit, None, folder))

@@ -102,7 +102,7 @@ def _with_figures(
         return answer
     # Loaded here: drawing costs a second that an explanation without figures need not wait.
     from monitor.workflow.explain.curve_figures import curve_figures
-    from monitor.workflow.figures import comparison_figures, explanation_figures
+    from monitor.workflow.explain.figures import comparison_figures, explanation_figures
 
     if isinstance(explanation, CurveExplanation):
         return replace(answer, figures=tuple(curve_figures(explanation.first, explanation, folder)))

@@ -170,7 +170,7 @@ def _curve_step(fit: CurveFit, version: StoredModel) -> CurveVersion:
 def _figures(steps: Sequence[MachineVersion | CurveVersion], folder: Path) -> tuple[str, ...]:
     # Loaded here: drawing costs a second that a history without figures need not wait.
     from monitor.workflow.explain.curve_figures import curve_history_figure
-    from monitor.workflow.figures import history_figure
+    from monitor.workflow.explain.figures import history_figure
 
     draw = curve_history_figure if isinstance(steps[0], CurveVersion) else history_figure
     return tuple(draw([to_document(step) for step in steps], folder))
