@@ -15,7 +15,7 @@ from monitor.store import Database, import_campaign
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest
-from monitor.workflow.model.change import version_with
+from monitor.workflow.model.change import add_effect, version_with
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.uncertainty.evaluation import evaluate
 
@@ -50,7 +50,7 @@ def test_a_single_run_with_a_hidden_effect_counts_it_in_the_uncertainty(tmp_path
         import_campaign(db, first_runs("hidden-reversal-x", 1))
         plain = evaluate(db, "hidden-reversal-x", 1, method="guf", model_uncertainty=False)
         counted = evaluate(db, "hidden-reversal-x", 1, method="guf")
-        version_with(db, AddEffectRequest("EXX:reversal", "samba", "with-reversal"))
+        add_effect(db, AddEffectRequest("EXX:reversal", "samba", "with-reversal"))
         right = evaluate(db, "hidden-reversal-x", 1, method="guf", model="with-reversal")
     assert "lack of fit of the model" in {line.source for line in counted.framework.budget}
     apart = np.abs(counted.framework.estimate - right.framework.estimate)
@@ -79,7 +79,5 @@ def test_a_name_in_use_is_no_name_for_a_model_with_another_parent(tmp_path: Path
         version_with(db, AddEffectRequest("EXX:reversal", "samba", "mine"))
         with pytest.raises(InputError, match="there is a model mine already: add to it with --to mine"):
             version_with(db, AddEffectRequest("EYY:reversal", "samba", "mine"))
-        assert version_with(db, AddEffectRequest("EYY:reversal", "mine")).effects == (
-            "EXX:reversal",
-            "EYY:reversal",
-        )
+        version = version_with(db, AddEffectRequest("EYY:reversal", "mine"))
+        assert version.effects == ("EXX:reversal", "EYY:reversal")

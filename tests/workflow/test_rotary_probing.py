@@ -12,9 +12,9 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from by_path import load
 
 from monitor.discovery import Verdict
-from monitor.methods.rotary_probing.patterns import SYMBOLS
 from monitor.store import Database
 from monitor.workflow import keeping
 from monitor.workflow.explain.compare import compare
@@ -27,6 +27,7 @@ from monitor.workflow.trend.trends import trends
 from monitor.workflow.uncertainty.evaluation import uncertainty
 
 ROOT = Path(__file__).resolve().parents[2]
+SYMBOLS = load("closed_forms", ROOT / "tests" / "methods" / "closed_forms.py").SYMBOLS
 TABLE_4 = json.loads((ROOT / "tests/references/papers/ibaraki2012.json").read_text(encoding="utf-8"))[
     "table_4"
 ]

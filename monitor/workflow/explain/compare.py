@@ -11,7 +11,7 @@ from monitor.discovery.curve.compare import compare_curve
 from monitor.documents import to_document
 from monitor.methods.curve.fit import CurveFit
 from monitor.store import Database, save_analysis
-from monitor.workflow.explain.compare_answer import CompareAnswer
+from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachineComparison
 from monitor.workflow.explain.curve_answer import curve_comparison
 from monitor.workflow.explain.machine_answer import machine_comparison
 from monitor.workflow.explain.request import CompareRequest
@@ -39,14 +39,17 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
     )  # fmt: skip
     if request.figures is None:
         return answer
-    return replace(answer, figures=_figures(answer, fit.fit, request.figures))
+    return replace(answer, figures=_figures(answer.comparison, fit.fit, request.figures))
 
 
-def _figures(answer: CompareAnswer, fit: Fit | CurveFit, folder: Path) -> tuple[str, ...]:
+def _figures(
+    comparison: MachineComparison | CurveComparison, fit: Fit | CurveFit, folder: Path
+) -> tuple[str, ...]:
     # Loaded here: drawing costs a second that a comparison without figures need not wait.
     from monitor.workflow.explain.curve_figures import curve_figures
-    from monitor.workflow.figures import comparison_figures
+    from monitor.workflow.explain.figures import comparison_figures
 
-    if isinstance(fit, CurveFit):
-        return tuple(curve_figures(fit, None, folder))
-    return tuple(comparison_figures(to_document(answer), fit, folder))
+    if isinstance(comparison, MachineComparison) and isinstance(fit, Fit):
+        return tuple(comparison_figures(comparison, fit, folder))
+    assert isinstance(fit, CurveFit)
+    return tuple(curve_figures(fit, None, folder))

@@ -17,6 +17,7 @@ from monitor.exceptions import DataError
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
+from monitor.workflow.explain.compare_answer import MachineComparison
 from monitor.workflow.explain.curve_answer import curve_explain_answer
 from monitor.workflow.explain.explain_answer import ExplainAnswer
 from monitor.workflow.explain.machine_answer import explain_answer
@@ -102,15 +103,15 @@ def _with_figures(
         return answer
     # Loaded here: drawing costs a second that an explanation without figures need not wait.
     from monitor.workflow.explain.curve_figures import curve_figures
-    from monitor.workflow.figures import comparison_figures, explanation_figures
+    from monitor.workflow.explain.figures import comparison_figures, explanation_figures
 
     if isinstance(explanation, CurveExplanation):
         return replace(answer, figures=tuple(curve_figures(explanation.first, explanation, folder)))
     assert first is not None
-    document = to_document(answer)
+    assert isinstance(answer.comparison, MachineComparison)
     files = (
-        *comparison_figures(document, first, folder),
-        *explanation_figures(document, explanation, folder),
+        *comparison_figures(answer.comparison, first, folder),
+        *explanation_figures(answer, explanation, folder),
     )
     # The residual over the workspace belongs to both.
     return replace(answer, figures=tuple(dict.fromkeys(files)))

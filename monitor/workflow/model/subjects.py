@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 
 from monitor.effects import parse_effect
 from monitor.effects.curve import inputs_of, parse_curve_effect
-from monitor.effects.curve_words import describe_curve
+from monitor.effects.curve.words import describe_curve
 from monitor.effects.words import describe
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain

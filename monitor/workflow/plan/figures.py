@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from monitor.reporting.figures.style import save
 from monitor.reporting.figures.volumetric import expected_uncertainties
-from monitor.workflow.figures import ENDINGS, make_folder
+from monitor.workflow.figure_files import make_folder, save_figure
 from monitor.workflow.plan.answer import BallPlan, BallPlanAnswer
 
 
@@ -36,4 +35,4 @@ def plan_figures(answer: BallPlanAnswer, folder: Path) -> tuple[str, ...]:
         title=f"{answer.campaign}: {sizes}",
         note=f"Expected standard uncertainties of one run with {answer.stated_uncertainty_um:g} µm a coordinate.",
     )
-    return tuple(str(save(figure, folder / f"expected-uncertainties{ending}")) for ending in ENDINGS)
+    return tuple(save_figure(figure, folder, "expected-uncertainties"))
