@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from monitor.discovery import Explanation, Fit
+from monitor.discovery import ChainComparison, Explanation, Fit
 from monitor.effects import ChainEffect
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -17,7 +17,6 @@ from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import Figure
 from monitor.reporting.numbers import round_result
 from monitor.units import MICROMETRE
-from monitor.workflow.explain.compare_answer import MachineComparison
 from monitor.workflow.explain.explain_answer import ExplainAnswer, MachineMissing
 from monitor.workflow.explain.residuals import drivers_followed, in_machine_frame, mean_over_runs
 from monitor.workflow.explain.residuals_against import against_effect
@@ -33,21 +32,22 @@ OVER_WORKSPACE = "What the model leaves, mean over the runs, over the workspace"
 NOISE_NAME = "probe's stated uncertainty"
 
 
-def comparison_figures(comparison: MachineComparison, fit: Fit, folder: Path) -> list[str]:
+def comparison_figures(comparison: ChainComparison, fit: Fit, folder: Path) -> list[str]:
     """Draw where the model fails: by target, axis and run, over the workspace, against what it may depend on."""
     make_folder(folder)
+    um = MICROMETRE.to_display
     groups = {}
     for name in ("target", "axis", "run"):
         residuals = {
-            label: part.rms_um
+            label: um(part.rms)
             for label, part in comparison.by.get(name, {}).items()
-            if part.rms_um > SMALLEST_SHOWN_UM
+            if um(part.rms) > SMALLEST_SHOWN_UM
         }
         if residuals:
             groups[name] = (list(residuals), list(residuals.values()))
-    level = comparison.expected_rms_um
+    level = um(comparison.expected_rms)
     title = (
-        f"{comparison.campaign}: RMS {comparison.rms_um:.2f} µm where {level:.2f} µm is expected: "
+        f"{comparison.campaign}: RMS {um(comparison.rms):.2f} µm where {level:.2f} µm is expected: "
         f"{comparison.verdict.value}"
     )
     bars = residual_bars(groups, level_um=level, level_name="expected", title=title)
