@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect
-from monitor.effects.curve_words import CALENDAR
+from monitor.effects.curve.calendar import CALENDAR
 from monitor.methods.curve.problem import CurveProblem
 
 POWERS = (1, 2, 3)

@@ -17,7 +17,8 @@ from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import coincides, least_likelihood
 from monitor.discovery.search.scan import Finding
 from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, coefficient_names
-from monitor.effects.curve_words import calendar_period, describe_curve
+from monitor.effects.curve.calendar import calendar_period
+from monitor.effects.curve.words import describe_curve
 from monitor.methods.curve.fit import CurveFit, fit
 from monitor.records import Array
 from monitor.statistics.noise import Assessed

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from monitor.effects.words import Words
+from monitor.effects.description import Description
 from monitor.records import Array
 from monitor.units import Unit
 
@@ -43,7 +43,7 @@ class Missing:
 
     rank: int
     effect: str
-    description: Words
+    description: Description
     parameters: tuple[str, ...]
     units: tuple[Unit, ...]
     coefficients: Array
