@@ -66,17 +66,17 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
     ) -> list[Evidence[CurveCandidate]]:
         """Evidence for candidates whose period, if any, lies far enough from those in the model and selected."""
         problem = self.scene.curve.problem
-        least = {name: APART / float(np.ptp(values)) for name, values in problem.inputs.numbers.items()}
-        rates: dict[str, list[float]] = {name: [] for name in least}
+        rates: dict[str, list[float]] = {name: [] for name in problem.inputs.numbers}
         for effect in (*problem.effects, *(candidate.effect for candidate in selected)):
             if effect.shape == "sin" and effect.value:
                 rates[effect.column].append(1.0 / effect.value)
+        spans = {name: float(np.ptp(problem.inputs.numbers[name])) for name in rates}
 
         def is_apart(effect: CurveEffect) -> bool:
             if effect.shape != "sin" or not effect.value:
                 return True
-            rate = 1.0 / effect.value
-            return all(abs(other - rate) >= least[effect.column] for other in rates[effect.column])
+            rate, least = 1.0 / effect.value, APART / spans[effect.column]
+            return all(abs(other - rate) >= least for other in rates[effect.column])
 
         return [evidence for evidence in weighed if is_apart(evidence.candidate.effect)]
 
