@@ -7,21 +7,11 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg
 
-from monitor.discovery.search.held_out import held_out_rms
+from monitor.discovery.search.held_out import folds_of, held_out_rms
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.solver import inverse_normal
 from monitor.records import Array
 from monitor.statistics.noise import WHITE, Assessed, assess
-
-#: Rows are dealt into ten folds at random, always the same way.
-FOLDS, DEAL = 10, 20261121
-
-
-def folds(count: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """The fold (n,) of every row; below twenty rows each is one."""
-    if count < 2 * FOLDS:
-        return np.arange(count)
-    return np.random.default_rng(DEAL).permutation(count) % FOLDS
 
 
 def noise_of(fitted: CurveFit) -> Assessed:
@@ -47,7 +37,7 @@ def held_out(fitted: CurveFit) -> float | None:
     count = int(weighted.sum())
     scale = np.maximum(np.linalg.norm(fitted.design, axis=0), 1e-300)
     columns = np.linalg.qr(fitted.design / scale)[0][weighted]
-    return held_out_rms(-fitted.residual[weighted], columns, folds(count), count, 1.0)
+    return held_out_rms(-fitted.residual[weighted], columns, folds_of(count), count, 1.0)
 
 
 def allowed_for(fitted: CurveFit, noise: Assessed) -> Array:

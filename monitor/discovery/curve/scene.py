@@ -12,10 +12,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from monitor.discovery.curve.quality import folds
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
-from monitor.discovery.search.held_out import held_out_rms
-from monitor.discovery.search.projection import without
+from monitor.discovery.search.held_out import folds_of, held_out_rms
+from monitor.discovery.search.projection import orthonormal_to_full_precision, without
 from monitor.effects.curve import CurveEffect, curve_columns
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import CurveProblem
@@ -106,7 +105,9 @@ class CurveScene:
 
     def held_out_error(self, columns: Array) -> float | None:
         """Root mean square error on folds of rows left out in turn."""
-        return held_out_rms(self.residual, columns, folds(len(self.residual)), self.degrees_of_freedom, 1.0)
+        return held_out_rms(
+            self.residual, columns, folds_of(len(self.residual)), self.degrees_of_freedom, 1.0
+        )
 
 
 def whitened_curve(fit: CurveFit, noise: Noise) -> WhitenedCurve:
@@ -114,10 +115,3 @@ def whitened_curve(fit: CurveFit, noise: Noise) -> WhitenedCurve:
     rows = fit.problem.order
     white = noise.whiten(np.column_stack([fit.problem.curve.measured, fit.design])[rows])[0]
     return WhitenedCurve(fit, noise, white[:, 0], orthonormal_to_full_precision(white[:, 1:]))
-
-
-def orthonormal_to_full_precision(columns: Array) -> Array:
-    """An orthonormal basis (m, r) of columns, to full precision: calendar years to the third power."""
-    scale = np.linalg.norm(columns, axis=0)
-    u, values, _ = np.linalg.svd(columns / np.where(scale == 0, 1.0, scale), full_matrices=False)
-    return np.asarray(u[:, values > 1e-12 * max(values.max(initial=0.0), 1e-300)])

@@ -7,6 +7,16 @@ import numpy.typing as npt
 
 from monitor.records import Array
 
+#: Rows are dealt into ten folds at random, always the same way.
+FOLDS, DEAL = 10, 20261121
+
+
+def folds_of(count: int) -> npt.NDArray[np.int64]:
+    """The fold (n,) of every row; below twenty rows each is one."""
+    if count < 2 * FOLDS:
+        return np.arange(count)
+    return np.random.default_rng(DEAL).permutation(count) % FOLDS
+
 
 def held_out_sum(residual: Array, columns: Array, row_fold: npt.NDArray[np.int64]) -> float:
     """Sum of squares of whitened residuals (M,), each fold's with coefficients from all other folds.

@@ -22,6 +22,13 @@ def orthonormal(columns: Array) -> Array:
     return basis
 
 
+def orthonormal_to_full_precision(columns: Array) -> Array:
+    """An orthonormal basis (m, r) of columns, to full precision: calendar years to the third power."""
+    scale = np.linalg.norm(columns, axis=0)
+    u, values, _ = np.linalg.svd(columns / np.where(scale == 0, 1.0, scale), full_matrices=False)
+    return np.asarray(u[:, values > 1e-12 * max(values.max(initial=0.0), 1e-300)])
+
+
 def without(basis: Array, columns: Array) -> Array:
     """Columns with the span of an orthonormal basis taken out."""
     if basis.shape[1] == 0:
