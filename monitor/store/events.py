@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta, timezone
 from typing import TYPE_CHECKING
 
 from monitor.exceptions import InputError
@@ -17,8 +18,17 @@ if TYPE_CHECKING:
 NOTE = "note"
 
 
+@dataclass(frozen=True)
+class MachineEvent:
+    """What people know of a machine; ``at`` in the shop's offset from UTC."""
+
+    at: datetime
+    kind: str
+    description: str
+
+
 def record_event(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> int:
-    """Keep an event of a machine; its number. ``happened_at`` has an offset from UTC.
+    """Record an event of a machine; return its number. ``happened_at`` has an offset from UTC.
 
     Raises InputError for a time without an offset or an empty kind, NotFoundError for an unknown machine.
     """
@@ -56,13 +66,16 @@ def list_events(db: Database, machine: str | None = None) -> pd.DataFrame:
     )
 
 
-def machine_events(db: Database, machine: str) -> list[tuple[datetime, str, str]]:
-    """Time (UTC), kind and description of the events of a machine, in the order of time."""
+def machine_events(db: Database, machine: str) -> list[MachineEvent]:
+    """The events of a machine, in the order of time."""
     rows = db.rows(
-        "SELECT happened_at, kind, description FROM v_events WHERE machine = ? ORDER BY happened_at",
+        "SELECT happened_at, utc_offset_s, kind, description FROM event WHERE machine = ? ORDER BY happened_at",
         [machine],
     )
-    return [(at.replace(tzinfo=UTC), kind, text) for at, kind, text in rows]
+    return [
+        MachineEvent(at.replace(tzinfo=UTC).astimezone(timezone(timedelta(seconds=offset))), kind, text)
+        for at, offset, kind, text in rows
+    ]
 
 
 def event_content(db: Database, number: int) -> str:
