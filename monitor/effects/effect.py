@@ -37,7 +37,7 @@ class ChainBasis:
         return int(self.columns.shape[-1])
 
     def displacement(self, by_error: Array) -> Array:
-        """Change (n, 3, k) of the tip-to-target vector for each coefficient, from ``Evaluation.by_error``."""
+        """Change (n, 3, k) of the tip-to-target vector for each coefficient, from ``ChainPose.by_error``."""
         direction = by_error[:, :, self.term.joint, self.term.stage, self.term.component]
         moved: Array = direction[:, :, None] * self.columns[:, None, :]
         return moved

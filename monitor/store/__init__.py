@@ -35,7 +35,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.events import NOTE, MachineEvent, list_events, machine_events, record_event
+from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
@@ -58,7 +58,14 @@ from monitor.store.machine_runs import (
     machine_runs,
     probing_counts,
 )
-from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
+from monitor.store.models import (
+    StoredModel,
+    last_used_campaign,
+    list_models,
+    load_model,
+    model_history,
+    save_model,
+)
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
@@ -77,6 +84,7 @@ __all__ = [
     "RecordedRun",
     "StoredAnalysis",
     "StoredCertificate",
+    "StoredEvent",
     "StoredIdentification",
     "StoredModel",
     "StoredRefusal",
@@ -103,6 +111,7 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "last_used_campaign",
     "latest_documents",
     "latest_tolerances",
     "list_analyses",

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta, timezone
-from typing import TYPE_CHECKING
 
+from monitor.documents import IN_UTC
 from monitor.exceptions import InputError
 from monitor.store import audit
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database, utc_now
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 #: A note is shown beside the history. An event of any other kind may have changed the machine, and splits it.
 NOTE = "note"
+
+
+@dataclass(frozen=True)
+class StoredEvent:
+    """A row of the view ``v_events``; times in UTC without a zone, ``happened_at_local`` by the shop's clock."""
+
+    event_id: int
+    machine: str
+    happened_at: datetime = field(metadata=IN_UTC)
+    happened_at_local: datetime
+    kind: str
+    description: str
+    recorded_at: datetime = field(metadata=IN_UTC)
 
 
 @dataclass(frozen=True)
@@ -58,12 +68,14 @@ def record_event(db: Database, machine: str, happened_at: datetime, kind: str, d
     return number
 
 
-def list_events(db: Database, machine: str | None = None) -> pd.DataFrame:
-    """The events of all machines or of one, in the order of time: the view ``v_events``."""
-    return db.frame(
-        "SELECT * FROM v_events WHERE $machine IS NULL OR machine = $machine ORDER BY machine, happened_at",
+def list_events(db: Database, machine: str | None = None) -> tuple[StoredEvent, ...]:
+    """The events of all machines or of one, by machine and time: the view ``v_events``."""
+    rows = db.rows(
+        "SELECT event_id, machine, happened_at, happened_at_local, kind, description, recorded_at FROM v_events "
+        "WHERE $machine IS NULL OR machine = $machine ORDER BY machine, happened_at",
         {"machine": machine},
     )
+    return tuple(StoredEvent(*row) for row in rows)
 
 
 def machine_events(db: Database, machine: str) -> list[MachineEvent]:

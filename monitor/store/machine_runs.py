@@ -51,7 +51,8 @@ class MachineDescription:
 def machine_descriptions(db: Database) -> list[MachineDescription]:
     """Every machine that counts, by name."""
     rows = db.rows(
-        "SELECT machine, topology, manufacturer, machine_model, serial_number, location FROM v_machines ORDER BY machine"
+        "SELECT machine, topology, manufacturer, machine_model, serial_number, location "
+        "FROM v_machines ORDER BY machine"
     )
     return [MachineDescription(*("" if text is None else str(text) for text in row)) for row in rows]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, TypedDict, TypeVar, Unpack
 
-from monitor.documents import from_document
+from monitor.documents import from_document, to_document
 from monitor.exceptions import NotFoundError
 from monitor.records import Campaign
 from monitor.store import (
@@ -26,7 +26,7 @@ from monitor.store import (
     save_identification,
 )
 from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
-from monitor.workflow.explain.comparison import save_explanation
+from monitor.workflow.explain.explain import save_explanation
 from monitor.workflow.health.runs import Span
 from monitor.workflow.health.stored import (
     StatedUncertainty,
@@ -35,12 +35,13 @@ from monitor.workflow.health.stored import (
     VersionError,
     VersionErrors,
 )
-from monitor.workflow.health.task import METHOD, ComputedDocument, Task, TaskResult, attempted
+from monitor.workflow.health.task import METHOD, Task, TaskResult, attempted
 from monitor.workflow.uncertainty.documents import save_uncertainty
 from monitor.workflow.uncertainty.evaluations import COVERAGE
 from monitor.workflow.volumetric.volumetric import save_map
 
 Record = TypeVar("Record")
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ def stored_with(
     explanation = _saved(
         StoredExplanation,
         computed.explanation,
-        lambda document: save_explanation(db, document, week.last.method, model, before),
+        lambda answer: save_explanation(db, answer, week.last.method, model, before),
         "model and measurement could not be compared",
         remarks,
     )
@@ -187,11 +188,11 @@ def stored_with(
     )
     versions = stored.versions
     if computed.versions is not None:
-        document = {"steps": list(computed.versions)}
+        document = {"steps": [to_document(step) for step in computed.versions]}
         versions = from_document(VersionErrors, document).steps
         save_analysis(
             db, kind_of("model history", before), document, method=method_of(METHOD, before),
-            campaign=versions[0].campaign, model=model.name, model_version=model.version,
+            campaign=week.last.campaign, model=model.name, model_version=model.version,
         )  # fmt: skip
     every = Results(
         stored.uncertainty or uncertainty, stored.explanation or explanation, stored.map or mapped, versions
@@ -201,18 +202,18 @@ def stored_with(
 
 def _saved(
     kind: type[Record],
-    document: ComputedDocument | None,
-    save: Callable[[ComputedDocument], None],
+    answer: Answer | None,
+    save: Callable[[Answer], None],
     failure: str,
     remarks: list[str],
 ) -> Record | None:
-    """The record of a computed document that was stored."""
-    if document is None:
+    """What the page reads of a computed answer, once it is stored."""
+    if answer is None:
         return None
 
     def saved() -> Record:
-        save(document)
-        return from_document(kind, document)
+        save(answer)
+        return from_document(kind, answer if isinstance(answer, dict) else to_document(answer))
 
     return attempted(saved, failure, remarks)
 

@@ -15,12 +15,15 @@ from threadpoolctl import threadpool_limits
 
 from monitor.discovery import Fit, fit
 from monitor.exceptions import MonitorError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
-from monitor.workflow.explain.comparison import error_steps, explanation_document, explanation_of
-from monitor.workflow.identify.identification import identified
+from monitor.workflow.explain.explain import explanation_of
+from monitor.workflow.explain.explain_answer import ExplainAnswer
+from monitor.workflow.explain.machine_answer import explain_answer
+from monitor.workflow.explain.versions import CurveVersion, MachineVersion, error_steps
+from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.documents import document
 from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate_fit
@@ -59,9 +62,9 @@ class TaskResult:
 
     identified: tuple[StoredIdentification, ...] = ()
     uncertainty: ComputedDocument | None = None
-    explanation: ComputedDocument | None = None
+    explanation: ExplainAnswer | None = None
     map: ComputedDocument | None = None
-    versions: tuple[ComputedDocument, ...] | None = None
+    versions: tuple[MachineVersion | CurveVersion, ...] | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -94,7 +97,7 @@ class _Fitted:
     @cached_property
     def fit(self) -> Fit:
         past = self._task.past
-        return fit(method_named(past.method).problem_of(past, as_model(self._task.model)))
+        return fit(campaign_method(past).problem_of(past, as_model(self._task.model)))
 
     @cached_property
     def evaluated(self) -> Evaluated:
@@ -132,7 +135,7 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
         )
     if task.explanation:
         explanation = attempted(
-            lambda: explanation_document(explanation_of(task.past, task.model, first=fitted.fit)),
+            lambda: explain_answer(explanation_of(task.past, task.model, fitted.fit)),
             "model and measurement could not be compared",
             remarks,
         )
@@ -145,7 +148,7 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
         )
     if task.versions:
         versions = attempted(
-            lambda: tuple(error_steps(task.past, task.versions)),
+            lambda: error_steps(task.past, task.versions),
             "the versions of the model could not be compared",
             remarks,
         )

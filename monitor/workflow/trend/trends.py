@@ -84,11 +84,12 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
     history = read()
     if not db.read_only and history.unidentified:
         # Loaded here: most pages have nothing to identify, and the methods take as long to load as a page to make.
-        from monitor.workflow.identify.identification import identify
+        from monitor.workflow.identify.identify import identify
+        from monitor.workflow.identify.request import IdentifyRequest
 
         for campaign in history.unidentified:
             try:
-                identify(db, campaign, request.model)
+                identify(db, IdentifyRequest(campaign, request.model))
             except DataError:
                 # A campaign that cannot be identified does not keep the others from being followed.
                 continue

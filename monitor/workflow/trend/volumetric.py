@@ -23,7 +23,7 @@ from monitor.statistics import (
     residual_correlation,
     trend,
 )
-from monitor.store import Database, MachineHistory
+from monitor.store import Database, MachineHistory, load_campaign
 from monitor.units import MICROMETRE
 from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
 from monitor.workflow.history.drift import PieceDrift
@@ -97,13 +97,16 @@ def _vectors(
 ) -> _Vectors:
     """The error vectors over the strokes of the latest campaign's machine about ``levels``, name to display value."""
     # Loaded here: pages without a limit of the volumetric error start without the methods and all that they need.
+    from monitor.discovery import fit
     from monitor.effects import ChainEffect
     from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
-    from monitor.workflow.explain.comparison import fitted
+    from monitor.workflow.identify.fitting import machine_problem
+    from monitor.workflow.models import resolve
     from monitor.workflow.volumetric.volumetric import POINTS, poses_of, ranges_of
 
-    campaign, _, fit = fitted(db, str(history.campaign[-1]), model)
-    problem, run = fit.problem, int(history.run[-1])
+    campaign = load_campaign(db, str(history.campaign[-1]))
+    fitted = fit(machine_problem(campaign, resolve(db, model, campaign.method)))
+    problem, run = fitted.problem, int(history.run[-1])
     effects = [
         effect
         for effect in problem.base
@@ -122,7 +125,7 @@ def _vectors(
     errors = GeometricErrors(
         effects=tuple(effects), names=names, estimate=estimate, covariance=np.zeros((len(names), len(names))),
         context=problem.context, run=run,
-        tip=fit.solution.local[int(np.flatnonzero(problem.runs == run)[0]), tip : tip + 3],
+        tip=fitted.solution.local[int(np.flatnonzero(problem.runs == run)[0]), tip : tip + 3],
     )  # fmt: skip
     ranges, _ = ranges_of(campaign, errors.chain)
     poses = poses_of(errors.chain, errors.context.positions)

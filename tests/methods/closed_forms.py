@@ -1,9 +1,10 @@
 """The closed forms of rotary-probing: eight location errors of a tilting table from means of touched positions.
 
 For ``w C A ...`` tables, touched at A, C = (0, 0), (0, 90), (0, 180), (0, 270), (-90, 90), (-90, 180), (-90, 270)
-degrees on faces that stand along the axes. They show which pattern tells which error. The general least squares
-of ``rotary_probing`` takes any arrangement, any poses and any faces, weighs all touches, and is what ``identify``
-reports; on exact readings both agree to products of two errors.
+degrees on faces that stand along the axes. They show which pattern tells which error.
+An independent reference, which shares no code with the product: the general least squares of ``rotary-probing`` takes
+any arrangement, any poses and any faces, weighs all touches, and is what ``identify`` reports; on exact readings both
+agree to products of two errors.
 
 Source: S. Ibaraki, T. Iritani, T. Matsushita, Calibration of location errors of rotary axes on five-axis machine
 tools by on-the-machine measurement using a touch-trigger probe, 2012, Eqs. (6) to (19) and (21). Departures from
@@ -19,9 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from monitor.exceptions import DataError
-from monitor.machine.chain import rotation_about
-from monitor.records import Array
+Array = npt.NDArray[np.float64]
 
 #: The paper's symbols and those of ISO 230-1 in our convention, in the order of the results.
 SYMBOLS = {
@@ -85,7 +84,7 @@ class _Pair:
         over = self.place[:, 0, X] - self.place[:, 0, X].mean()
         spread = float(over @ over)
         if spread < SMALLEST_SPREAD:
-            raise DataError("pattern 4 needs a face touched at several X at A = -90°, C = 90° and 270°")
+            raise ValueError("pattern 4 needs a face touched at several X at A = -90°, C = 90° and 270°")
         return float(over @ self.moved[:, 0]) / spread
 
 
@@ -94,7 +93,7 @@ class _Displacements:
 
     def __init__(self, touches: Touches) -> None:
         self.touches = touches
-        turned = rotation_about((1.0, 0.0, 0.0), -touches.a) @ rotation_about((0.0, 0.0, 1.0), -touches.c)
+        turned = _turn(X, -touches.a) @ _turn(Z, -touches.c)
         self.direction = np.einsum("nij,nj->ni", turned, touches.normal)
         self.along = np.sum(self.direction * touches.position, axis=1)
         self.rows = {pose: self._at(pose) for pose in (I, II, III, IV, V, VI, VII)}
@@ -103,7 +102,7 @@ class _Displacements:
         degrees = np.degrees(np.column_stack([self.touches.a, self.touches.c])) - pose
         rows = np.flatnonzero(np.all(np.abs((degrees + 180.0) % 360.0 - 180.0) < SAME_ANGLE, axis=1))
         if not len(rows):
-            raise DataError(
+            raise ValueError(
                 f"no touch at A = {pose[0]:g}°, C = {pose[1]:g}°: the closed forms need the paper's seven poses; "
                 "the least squares takes any"
             )
@@ -124,7 +123,7 @@ class _Displacements:
             and self.faces(after[target], axes[1])
         ]
         if not chosen:
-            raise DataError(
+            raise ValueError(
                 f"pattern {name} has no point that faces {'XYZ'[axes[0]]} at A, C = {poses[0]} and {'XYZ'[axes[1]]} "
                 f"at {poses[1]} degrees"
             )
@@ -134,10 +133,20 @@ class _Displacements:
         return _Pair(moved, self.touches.position[rows[:, :2]])
 
 
+def _turn(axis: int, angle: Array) -> Array:
+    """Rotation matrices (n, 3, 3) about X, Y or Z."""
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.zeros((len(angle), 3, 3))
+    turn[:, axis, axis] = 1.0
+    turn[:, first, first] = turn[:, second, second] = np.cos(angle)
+    turn[:, second, first], turn[:, first, second] = np.sin(angle), -np.sin(angle)
+    return turn
+
+
 def closed_forms(touches: Touches) -> Array:
     """The eight location errors (8,) in the order of ``PARAMETERS``, mm and rad, of one run.
 
-    Only points that were touched at both poses of a pattern, and at A = C = 0, enter it. Raises DataError where a
+    Only points that were touched at both poses of a pattern, and at A = C = 0, enter it. Raises ValueError where a
     pose or the points of a pattern are missing.
     """
     seen = _Displacements(touches)
