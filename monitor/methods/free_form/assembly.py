@@ -45,13 +45,13 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> FreeFormProb
     nodes = {axis: tuple(places) for axis, places in calibration.nodes.items()}
     places = {symbol: nodes[axis.name] for symbol, axis in plane.axis_terms.items()}
     places |= dict.fromkeys(plane.table_terms, angles)
-    there = {at(symbol, place) for symbol, of_it in places.items() for place in of_it}
-    length = replace(calibration.length, parameter=_known(calibration.length.parameter, there, "length"))
-    chosen = calibration.conditions or tuple(
+    parameters = {at(symbol, position) for symbol, of_it in places.items() for position in of_it}
+    length = replace(calibration.length, parameter=_known(calibration.length.parameter, parameters, "length"))
+    conditions = calibration.conditions or tuple(
         name for name in all_conditions(plane, nodes, first_angle) if name != length.parameter
     )
-    on_shape = tuple(name for name in chosen if name in WORKPIECE_CONDITIONS)
-    held = tuple(_known(name, there, "conditions") for name in chosen if name not in on_shape)
+    on_shape = tuple(name for name in conditions if name in WORKPIECE_CONDITIONS)
+    held = tuple(_known(name, parameters, "conditions") for name in conditions if name not in on_shape)
     if length.parameter in held:
         raise DataError(
             f"{length.parameter} is both a condition and the known length; take it out of conditions"
@@ -71,7 +71,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> FreeFormProb
         sigma=np.full((len(campaign.probings), 1), campaign.probe.standard_uncertainty),
         plane=plane,
         length=length,
-        known=np.full(len(campaign.probings), length.value),
+        length_at_rows=np.full(len(campaign.probings), length.value),
         held=held,
         on_shape=on_shape,
         nodes=nodes,
@@ -80,12 +80,14 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> FreeFormProb
     return problem.foreseen() if problem.added else problem
 
 
-def _known(name: str, there: set[str], where: str) -> str:
+def _known(name: str, parameters: set[str], where: str) -> str:
     plain = name.replace(" ", "")
-    if plain not in there:
-        near = sorted(one for one in there if one.partition("(")[0] == plain.partition("(")[0])
+    if plain not in parameters:
+        near = sorted(
+            parameter for parameter in parameters if parameter.partition("(")[0] == plain.partition("(")[0]
+        )
         raise DataError(
             f"[artefact.self_calibration] {where}: there is no parameter '{name}'; write for example "
-            f"{', '.join(near[:3] or sorted(there)[:3])} or one of {', '.join(WORKPIECE_CONDITIONS)}"
+            f"{', '.join(near[:3] or sorted(parameters)[:3])} or one of {', '.join(WORKPIECE_CONDITIONS)}"
         )
     return plain

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.method import ChainMethod, Words
+from monitor.methods.method import ChainMethod, Nouns
 from monitor.methods.rotary_probing.base import rotary_base
 from monitor.methods.rotary_probing.problem import NAME, problem_of
 
@@ -15,8 +15,8 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     rows = problem.context.run == run
     still = [
         joint.name
-        for place, joint in enumerate(problem.context.chain.joints)
-        if joint.kind == "rotary" and np.ptp(problem.context.positions[rows, place]) == 0
+        for index, joint in enumerate(problem.context.chain.joints)
+        if joint.kind == "rotary" and np.ptp(problem.context.positions[rows, index]) == 0
     ]
     if still:
         return f": {' and '.join(still)} stands at one angle throughout; index it too"
@@ -27,7 +27,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="rotary probing",
     description="a block, a part or spheres, touched at indexed angles of two rotary axes",
-    words=Words(target="target", row="touch", tool_point="tip"),
+    nouns=Nouns(target="target", row="touch", tool_point="tip"),
     problem_of=problem_of,
     advice=advice,
     base_effects=rotary_base,

@@ -15,7 +15,7 @@ from monitor.exceptions import DataError
 from monitor.machine import refuse_untouchable
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.touch import Distance, TouchProblem
-from monitor.methods.method import ChainMethod, TouchPlan, Words
+from monitor.methods.method import ChainMethod, Nouns, TouchPlan
 from monitor.methods.model import Model, chain_of
 from monitor.records import Array, Campaign
 
@@ -85,8 +85,8 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     if missing and gains.intersection(parameters):
         return f": run {run} did not probe {' and '.join(missing)} of the scale bar, the unit of length"
     still = []
-    for place, joint in enumerate(problem.context.chain.joints):
-        if joint.turns and np.ptp(problem.context.positions[rows, place]) == 0:
+    for index, joint in enumerate(problem.context.chain.joints):
+        if joint.turns and np.ptp(problem.context.positions[rows, index]) == 0:
             still.append(joint)
     if not still:
         return "; probe more indexations"
@@ -115,7 +115,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="scale and master balls",
     description="balls and a scale bar, touched at indexed angles",
-    words=Words(target="ball", row="touch", tool_point="tip"),
+    nouns=Nouns(target="ball", row="touch", tool_point="tip"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,

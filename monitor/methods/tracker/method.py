@@ -18,7 +18,7 @@ from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.method import ChainMethod, Unable, Words
+from monitor.methods.method import ChainMethod, Nouns, Unable
 from monitor.methods.model import Model, chain_of
 from monitor.methods.tracker.problem import TrackingProblem, first_guess
 from monitor.records import Array, Campaign
@@ -50,7 +50,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
     """
     chain = tool_side(chain_of(campaign.machine))
     context = context_of(campaign, chain)
-    fixed = tuple(one.id for one in campaign.artefact.reflectors if one.fixed)
+    fixed = tuple(reflector.id for reflector in campaign.artefact.reflectors if reflector.fixed)
     points = measured_points(context)
     for run in np.unique(context.run):
         if not np.any((context.run == run) & ~np.isin(context.target, list(fixed))):
@@ -86,8 +86,8 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     rows = problem.context.run == run
     still = [
         joint.name
-        for place, joint in enumerate(problem.context.chain.joints)
-        if np.ptp(problem.context.positions[rows, place]) == 0
+        for index, joint in enumerate(problem.context.chain.joints)
+        if np.ptp(problem.context.positions[rows, index]) == 0
     ]
     if still:
         return f": {', '.join(still)} stood still throughout; move {'it' if len(still) == 1 else 'them'} too"
@@ -113,7 +113,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="tracker",
     description="reflectors on a robot or any serial machine, seen by a laser tracker or camera",
-    words=Words(target="reflector", row="reading", tool_point="reflectors"),
+    nouns=Nouns(target="reflector", row="reading", tool_point="reflectors"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,

@@ -18,13 +18,9 @@ from monitor.effects.catalogue import catalogue
 from monitor.exceptions import InputError
 from monitor.machine import Chain
 from monitor.methods import AnglePlan, campaign_method
-from monitor.methods.chain.expected import planned_context
-from monitor.methods.chain.planning import (
-    MOST_BALLS,
-    Choice,
-    best_plan,
-    quickest_plan,
-)
+from monitor.methods.planning.candidates import Choice
+from monitor.methods.planning.search import MOST_BALLS, best_plan, quickest_plan
+from monitor.methods.planning.touches import planned_context
 from monitor.records import Array, Campaign
 from monitor.reporting.figures.style import save
 from monitor.reporting.figures.volumetric import expected_uncertainties
