@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.method import ChainMethod, Nouns
 from monitor.methods.rotary_probing.base import rotary_base
 from monitor.methods.rotary_probing.problem import NAME, problem_of
@@ -12,12 +11,7 @@ from monitor.methods.rotary_probing.problem import NAME, problem_of
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     """What the plan kept still and would have to move."""
-    rows = problem.context.run == run
-    still = [
-        joint.name
-        for index, joint in enumerate(problem.context.chain.joints)
-        if joint.kind == "rotary" and np.ptp(problem.context.positions[rows, index]) == 0
-    ]
+    still = [joint.name for joint in still_joints(problem, run, "rotary")]
     if still:
         return f": {' and '.join(still)} stands at one angle throughout; index it too"
     return "; touch more faces or other angles: the same points at opposite angles, and faces that look elsewhere"

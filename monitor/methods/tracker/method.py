@@ -18,6 +18,7 @@ from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
 from monitor.methods.method import ChainMethod, Nouns, Unable
 from monitor.methods.model import Model, chain_of
 from monitor.methods.tracker.problem import TrackingProblem, first_guess
@@ -83,16 +84,10 @@ def _refuse_copies(campaign: Campaign, context: Context, points: Array) -> None:
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     """What the plan kept still and would have to move."""
-    rows = problem.context.run == run
-    still = [
-        joint.name
-        for index, joint in enumerate(problem.context.chain.joints)
-        if np.ptp(problem.context.positions[rows, index]) == 0
-    ]
+    still = [joint.name for joint in still_joints(problem, run)]
     if still:
         return f": {', '.join(still)} stood still throughout; move {'it' if len(still) == 1 else 'them'} too"
-    targets = [target for target in problem.targets if np.any(rows & (problem.context.target == target))]
-    if len(targets) == 1:
+    if len(np.unique(problem.context.target[problem.context.run == run])) == 1:
         return "; add reflectors away from the last axis, or poses that turn the wrist more"
     return "; add poses over the whole range of the joints"
 
@@ -100,11 +95,10 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:
     """DataError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
-        targets = problem.context.target[problem.context.run == run]
-        unknowns = len(problem.local_names) - 3 * (len(problem.targets) - len(np.unique(targets)))
-        if 3 * len(targets) < unknowns:
+        readings, unknowns = 3 * int(np.sum(problem.context.run == run)), unknowns_of_run(problem, run)
+        if readings < unknowns:
             raise DataError(
-                f"run {run} of campaign {campaign.name} has {3 * len(targets)} readings for {unknowns} unknowns; "
+                f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "measure more poses"
             )
 
