@@ -161,7 +161,7 @@ def side_by_side_figure(document: Document, folder: Path) -> list[str]:
     # The drawing library takes longer to load than most commands to run.
     from monitor.reporting.figures.style import save
     from monitor.reporting.figures.trend import selections_side_by_side
-    from monitor.workflow.figures import ENDINGS, make_folder
+    from monitor.workflow.figure_files import ENDINGS, make_folder
 
     make_folder(folder)
     found = document["selections"]

@@ -41,7 +41,7 @@ def run(options: Namespace) -> int:
             db, options.campaign, options.by, options.where, options.model, options.select, options.matrices
         )
         if options.figures is not None:
-            from monitor.workflow.figures import statistics_figure
+            from monitor.workflow.run_statistics.figures import statistics_figure
 
             days = {one.run: one.day for one in load_campaign(db, options.campaign).runs}
             found["figures"] = statistics_figure(
@@ -69,7 +69,7 @@ def run(options: Namespace) -> int:
         f"{found['campaign']}, runs by {found['by']} ({groups})",
         ["parameter", "unit", "mean", "u all", "u pooled", "Bartlett p", "ANOVA p", "ANOVA q", "normal p"],
         rows,
-        left=2,
+        text_columns=2,
     )
     moved = [
         name

@@ -61,7 +61,7 @@ def explain_curve(problem: CurveProblem, *, rate: float = 0.01, most: int = MOST
         rounds.append(now)
     out = now.under.problem.left_out
     missing = tell(rounds, noise)
-    named = {one.effect.family for one in missing}
+    named = {one.fitted.family for one in missing}
     return CurveExplanation(
         first=first,
         final=now.under,

@@ -22,7 +22,8 @@ from monitor.store import (
     save_analysis,
 )
 from monitor.units import DEGREE
-from monitor.workflow.identify.identification import identify
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.models import resolve
 from monitor.workflow.run_statistics.columns import campaign_columns, group_labels, selected
 from monitor.workflow.run_statistics.matrix_files import write_matrices
@@ -114,7 +115,7 @@ def _identified(db: Database, campaign: Campaign, model: str | None) -> StoredId
             return found
     except NotFoundError:
         pass
-    identify(db, campaign.name, model)
+    identify(db, IdentifyRequest(campaign.name, model))
     return load_identification(db, campaign.name, stored.name, stored.version)
 
 
