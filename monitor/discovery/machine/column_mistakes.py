@@ -45,7 +45,7 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
 
 def target_word(campaign: Campaign) -> str:
     """What a target of the campaign is called."""
-    return campaign_method(campaign).words.target
+    return campaign_method(campaign).nouns.target
 
 
 def _column(axis: str, linear: Sequence[str]) -> str:
