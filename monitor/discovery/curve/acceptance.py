@@ -106,8 +106,8 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         return doubt is not None
 
     def _doubt_in_company(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> float | None:
-        """How often noise alone would bring forth a line or a cycle and what it needs beside it; None where that is too
-        often, or the rows stay dependent."""
+        """The rate at which noise alone would produce a line or a cycle and what it needs beside it; None where that
+        is too high, or the rows stay dependent."""
         effect = candidate.effect
         line = effect.order == 1
         if not (line or effect.shape == "sin"):

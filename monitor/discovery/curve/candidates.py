@@ -27,7 +27,7 @@ MOST_PERIODS = 6000
 
 
 def tries_of(effect: CurveEffect, values: Array) -> list[int]:
-    """What the search for each value costs: the inverse of its probability beforehand.
+    """The price of the search for each value: the inverse of its probability beforehand.
 
     Periods are as likely between 5 and 10 as between 50 and 100 (even in the logarithm), constants and places all
     the same.

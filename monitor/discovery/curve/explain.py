@@ -1,4 +1,4 @@
-"""Which effect a curve lacks: the same scan as for a machine, over plain columns.
+"""The effects that a curve lacks: the same scan as for a machine, over plain columns.
 
 Fit, scan, add the findings to the model, name the outliers, look whether neighbouring rows resemble each other, and
 begin again under that until nothing changes. A finding has to stand three things: the false discovery rate of the

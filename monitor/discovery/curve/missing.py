@@ -69,7 +69,7 @@ def missing_effects(rounds: Sequence[SearchRound], noise: Assessed) -> tuple[Cur
 
 
 def _doubts(current: SearchRound) -> dict[str, float]:
-    """How often noise alone would do as well, by family of the findings.
+    """The doubt of each finding by family: the rate at which noise alone would do as well.
 
     Beside those only that are certain already: two cycles that are plain beside each other may both be noise.
     """

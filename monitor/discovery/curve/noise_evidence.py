@@ -77,7 +77,7 @@ class NoiseEvidence:
         return self._odds[key]
 
     def doubt(self, others: Sequence[CurveCandidate], together: Sequence[CurveCandidate]) -> float:
-        """How often noise alone would do as well as effects together beside others."""
+        """The rate at which noise alone would do as well as effects together beside others."""
         return HALF * math.sqrt(self.odds(others, together))
 
     def noise_after(self, selected: Sequence[CurveCandidate]) -> Assessed:

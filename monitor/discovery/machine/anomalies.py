@@ -83,7 +83,7 @@ class _Deviations:
     scale: Array  # (n,): standard deviation of a coordinate in standard uncertainties
 
     def of_run(self, run: int) -> Array:
-        """What the unknowns of a run span, row by row (m, d, p)."""
+        """The span of the unknowns of a run, row by row (m, d, p)."""
         rows, numbers = len(self.rows[run]), self.vectors.shape[1]
         return self.bases[run, : numbers * rows].reshape(rows, numbers, -1)
 

@@ -44,7 +44,7 @@ def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
 
 
 def target_word(campaign: Campaign) -> str:
-    """What a target of the campaign is called."""
+    """The noun for a target of the campaign."""
     return campaign_method(campaign).nouns.target
 
 

@@ -1,4 +1,4 @@
-"""When a mistake of the file is undone: the residual falls to the noise."""
+"""The test of a mistake of the file: undone, it lets the residual fall to the noise."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Maker = Callable[[Campaign], ChainProblem]
 
 @dataclass(frozen=True)
 class Mistake:
-    """What looks wrong in the file: ``what`` in words, and the RMS of all coordinates in mm with it and without."""
+    """A likely mistake of the file: ``what`` in words, and the RMS of all coordinates in mm with it and without."""
 
     what: str
     rms_as_recorded: float

@@ -1,4 +1,4 @@
-"""How far apart a plan keeps effects, in standard deviations, and the poses that increase it most."""
+"""Distances between effects under a plan, in standard deviations, and the poses that increase them most."""
 
 from __future__ import annotations
 

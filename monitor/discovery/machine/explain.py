@@ -1,4 +1,4 @@
-"""Which physical effect is missing: the whole way from a fitted model to an answer.
+"""The physical effects that are missing: the whole way from a fitted model to an answer.
 
 Fit, scan, add the findings to the model, look for bad points and balls that moved under that model, leave them out and
 begin again until nothing changes. Then the steps between runs, what varies without a recorded column, what cannot be

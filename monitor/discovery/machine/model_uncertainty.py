@@ -1,4 +1,4 @@
-"""What lack of fit may do to the parameters: a systematic deviation is no noise, and pulls where noise would not.
+"""The uncertainty by lack of fit: a systematic deviation is no noise, and pulls parameters where noise would not.
 
 A deviation that is the same in every run leaves part of itself in the residual and hides the other part in the
 parameters. Taken as more noise of the same size, the hidden part comes out several times too small, because

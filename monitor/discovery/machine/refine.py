@@ -53,7 +53,7 @@ class _Range:
 
 
 def _range_of(candidate: ChainCandidate) -> _Range | None:
-    """What is searched of a candidate; None where nothing is."""
+    """The value that is searched of a candidate; None where there is none."""
     effect, family, variant = candidate.effect, candidate.family, candidate.variant
     if variant.tries == 1:
         return None

@@ -20,7 +20,7 @@ SCATTERS = 1e-3
 def _run_by_run(
     columns: Array, residual: Array, lengths: Array, rows: npt.NDArray[np.int64]
 ) -> tuple[Array, npt.NDArray[np.int64]]:
-    """What candidates explain (n,) with another size in every run, and the rank (n,) of that.
+    """Sums of squares (n,) that candidates explain with another size in every run, and their ranks (n,).
 
     ``columns`` (K, R, N) and ``residual`` (R, N) are run by run, ``lengths`` (K,) of whole columns, ``rows``
     (n, k) of each candidate's columns.

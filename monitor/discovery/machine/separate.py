@@ -174,7 +174,7 @@ def _reachable_touches(
 def _reachable(
     chain: Chain, positions: Array, visited: Array, strokes: Mapping[str, tuple[float, float]]
 ) -> Array:
-    """Which positions (n, J) the linear axes reach (n,)."""
+    """Mark the positions (n, J) that the linear axes reach (n,)."""
     inside = np.ones(len(positions), dtype=bool)
     for index, joint in enumerate(chain.joints):
         if joint.turns:

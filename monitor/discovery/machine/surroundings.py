@@ -1,4 +1,4 @@
-"""What a campaign says besides its probings."""
+"""The contents of a campaign besides its probings."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ def table_variants(scene: ChainScene, selected: Sequence[ChainCandidate]) -> lis
 
 
 def _score(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float:
-    """What effects say together, one after the other."""
+    """The score of effects together, one after the other."""
     return sum(
         weigh_beside(scene, [candidate], selected[:index])[0].score
         for index, candidate in enumerate(selected)

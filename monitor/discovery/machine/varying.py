@@ -1,4 +1,4 @@
-"""What varies from run to run: effects with another size in every run, which a recorded column follows or not."""
+"""Variation from run to run: effects with another size in every run, which a recorded column follows or not."""
 
 from __future__ import annotations
 

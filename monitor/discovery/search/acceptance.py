@@ -1,4 +1,4 @@
-"""What decides on a finding of the scan beside its evidence; by default nothing is refused."""
+"""The rules that decide on a finding of the scan beside its evidence; by default nothing is refused."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class Candidate(Generic[Effect]):
 
     @property
     def family(self) -> str:
-        """How the effect is written."""
+        """The effect as written."""
         return self.variant.family
 
     @property

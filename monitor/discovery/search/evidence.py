@@ -36,7 +36,7 @@ STANDS_OUT = 3.0
 
 @dataclass(frozen=True)
 class Evidence(Generic[CandidateT]):
-    """What one candidate explains: F with ``rank`` degrees of freedom in its numerator, its p-value and score.
+    """The evidence for one candidate: F with ``rank`` degrees of freedom in its numerator, its p-value and score.
 
     ``too_large`` says that it would need coefficients beyond what a machine in use is likely to have.
     """
@@ -94,7 +94,7 @@ class Pool(Generic[CandidateT]):
 
     @cached_property
     def tries(self) -> Array:
-        """How many variants of each candidate are searched."""
+        """The number of variants of each candidate that are searched."""
         return np.array([float(candidate.variant.tries) for candidate in self.candidates])
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What an effect that was found may be mistaken for."""
+"""The rivals of an effect: those that the data do not rule out instead of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be searched for missing effects: a residual, and candidates that may explain it."""
+"""The protocol of data that can be searched for missing effects: a residual, and candidates that may explain it."""
 
 from __future__ import annotations
 
