@@ -15,7 +15,7 @@ from monitor.methods.method import (
     TouchPlan,
     Unable,
 )
-from monitor.methods.registry import campaign_method, method_named, methods
+from monitor.methods.registry import campaign_method, method_named, methods, require
 
 __all__ = [
     "Able",
@@ -30,4 +30,5 @@ __all__ = [
     "campaign_method",
     "method_named",
     "methods",
+    "require",
 ]

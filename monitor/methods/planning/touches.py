@@ -56,7 +56,7 @@ class Touches:
 def planned_context(
     template: Context, positions: Array, targets: Sequence[str], nominal: Array, pose: npt.NDArray[np.int64]
 ) -> Context:
-    """The context of touches (n,) of one run that nobody made: recorded columns stand at their means."""
+    """The context of touches (n,) of one run that is only planned: recorded columns stand at their means."""
     count = len(positions)
     mean = {
         name: np.full(

@@ -1,7 +1,7 @@
-"""Tracker: reflectors on the tool of any serial chain, looked at from outside at given joint readings.
+"""Tracker: reflectors on the tool of any serial chain, observed from outside at given joint readings.
 
-Location errors of the joints and gains of linear axes are found together with the tracker's frame and the places of
-the reflectors, of which nothing has to be known. Source: B. Mooring, Z. Roth, M. Driels, Fundamentals of manipulator
+Location errors of the joints and gains of linear axes are identified together with the tracker's frame and the places
+of the reflectors, of which nothing has to be known. Source: B. Mooring, Z. Roth, M. Driels, Fundamentals of manipulator
 calibration, Wiley 1991, chapters 3 to 5; conventions as in docs/conventions.md. Axes on the work side are not seen
 and do not take part.
 """
@@ -22,12 +22,12 @@ from monitor.records import Campaign
 
 
 def tracker_base(chain: Chain) -> tuple[str, ...]:
-    """The effects that are free in every run: those of the tool's side, looked at from outside."""
+    """The effects that are free in every run: those of the tool's side, observed from outside."""
     return base_effects(tool_side(chain), outside=True)
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
-    """What the plan kept still and would have to move."""
+    """What the plan did not move and would have to move."""
     still = [joint.name for joint in still_joints(problem, run)]
     if still:
         return f": {', '.join(still)} stood still throughout; move {'it' if len(still) == 1 else 'them'} too"
