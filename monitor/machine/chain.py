@@ -20,7 +20,7 @@ from monitor.records import Array
 
 @dataclass(frozen=True)
 class ChainPose:
-    """What the chain says of n poses.
+    """The chain at n poses.
 
     ``residual`` (..., 3) in mm, from target to tip in the frame of the last work axis. ``by_error``
     (..., 3, J, 2, 6) its derivative by every error of every joint (stage 0 location, 1 motion; components

@@ -97,7 +97,7 @@ class Chain:
     def gravity(self) -> Vector:
         """The direction of gravity in the machine frame at all axes zero.
 
-        A topology does not tell it. The linear axis next to the tool is taken as the vertical one, as on
+        A topology does not state it. The linear axis next to the tool is taken as the vertical one, as on
         horizontal machines (Y carries the spindle head) and vertical ones (Z does); Z without such an axis.
         """
         if self.down is not None:

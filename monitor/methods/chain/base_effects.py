@@ -1,10 +1,10 @@
-"""The location errors and gains that a chain needs, found from its own rank.
+"""The location errors and gains that a chain needs, determined from its own rank.
 
 Of all location errors of a serial chain many do the same thing at the tip; a complete and minimal set is
 chosen in a fixed order, outermost axes first, so that an error is given to the axis nearest to the workpiece
 or tool. For ``w C B X b Z Y (C1) t`` this gives the ten of SAMBA.
 
-A chain with fewer than three linear axes, such as a robot, cannot bring its tool to any target; it is looked at
+A chain with fewer than three linear axes, such as a robot, cannot bring its tool to any target; it is observed
 from outside, its base frame and the points on its tool being unknown. There the zeros of the joints come first:
 they are what a collision or an exchanged motor changes and what the control can correct. For six joints of an
 elbow robot this gives 18 errors, with frame and one point 27: 4 a rotary joint and 3 for the point, the number
@@ -82,7 +82,7 @@ def _generic_jacobian(chain: Chain) -> tuple[Array, Array]:
 
 
 def _candidates_outside(chain: Chain) -> list[tuple[Joint, int]]:
-    """Location errors that a look from outside can find: the zeros of the joints, shifts, tilts, outermost first.
+    """Location errors that an observer outside can identify: the zeros of the joints, shifts, tilts, outermost first.
 
     A tilt that the zero of the joint before does together with a shift is left to these two, as in Denavit and
     Hartenberg's parameters; with a short link between them it would come out as large as the link is short.
@@ -97,7 +97,7 @@ def _candidates_outside(chain: Chain) -> list[tuple[Joint, int]]:
 
 
 def _generic_jacobian_outside(chain: Chain) -> tuple[Array, Array]:
-    """The same for a chain that is looked at from outside: the nuisance is a frame, points on the tool and gains."""
+    """The same for a chain that is observed from outside: the nuisance is a frame, points on the tool and gains."""
     rng = np.random.default_rng(SEED)
     count = POSES * TARGETS
     half = {"linear": REACH, "rotary": np.pi, "spindle": np.pi}
@@ -129,7 +129,7 @@ def _generic_jacobian_outside(chain: Chain) -> tuple[Array, Array]:
 def base_effects(chain: Chain, outside: bool | None = None) -> tuple[str, ...]:
     """The effects of a complete and minimal model of a chain, location errors in chain order, then gains.
 
-    ``outside`` says whether the chain is looked at from outside; None: where it cannot touch a target at will.
+    ``outside`` says whether the chain is observed from outside; None: where it cannot touch a target at will.
     """
     if outside is None:
         outside = len(chain.of_kind("linear")) < 3

@@ -2,7 +2,7 @@
 
 The runs share only the common unknowns, so every Gauss-Newton step takes each run's own columns out first
 (QR, then a singular value decomposition of the small triangle) and solves for the common ones on what is
-left. What the data cannot separate is found by the rank, gets no step and no number, and is named.
+left. What the data cannot separate is detected by the rank, gets no step and no number, and is named.
 """
 
 from __future__ import annotations
@@ -98,13 +98,20 @@ def project_out(basis: Array, columns: Array) -> Array:
     return remainder
 
 
-def _common_step(
-    remainder: Array, whole: Array, residual: Array
-) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-    """Step, covariance and identifiability of the common unknowns."""
+@dataclass(frozen=True)
+class _CommonStep:
+    """The step of the common unknowns (c,), their covariance (c, c), and which of them the data determine (c,)."""
+
+    step: Array
+    covariance: Array
+    free: npt.NDArray[np.bool_]
+
+
+def _common_step(remainder: Array, whole: Array, residual: Array) -> _CommonStep:
+    """The step of the common unknowns from what is left of their derivatives, ``whole`` before, and the residual."""
     count = remainder.shape[-1]
     if count == 0:
-        return np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool)
+        return _CommonStep(np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool))
     scale = np.linalg.norm(whole.reshape(-1, count), axis=0)
     scale[scale == 0] = 1.0
     matrix = remainder.reshape(-1, count) / scale
@@ -113,7 +120,7 @@ def _common_step(
     inverse_s = np.where(keep, 1.0 / np.where(keep, s, 1.0), 0.0)
     inverse = (vt.T * inverse_s) / scale[:, None]
     free = np.abs(vt[~keep]).max(axis=0, initial=0.0) < MEMBER_SHARE
-    return -inverse @ (u.T @ residual.reshape(-1)), inverse @ inverse.T, free
+    return _CommonStep(-inverse @ (u.T @ residual.reshape(-1)), inverse @ inverse.T, free)
 
 
 def solve(
@@ -136,22 +143,22 @@ def solve(
             space, spanned = eliminate(current.local), current.local
         whole = np.concatenate([current.common, current.residual[..., None]], axis=-1)
         remainder = project_out(space.basis, whole)
-        step_common, covariance, free = _common_step(remainder[..., :-1], current.common, remainder[..., -1])
-        moved = current.residual + current.common @ step_common
+        of_common = _common_step(remainder[..., :-1], current.common, remainder[..., -1])
+        moved = current.residual + current.common @ of_common.step
         in_basis = -np.einsum("rnp,rn->rp", space.basis, moved)
         step_local = np.einsum("rkp,rp->rk", space.inverse, in_basis)
-        size = float(np.sqrt(np.sum(in_basis**2) + np.sum((remainder[..., :-1] @ step_common) ** 2)))
+        size = float(np.sqrt(np.sum(in_basis**2) + np.sum((remainder[..., :-1] @ of_common.step) ** 2)))
         factor = 1.0
         for _ in range(MOST_HALVINGS):
-            trial = linearise(local + factor * step_local, common + factor * step_common)
+            trial = linearise(local + factor * step_local, common + factor * of_common.step)
             trial_cost = float(np.sum(trial.residual**2))
             if trial_cost <= cost or size < 1.0:
                 break
             factor /= 2.0
-        local, common = local + factor * step_local, common + factor * step_common
+        local, common = local + factor * step_local, common + factor * of_common.step
         current, cost = trial, trial_cost
         if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
-            return _solution(local, common, current, space, covariance, free, iteration)
+            return _solution(local, common, current, space, of_common, iteration)
         before = size
     raise DataError(
         f"the identification did not converge in {most} steps: the readings contradict the machine file; "
@@ -164,22 +171,21 @@ def _solution(
     common: Array,
     last: Linearisation,
     space: _Elimination,
-    covariance: Array,
-    free: npt.NDArray[np.bool_],
+    of_common: _CommonStep,
     iterations: int,
 ) -> Solution:
     # The last step was a hundred-thousandth of a standard deviation or less: the space before it is that after it.
     local_covariance = space.inverse @ np.swapaxes(space.inverse, -1, -2)
     reaction = space.inverse @ (np.swapaxes(space.basis, -1, -2) @ last.common)
-    local_covariance = local_covariance + reaction @ covariance @ np.swapaxes(reaction, -1, -2)
+    local_covariance = local_covariance + reaction @ of_common.covariance @ np.swapaxes(reaction, -1, -2)
     share = np.abs(space.null_space).max(axis=1)
     return Solution(
         local=local,
         common=common,
         local_covariance=local_covariance,
-        common_covariance=covariance,
+        common_covariance=of_common.covariance,
         local_free=share < MEMBER_SHARE,
-        common_free=free,
+        common_free=of_common.free,
         null_space=space.null_space,
         rank=space.rank,
         iterations=iterations,

@@ -4,7 +4,7 @@ Something on the tool side is brought to, or seen from, something on the work si
 coefficients of the model's base effects and those of its own that the method adds (balls, stylus tip, frames,
 faces); those common to the campaign are the coefficients of the effects that were added. A method says where the two
 ends of the chain are (``ends``), how they depend on its own unknowns (``by_own``), which part of the vector between
-them a reading tells (``observe``), and which calibrated quantities it has besides (``extras``).
+them a reading measures (``observe``), and which calibrated quantities it has besides (``extras``).
 """
 
 from __future__ import annotations
@@ -69,11 +69,11 @@ class ChainProblem(ABC):
         """Derivatives (n, 3, q) of the vector from the work end to the tool end by the own unknowns."""
 
     def observe(self, rows: Array) -> Array:
-        """What the readings tell (n, d, ...) of vectors or their derivatives (n, 3, ...): all three components."""
+        """The part (n, d, ...) that is measured of vectors or their derivatives (n, 3, ...): all three components."""
         return rows
 
     def as_vectors(self, rows: Array) -> Array:
-        """Residuals (n, d) as vectors (n, 3) mm in the frame of the last work axis: the shortest that tell the same."""
+        """Residuals (n, d) as the shortest vectors (n, 3) mm in the frame of the last work axis."""
         if self.components == ("x", "y", "z"):
             return rows
         directions = self.observe(np.tile(np.eye(3), (len(self.context), 1, 1)))
@@ -103,7 +103,7 @@ class ChainProblem(ABC):
         return replace(self, context=self.context.expecting(stops(bare, solve_problem(bare))))
 
     def for_search(self) -> Self:
-        """The problem in which missing effects are looked for."""
+        """The problem in which missing effects are searched."""
         return self.foreseen()
 
     @property

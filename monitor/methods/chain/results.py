@@ -1,4 +1,4 @@
-"""What a solved problem reports: the numbers of every run, and what the plan cannot tell apart."""
+"""The results of a solved problem: the numbers of every run, and what the plan cannot separate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a run says enough: the joints that stood still in it, and its readings against its unknowns."""
+"""Whether a run suffices: the joints that stood still in it, and its readings against its unknowns."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Distance:
 
 @dataclass(frozen=True)
 class TouchProblem(ChainProblem):
-    """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is told.
+    """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is measured.
 
     ``beside`` (n, 3) mm is what the readings differ by where the chain stands at expected places.
     """
@@ -59,14 +59,14 @@ class TouchProblem(ChainProblem):
 
     @property
     def measured_joints(self) -> tuple[int, ...]:
-        """The linear axes: their readings say where the tip met the ball."""
+        """The linear axes: their readings are where the tip met the ball."""
         return tuple(index for index, joint in enumerate(self.context.chain.joints) if not joint.turns)
 
     def foreseen(self) -> TouchProblem:
         """As read, unless an axis stands still while a ball is probed at all its poses.
 
         Where balls move every axis by millimetres from touch to touch, the reading is as good as the expected place. An
-        axis that stands still (along a single rotary axis) tells little but its noise, and leaves gains to what moves
+        axis that stands still (along a single rotary axis) measures its noise, and leaves gains to what moves
         the others least: the chain is then taken where it is expected to stop, what the readings differ by beside it.
         """
         if self.context.expected is not None or not self._stands_still:

@@ -1,6 +1,6 @@
 """The least-squares fit of a curve: one response over its inputs, a base model in one line, and added effects.
 
-Everything linear is solved for exactly at every step; periods, constants and places that are to be found from the
+Everything linear is solved for exactly at every step; periods, constants and places that are to be estimated from the
 data are refined by Gauss-Newton on all unknowns together (variable projection gives the start: Golub and
 Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). Where neighbouring rows resemble each other the standard
 uncertainties allow for it; the estimates stay those of ordinary least squares.
@@ -68,7 +68,7 @@ class CurveFit:
 
     @property
     def exact(self) -> bool:
-        """Whether what is left is the rounding of numbers and no noise that says anything."""
+        """Whether the residual is the rounding of numbers rather than noise."""
         return self.rms < EXACT * float(np.ptp(self.problem.curve.measured[~self.problem.left_out]))
 
     @property

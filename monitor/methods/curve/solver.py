@@ -97,7 +97,7 @@ def refined(
 
 def _bounds(problem: CurveProblem, effect: CurveEffect) -> tuple[float, float]:
     """How far the frequency or rate of a searched value may go from where it begins: half of what two periods have to
-    differ by to be told apart, so that they do not run into each other; a factor of ten or a hundred for a constant."""
+    differ by to be separated, so that they do not run into each other; a factor of ten or a hundred for a constant."""
     rate = 1.0 / float(effect.value or 1.0)
     if effect.shape == "sin":
         # A cycle longer than the range is a bend, not a cycle.

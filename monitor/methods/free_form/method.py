@@ -1,4 +1,4 @@
-"""Free-form self-calibration: the shape of a workpiece and the errors of the axes that probe it, found together.
+"""Free-form self-calibration: the shape of a workpiece and the errors of the axes that probe it, identified together.
 
 The same points are probed with the rotary table at several angles. The errors of two linear axes are tables over
 their travel, those of the rotary table one set an angle, the shape one number a point along the surface's normal;

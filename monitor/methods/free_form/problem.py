@@ -134,7 +134,7 @@ class FreeFormProblem(ChainProblem):
         """The same probings where a machine without errors would have met the nominal points.
 
         There the null vectors are exact. At the readings themselves errors of 50 µrad and 10 µm leave products of
-        second order, 1e-4 of a column, which no tolerance would tell from a plan that barely sees an unknown.
+        second order, 1e-4 of a column, which no tolerance would separate from a plan that barely determines an unknown.
         """
         chain, positions = self.context.chain, self.context.positions.copy()
         none = np.zeros((len(self.context), len(chain.joints), 2, 6))
@@ -162,7 +162,7 @@ class FreeFormProblem(ChainProblem):
 
     @cached_property
     def as_read(self) -> Array:
-        """What the readings tell (n, 1) in mm of a machine and workpiece without errors, exactly (Eq. 3)."""
+        """The residuals (n, 1) in mm of a machine and workpiece without errors, exactly (Eq. 3)."""
         none = np.zeros((len(self.context), len(self.context.chain.joints), 2, 6))
         ends = self.ends(self.own_start)
         return self.observe(evaluate(self.context.chain, self.context.positions, none, *ends).residual)

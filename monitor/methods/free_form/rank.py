@@ -45,7 +45,7 @@ def missing_conditions(problem: FreeFormProblem) -> dict[str, str]:
 
 
 def reason_of(problem: FreeFormProblem, parameters: tuple[str, ...], run: int) -> str:
-    """Why ``parameters`` of a run cannot be told apart, and what would separate them."""
+    """Why ``parameters`` of a run cannot be separated, and what would separate them."""
     missing = {name: meaning for name, meaning in missing_conditions(problem).items() if name in parameters}
     if missing:
         listed = "; ".join(f"{name} = 0 ({meaning})" for name, meaning in missing.items())

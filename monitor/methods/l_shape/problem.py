@@ -139,7 +139,7 @@ class LShapeProblem(ChainProblem):
 
     def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """Residuals (n, 6): displacement in mm from the module to the sensor, then how much further a point 1 mm
-        along the faces' normal is displaced, in mm/mm, both less what the spots say."""
+        along the faces' normal is displaced, in mm/mm, both less what the spots measure."""
         errors, target, tip = self.state(local, common)
         chain, positions = self.context.chain, self.context.positions
         normal, arms = self.frames[:, 2], self.frames[:, :2]
@@ -191,7 +191,7 @@ class LShapeProblem(ChainProblem):
 
     @cached_property
     def _perfect(self) -> ChainPose:
-        """A machine without errors and a piece laid down exactly: what the spots say of it, and the derivatives."""
+        """A machine without errors and a piece laid down exactly: its spots, and the derivatives."""
         return self.evaluated(self.start, np.zeros(len(self.added_names)), jacobian=True)
 
     @cached_property
@@ -215,9 +215,9 @@ class LShapeProblem(ChainProblem):
     def linearise(self, local: Array, common: Array) -> Linearisation:
         """Whitened residuals and derivatives.
 
-        To first order, as the source has it: what the placements cannot tell apart is then exactly so, where products
-        of errors (3e-4 of a derivative) would seem to tell it. Neglected: a tenth of a micrometre for a piece of 200
-        mm that lies 1 mrad askew, 4 nm at 0.2 mrad.
+        To first order, as the source has it: what the placements cannot separate is then exactly so, where products
+        of errors (3e-4 of a derivative) would seem to separate it. Neglected: a tenth of a micrometre for a piece of
+        200 mm that lies 1 mrad askew, 4 nm at 0.2 mrad.
         """
         by_error = self._perfect.by_error
         assert by_error is not None
@@ -248,7 +248,7 @@ class LShapeProblem(ChainProblem):
 
     def for_search(self) -> LShapeProblem:
         """The modules deviate from their calibration alike in all R runs. Each run has a deviation of its own here,
-        so its uncertainty is widened by the root of R: all runs together then say as little of it as one does."""
+        so its uncertainty is widened by the root of R: all runs together then determine it no better than one does."""
         wider = float(np.sqrt(len(self.runs)))
         piece = replace(
             self.piece,

@@ -33,7 +33,7 @@ class Expected:
 
     @property
     def separation(self) -> Array:
-        """From 0 (the plan cannot tell the parameter from others) to 1 (nothing is lost to them), (k,)."""
+        """From 0 (the plan cannot separate the parameter from others) to 1 (nothing is lost to them), (k,)."""
         return np.asarray(
             np.where(np.isfinite(self.u), self.alone / np.where(np.isfinite(self.u), self.u, 1.0), 0.0)
         )

@@ -34,7 +34,7 @@ class Touches:
 
     ``poses`` (P, J) rotary positions, rad; ``positions`` (P, T, J) where the axes stand; ``rows`` (P, T, 3, q)
     derivatives of the vectors by the q parameters ``names``, in standard uncertainties ``sigma`` (mm) of a
-    coordinate; ``reachable`` (P, T). The tip's coordinates are the last three parameters.
+    coordinate; ``reachable`` (P, T). The tip's coordinates are the last three parameters unless it is known.
     """
 
     targets: tuple[str, ...]
@@ -56,7 +56,7 @@ class Touches:
 def planned_context(
     template: Context, positions: Array, targets: Sequence[str], nominal: Array, pose: npt.NDArray[np.int64]
 ) -> Context:
-    """The context of touches (n,) of one run that nobody made: recorded columns stand at their means."""
+    """The context of touches (n,) of one run that is only planned: recorded columns stand at their means."""
     count = len(positions)
     mean = {
         name: np.full(
@@ -90,6 +90,8 @@ def candidate_touches(
     targets: Sequence[str],
     places: Array,
     strokes: Mapping[str, tuple[float, float]],
+    *,
+    tip_known: bool = False,
 ) -> Touches:
     """Every touch of ``targets`` (T,) at ``places`` (T, 3) mm, at the rotary ``poses`` (P, J) in rad.
 
@@ -113,7 +115,10 @@ def candidate_touches(
         np.repeat(np.arange(len(poses)), len(targets)),
     )
     parts = [effect.basis(context).displacement(pose.by_error) for effect in problem.base]
-    names = (*problem.base_names, "tip x", "tip y", "tip z")
+    names = problem.base_names
+    if not tip_known:
+        parts.append(pose.by_tip)
+        names = (*names, "tip x", "tip y", "tip z")
     sigma = float(np.sqrt(np.mean(problem.sigma[np.isfinite(problem.sigma)] ** 2)))
     inside = np.ones(count, dtype=bool)
     for index, joint in enumerate(chain.joints):
@@ -125,7 +130,7 @@ def candidate_touches(
         targets=tuple(targets),
         poses=poses,
         positions=positions.reshape(*shape, -1),
-        rows=(np.concatenate([*parts, pose.by_tip], axis=-1) / sigma).reshape(*shape, 3, len(names)),
+        rows=(np.concatenate(parts, axis=-1) / sigma).reshape(*shape, 3, len(names)),
         reachable=inside.reshape(shape),
         names=names,
         reported=len(problem.base_names),

@@ -1,4 +1,4 @@
-"""The location errors of rotary axes that touching one piece at indexed angles can tell, found from the chain's rank.
+"""The location errors of rotary axes that touching one piece at indexed angles determines, by the chain's rank.
 
 The linear axes and the stylus tip count as known, the piece as unknown: whatever does the same as moving the piece
 or the points on it drops out. For ``w C A Y b X Z t`` these are the eight of Ibaraki et al. 2012, Table 1.

@@ -10,7 +10,7 @@ from monitor.methods.rotary_probing.problem import NAME, problem_of
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
-    """What the plan kept still and would have to move."""
+    """What the plan did not move and would have to move."""
     still = [joint.name for joint in still_joints(problem, run, "rotary")]
     if still:
         return f": {' and '.join(still)} stands at one angle throughout; index it too"

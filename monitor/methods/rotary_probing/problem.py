@@ -1,10 +1,10 @@
 """Rotary probing: location errors of rotary axes from touching one test piece at indexed angles.
 
-A touch tells one number: how far the stylus tip's centre stands from the surface, along its normal. The same points
+A touch measures one number: how far the stylus tip's centre stands from the surface, along its normal. The same points
 are touched at several angles, so their heights are unknowns of the run, and place and shape of the piece cancel. A
 sphere is touched from several sides at every pose; its centre and its effective radius (its own and the tip's) are
 unknowns. The linear axes and the stylus tip count as known: their errors go into the result (docs/rotary-probing.md
-says how far), as none of these touches can tell them from errors of the rotary axes.
+says how far), as none of these touches separates them from errors of the rotary axes.
 
 Any chain with rotary axes, any poses, faces with any normals. Source: S. Ibaraki, T. Iritani, T. Matsushita, 2012;
 its closed forms are a reference of the tests. Two products of small numbers are neglected: the tilt of a face against
@@ -43,9 +43,9 @@ DIRECTIONS = 3
 
 @dataclass(frozen=True)
 class RotaryProblem(ChainProblem):
-    """Touches of faces and spheres. ``normal`` (n, 3) is the direction in which a touch tells, outwards, in the frame
-    of the last work axis; ``reference`` (n, 3) mm where the touched point lies in it, a sphere's centre for its
-    touches; ``ball`` (n,) whether the target is a sphere; ``tip`` (3,) mm the tip's centre in the spindle frame."""
+    """Touches of faces and spheres. ``normal`` (n, 3) is the direction that a touch measures, outwards, in the frame of
+    the last work axis; ``reference`` (n, 3) mm where the touched point lies in it, a sphere's centre for its touches;
+    ``ball`` (n,) whether the target is a sphere; ``tip`` (3,) mm the tip's centre in the spindle frame."""
 
     normal: Array
     reference: Array

@@ -1,6 +1,6 @@
 """SAMBA: scale and master balls artefact; balls touched at many indexations, a calibrated bar for the length.
 
-The geometric errors, the balls' places and the stylus tip are found together (34 unknowns with 4 balls and a
+The geometric errors, the balls' places and the stylus tip are identified together (34 unknowns with 4 balls and a
 bar on a five-axis machine), so nothing but the bar has to be calibrated. Source: A. Los, Uncertainty
 estimation in indirect calibration of five-axis machine tools, Polytechnique Montréal 2017, chapters 3 and 4;
 conventions as in docs/conventions.md.
@@ -16,8 +16,9 @@ from monitor.machine import refuse_untouchable
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
 from monitor.methods.chain.touch import Distance, TouchProblem
-from monitor.methods.method import ChainMethod, Nouns, TouchPlan
+from monitor.methods.method import ChainMethod, Nouns, Rehearsal, TouchPlan
 from monitor.methods.model import Model, chain_of
+from monitor.methods.samba.virtual import virtual_campaign
 from monitor.records import Array, Campaign
 
 NAME = "samba"
@@ -70,7 +71,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TouchProblem
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
-    """What the plan kept still and would have to move."""
+    """What the plan did not move and would have to move."""
     missing = _bar_ends_missing(problem, run)
     if missing and _gains(problem).intersection(parameters):
         return f": run {run} did not probe {' and '.join(missing)} of the scale bar, the unit of length"
@@ -120,4 +121,5 @@ METHOD = ChainMethod(
     refuse=refuse,
     advice=advice,
     plan=TouchPlan(),
+    rehearsal=Rehearsal("machine tool", virtual_campaign, noise_um=1.0),
 )

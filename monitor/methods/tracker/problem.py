@@ -1,4 +1,4 @@
-"""Looking from outside: reflectors carried by the tool, measured by a tracker or camera in a frame of its own.
+"""Observation from outside: reflectors carried by the tool, measured by a tracker or camera in a frame of its own.
 
 A run's own unknowns are the frame (as a small motion away from a first guess), the places of the reflectors on the
 tool in the frame of the last tool axis, and those of reflectors fixed beside the machine. The first guess comes

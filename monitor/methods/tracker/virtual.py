@@ -16,7 +16,7 @@ from monitor.exceptions import EffectError
 from monitor.machine import Chain, evaluate
 from monitor.machine.chain import rotation_about
 from monitor.methods.model import chain_of
-from monitor.methods.tracker.method import problem_of
+from monitor.methods.tracker.assembly import problem_of
 from monitor.records import (
     Array,
     Artefact,
