@@ -14,9 +14,13 @@ from monitor.store.analyses import (
     save_analysis,
     stored_analyses,
 )
+from monitor.store.audit import AuditEntry, last_entries
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
+    CampaignRow,
+    RunRow,
+    WithdrawnCampaign,
     described_machines,
     list_campaigns,
     list_machines,
@@ -34,7 +38,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.events import NOTE, list_events, machine_events, record_event
+from monitor.store.events import NOTE, EventRow, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
@@ -55,11 +59,15 @@ from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
 __all__ = [
     "NOTE",
+    "AuditEntry",
     "Backup",
+    "CampaignRow",
     "Database",
+    "EventRow",
     "FleetSums",
     "Imported",
     "MachineHistory",
+    "RunRow",
     "StoredAnalysis",
     "StoredCertificate",
     "StoredIdentification",
@@ -69,6 +77,7 @@ __all__ = [
     "StoredSelection",
     "Verification",
     "Withdrawal",
+    "WithdrawnCampaign",
     "campaign_notes",
     "certificate_numbers",
     "check_analysis",
@@ -83,6 +92,7 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "last_entries",
     "latest_documents",
     "latest_tolerances",
     "list_analyses",

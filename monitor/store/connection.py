@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 import duckdb
 import pandas as pd
@@ -26,6 +26,7 @@ from monitor.exceptions import StoreError
 from monitor.store import migrations
 
 Parameters = Sequence[Any] | Mapping[str, Any]
+Record = TypeVar("Record")
 
 _LOCKED = re.compile(r"Conflicting lock is held in (.*?) ?\(PID (\d+)\)")
 
@@ -85,6 +86,13 @@ class Database:
         """The rows of a query as tuples."""
         with self._lock, _stopped_by_ctrl_c():
             return self._connection.execute(sql, parameters).fetchall()
+
+    def records(self, kind: type[Record], sql: str, parameters: Parameters = ()) -> tuple[Record, ...]:
+        """Return the rows of a query as records of a kind, whose fields are named as the columns."""
+        with self._lock, _stopped_by_ctrl_c():
+            cursor = self._connection.execute(sql, parameters)
+            names = [column[0] for column in cursor.description or ()]
+            return tuple(kind(**dict(zip(names, row, strict=True))) for row in cursor.fetchall())
 
     def frame(self, sql: str, parameters: Parameters = ()) -> pd.DataFrame:
         """The rows of a query as a table, for views that people read."""

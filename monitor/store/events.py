@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
+from monitor.documents import IN_UTC
 from monitor.exceptions import InputError
 from monitor.store import audit
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database, utc_now
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 #: A note is shown beside the history. An event of any other kind may have changed the machine, and splits it.
 NOTE = "note"
+
+
+@dataclass(frozen=True)
+class EventRow:
+    """An event as the view ``v_events`` has it; ``happened_at_local`` is by the shop's clock."""
+
+    event_id: int
+    machine: str
+    happened_at: datetime = field(metadata=IN_UTC)
+    happened_at_local: datetime
+    kind: str
+    description: str
+    recorded_at: datetime = field(metadata=IN_UTC)
 
 
 def record_event(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> int:
@@ -48,9 +59,10 @@ def record_event(db: Database, machine: str, happened_at: datetime, kind: str, d
     return number
 
 
-def list_events(db: Database, machine: str | None = None) -> pd.DataFrame:
-    """The events of all machines or of one, in the order of time: the view ``v_events``."""
-    return db.frame(
+def list_events(db: Database, machine: str | None = None) -> tuple[EventRow, ...]:
+    """Return the events of all machines or of one, by machine and time."""
+    return db.records(
+        EventRow,
         "SELECT * FROM v_events WHERE $machine IS NULL OR machine = $machine ORDER BY machine, happened_at",
         {"machine": machine},
     )

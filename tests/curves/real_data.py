@@ -26,7 +26,7 @@ from monitor.store import Database
 from monitor.workflow import models
 from monitor.workflow.explain import comparison, curves
 from monitor.workflow.explain.curve_figures import residual_figure
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "real-data.md"
@@ -52,7 +52,7 @@ def tell(names: tuple[str, ...] | None = None) -> dict[str, Told]:
         for name, one in series().items():
             if names is not None and name not in names:
                 continue
-            import_folders(db, [write(one, Path(made) / name)])
+            import_folders(db, ImportRequest([write(one, Path(made) / name)]))
             explained, explanation = curves.explain(db, name)
             model = "curve"
             for step, missing in enumerate(explained["missing"], start=1):

@@ -15,10 +15,10 @@ import pytest
 
 from monitor.methods.rotary_probing.patterns import SYMBOLS
 from monitor.store import Database
-from monitor.workflow import keeping
+from monitor.workflow.events import EventRequest, record
 from monitor.workflow.explain.comparison import compare
 from monitor.workflow.identify.identification import identify
-from monitor.workflow.intake import campaigns
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.trend.trends import trends
 from monitor.workflow.uncertainty.evaluation import uncertainty
@@ -34,7 +34,7 @@ COMPENSATED = {"EX0A", "EY0A", "EZ0A", "EA0C"}
 def db(tmp_path_factory):
     with Database(tmp_path_factory.mktemp("rotary") / "x.duckdb") as own:
         for name in ("tilting-table", "tilting-table-compensated"):
-            campaigns.import_folders(own, [ROOT / "examples" / name])
+            import_folders(own, ImportRequest([ROOT / "examples" / name]))
         yield own
 
 
@@ -53,7 +53,7 @@ def test_table_4_only_the_z_offset_drifts(db):
 
 def test_table_4_compensation_moves_what_was_compensated(db):
     noon = datetime(2012, 3, 5, 12, 0, tzinfo=timezone(timedelta(hours=9)))
-    keeping.record(db, "TILT-500", noon, "compensation", "dx, dy, dz and the zero of A")
+    record(db, EventRequest("TILT-500", noon, "compensation", "dx, dy, dz and the zero of A"))
     (pair,) = trends(db, "TILT-500").document["agreement"]
     assert pair["kind"] == "event"
     assert pair["campaigns"] == ["tilting-table", "tilting-table-compensated"]
@@ -103,7 +103,7 @@ def both_methods(simulator: ModuleType, folder: Path, rotary: dict[str, float]) 
         first=datetime(2026, 3, 9, 9, 0, tzinfo=UTC),
     )  # fmt: skip
     own = Database(folder / "two.duckdb")
-    campaigns.import_folders(own, [folder / "s", folder / "r"])
+    import_folders(own, ImportRequest([folder / "s", folder / "r"]))
     return own
 
 

@@ -9,7 +9,7 @@ from monitor.methods.samba.method import problem_of
 from monitor.methods.samba.virtual import virtual_campaign
 from monitor.store import Database
 from monitor.workflow import models
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.simulation import simulate
 from monitor.workflow.volumetric.known_errors import _of_shared
 from monitor.workflow.volumetric.volumetric import at_zero, volumetric_map
@@ -57,7 +57,7 @@ def database(tmp_path_factory):
     folder = tmp_path_factory.mktemp("volumetric")
     simulate(folder / "hidden", "EBB:harmonic2", 8.0, 1.0, 3)
     with Database(folder / "map.duckdb") as db:
-        import_folders(db, [folder / "hidden"])
+        import_folders(db, ImportRequest([folder / "hidden"]))
         models.add(db, "EBB:harmonic2", "samba", "with-b")
         yield db
 

@@ -13,7 +13,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow import keeping
+from monitor.workflow import events
 
 EXAMPLE = 'monitor event HU40-T --at 2026-03-05T07:00:00-05:00 --kind repair "B axis encoder changed"'
 
@@ -47,10 +47,12 @@ def run(options: Namespace) -> int:
         raise InputError("say when it happened: --at 2026-03-05T07:00:00-05:00")
     with opened(options) as db:
         if options.text is not None and moment is not None:
-            keeping.record(db, options.machine, moment, options.kind, options.text)
-        found = keeping.events(db, options.machine)
+            request = events.EventRequest(options.machine, moment, options.kind, options.text)
+            answer = events.record(db, request)
+        else:
+            answer = events.events(db, events.EventsRequest(options.machine))
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        output.listing(found["events"], "nothing was recorded yet")
+        output.listing(answer.events, "nothing was recorded yet")
     return 0

@@ -21,10 +21,10 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("writing"):
-        found = keeping.export(db, options.folder, options.format_)
+        answer = keeping.export(db, keeping.ExportRequest(options.folder, options.format_))
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        for file in found["files"]:
-            output.say(file)
+        for file in answer.files:
+            output.say(str(file))
     return 0

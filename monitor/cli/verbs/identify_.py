@@ -40,7 +40,7 @@ def run(options: Namespace) -> int:
     if options.stepwise:
         return _stepwise(options)
     with opened(options) as db, output.working("identifying"), db.transaction():
-        names = campaigns.chosen(db, options.campaign)
+        names = campaigns.selected_campaigns(db, options.campaign)
         found = [
             (curves.identify if is_curve(db, name) else identify)(db, name, options.model, options.number)
             for name in names
