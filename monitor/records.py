@@ -88,9 +88,9 @@ class Machine:
 
     def is_linear(self, axis: str) -> bool:
         """Whether an axis travels rather than turns."""
-        for one in self.chain:
-            if one.name == axis:
-                return one.kind == "linear"
+        for chain_axis in self.chain:
+            if chain_axis.name == axis:
+                return chain_axis.kind == "linear"
         return axis[:1] in LINEAR_LETTERS
 
 
@@ -197,8 +197,8 @@ class LShape:
 
     @property
     def reference(self) -> int:
-        """Place of the reference module."""
-        return min(range(len(self.modules)), key=lambda place: sum(c**2 for c in self.modules[place].centre))
+        """Index of the reference module."""
+        return min(range(len(self.modules)), key=lambda index: sum(c**2 for c in self.modules[index].centre))
 
 
 @dataclass(frozen=True)
@@ -244,15 +244,15 @@ class Probings:
     def __len__(self) -> int:
         return len(self.run)
 
-    def rows(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> Probings:
-        """The chosen rows (a mask or indices), in order."""
+    def rows(self, selection: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> Probings:
+        """Return the selected rows (a mask or indices), in order."""
         return Probings(
-            self.run[chosen],
-            self.sequence[chosen],
-            self.time[chosen],
-            self.target[chosen],
-            {axis: values[chosen] for axis, values in self.readings.items()},
-            {name: values[chosen] for name, values in self.channels.items()},
+            self.run[selection],
+            self.sequence[selection],
+            self.time[selection],
+            self.target[selection],
+            {axis: values[selection] for axis, values in self.readings.items()},
+            {name: values[selection] for name, values in self.channels.items()},
         )
 
 

@@ -79,14 +79,14 @@ def run_drift(
     if square == 0.0:
         raise DataError("all runs of a day began at the same time; a drift needs times that differ")
     slope = t @ y / square
-    left = y - t[:, None] * slope
+    residual = y - t[:, None] * slope
     u = np.sqrt(np.diag(covariance))
-    own = np.sqrt(np.sum(left**2, axis=0) / dof) / u
-    common = k > 1 and _alike(own**2, dof)
-    scale = own
+    ratio = np.sqrt(np.sum(residual**2, axis=0) / dof) / u
+    common = k > 1 and _alike(ratio**2, dof)
+    scale = ratio
     if common:
         # In whitened columns the parameters are independent, whatever the plan correlates.
-        white = np.linalg.solve(np.linalg.cholesky(covariance), left.T)
+        white = np.linalg.solve(np.linalg.cholesky(covariance), residual.T)
         scale = np.full(k, np.sqrt(np.sum(white**2) / (dof * k)))
         dof *= k
     error = scale * u / np.sqrt(square)

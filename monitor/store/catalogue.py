@@ -109,21 +109,21 @@ def described_machines(db: Database) -> tuple[Machine, ...]:
 
 def campaign_number(db: Database, name: str) -> int:
     """The number of a campaign in the tables. Raises NotFoundError listing what is there."""
-    found = db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [name])
-    if not found:
+    numbers = db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [name])
+    if not numbers:
         raise NotFoundError(
             f"there is no campaign {name!r}; {_withdrawn(db, name)}{_what_is_there(db, 'campaign')}"
         )
-    return int(found[0][0])
+    return int(numbers[0][0])
 
 
 def _withdrawn(db: Database, name: str) -> str:
     """Whether a campaign of that name was withdrawn, in words before others; empty where none was."""
-    found = db.rows(
+    withdrawals = db.rows(
         "SELECT withdrawn_at, reason FROM v_withdrawn_campaigns WHERE campaign = ? ORDER BY withdrawn_at DESC LIMIT 1",
         [name],
     )
-    return f"it was withdrawn on {found[0][0]:%Y-%m-%d} ({found[0][1]}); " if found else ""
+    return f"it was withdrawn on {withdrawals[0][0]:%Y-%m-%d} ({withdrawals[0][1]}); " if withdrawals else ""
 
 
 def campaigns_of_machine(db: Database, machine: str) -> dict[int, tuple[str, str]]:
@@ -131,21 +131,21 @@ def campaigns_of_machine(db: Database, machine: str) -> dict[int, tuple[str, str
 
     Raises NotFoundError, listing what is there, for a machine that has neither a campaign that counts nor an event.
     """
-    found = db.rows(
+    imported = db.rows(
         "SELECT campaign_id, campaign, method FROM imported_campaign WHERE machine = ? ORDER BY campaign_id",
         [machine],
     )
-    counting = _counting(db, [number for number, _, _ in found])
+    counting = _counting(db, [number for number, _, _ in imported])
     if not counting and not _has_event(db, machine):
         raise _no_machine(db, machine)
-    return {number: (name, method) for number, name, method in found if number in counting}
+    return {number: (name, method) for number, name, method in imported if number in counting}
 
 
 def check_machine(db: Database, machine: str) -> None:
     """Raise NotFoundError, listing what is there, for a machine that is not."""
     # The campaigns first: nearly every machine has one, and an index finds them.
-    found = db.rows("SELECT campaign_id FROM imported_campaign WHERE machine = ?", [machine])
-    if not _counting(db, [number for (number,) in found]) and not _has_event(db, machine):
+    imported = db.rows("SELECT campaign_id FROM imported_campaign WHERE machine = ?", [machine])
+    if not _counting(db, [number for (number,) in imported]) and not _has_event(db, machine):
         raise _no_machine(db, machine)
 
 

@@ -178,12 +178,12 @@ class Database:
             return
 
     def _fit(self) -> None:
-        known = migrations.available()
+        available = migrations.available()
         try:
             if not self.read_only:
-                migrations.migrate(self._connection, known)
+                migrations.migrate(self._connection, available)
                 return
-            waiting = migrations.pending(self._connection, known)
+            waiting = migrations.pending(self._connection, available)
         except StoreError as fault:
             raise StoreError(f"{self.path}: {fault}") from fault
         if waiting:
@@ -232,10 +232,10 @@ def _connect(path: str, read_only: bool, threads: int | None) -> duckdb.DuckDBPy
 def _is_being_made(path: str) -> bool:
     """Whether a file that is no database yet may be one in a moment: another process makes it just now."""
     try:
-        found = Path(path).stat()
+        status = Path(path).stat()
     except OSError:
         return False
-    return found.st_size < _HEADERS_BYTES and abs(time.time() - found.st_mtime) < _YOUNG_S
+    return status.st_size < _HEADERS_BYTES and abs(time.time() - status.st_mtime) < _YOUNG_S
 
 
 def _in_words(path: str, read_only: bool, message: str) -> str:

@@ -19,14 +19,14 @@ METHOD = "curve"
 
 def is_curve(db: Database, name: str) -> bool:
     """Whether a campaign is a curve. Raises NotFoundError listing what is there."""
-    found = db.rows("SELECT method FROM campaign WHERE campaign_id = ?", [campaign_number(db, name)])
-    return bool(found[0][0] == METHOD)
+    methods = db.rows("SELECT method FROM campaign WHERE campaign_id = ?", [campaign_number(db, name)])
+    return bool(methods[0][0] == METHOD)
 
 
 def curve_names(db: Database) -> tuple[str, ...]:
     """The campaigns that are curves, the latest first."""
-    found = db.rows("SELECT campaign FROM campaign WHERE method = ? ORDER BY campaign_id DESC", [METHOD])
-    return tuple(str(name) for (name,) in found)
+    names = db.rows("SELECT campaign FROM campaign WHERE method = ? ORDER BY campaign_id DESC", [METHOD])
+    return tuple(str(name) for (name,) in names)
 
 
 def insert_curve(db: Database, campaign_id: int, curve: CurveCampaign, content: str) -> None:

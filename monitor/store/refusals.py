@@ -46,27 +46,27 @@ def record_refusal(
     A folder that is refused again on the same day for the same faults (a job that tries every five minutes) is
     told once: the number is that of the refusal that is there.
     """
-    now = at or datetime.now().astimezone()
-    offset = now.utcoffset() or timedelta()
-    folder, kept = _utf8(folder), [_utf8(fault) for fault in faults[:FAULTS_KEPT]]
+    moment = at or datetime.now().astimezone()
+    offset = moment.utcoffset() or timedelta()
+    folder, texts = _utf8(folder), [_utf8(fault) for fault in faults[:FAULTS_KEPT]]
     with db.transaction():
-        day = now.date()
-        for one in refusals(db):
-            same = (one.folder, one.fault_count, list(one.faults)) == (folder, len(faults), kept)
-            if same and one.cleared_at is None and one.at.date() == day:
-                return one.number
+        day = moment.date()
+        for refusal in refusals(db):
+            same = (refusal.folder, refusal.fault_count, list(refusal.faults)) == (folder, len(faults), texts)
+            if same and refusal.cleared_at is None and refusal.at.date() == day:
+                return refusal.number
         number = db.next_number("refused_import", "refusal_id")
         db.execute(
             "INSERT INTO refused_import VALUES (?, ?, ?, ?, ?, ?, ?, ?::VARCHAR[], ?)",
             [
                 number,
-                now.astimezone(UTC).replace(tzinfo=None),
+                moment.astimezone(UTC).replace(tzinfo=None),
                 offset.total_seconds(),
                 folder,
                 campaign,
                 machine,
                 len(faults),
-                kept,
+                texts,
                 __version__,
             ],
         )
@@ -76,7 +76,7 @@ def record_refusal(
 
 def clear_refusals(db: Database, folder: str, campaign: str, at: datetime | None = None) -> tuple[int, ...]:
     """Mark the open refusals of a folder, or of a campaign of that name, as settled: it was imported well."""
-    now = (at or datetime.now(UTC)).astimezone(UTC).replace(tzinfo=None)
+    moment = (at or datetime.now(UTC)).astimezone(UTC).replace(tzinfo=None)
     with db.transaction():
         open_ones = db.rows(
             "SELECT refusal_id FROM v_refused_imports WHERE cleared_at IS NULL AND (folder = ? OR campaign = ?) "
@@ -84,7 +84,7 @@ def clear_refusals(db: Database, folder: str, campaign: str, at: datetime | None
             [_utf8(folder), campaign],
         )
         for (number,) in open_ones:
-            db.execute("INSERT INTO refusal_cleared VALUES (?, ?, ?)", [number, campaign, now])
+            db.execute("INSERT INTO refusal_cleared VALUES (?, ?, ?)", [number, campaign, moment])
             audit.record(db, "clear", "cleared refusal", str(number), cleared_content(db, number))
     return tuple(int(number) for (number,) in open_ones)
 

@@ -51,21 +51,21 @@ def verify_audit(db: Database) -> Verification:
         *_machine_faults(db),
         *index_faults(db),
     ]
-    told = {}
+    audited = {}
     imports: Counter[str] = Counter()
     for subject, key, content in db.rows("SELECT subject, key, content_sha256 FROM audit ORDER BY entry"):
         if subject == "campaign":
             imports[key] += 1
             key = _of_several(key, imports[key])
-        told[subject, key] = content
-    found = dict(_contents(db))
-    for subject, key in sorted(told.keys() | found.keys()):
+        audited[subject, key] = content
+    stored = dict(_contents(db))
+    for subject, key in sorted(audited.keys() | stored.keys()):
         name = f"{subject} {key}"
-        if (subject, key) not in found:
+        if (subject, key) not in stored:
             faults.append(f"{name} is in the audit, but no longer in the database")
-        elif (subject, key) not in told:
+        elif (subject, key) not in audited:
             faults.append(f"{name} is in the database, but not in the audit")
-        elif told[subject, key] != found[subject, key]:
+        elif audited[subject, key] != stored[subject, key]:
             faults.append(f"{name} was altered after it was stored")
     last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
     entries, last_sha256 = last[0] if last else (0, audit.NO_ENTRY_BEFORE)
@@ -104,8 +104,10 @@ def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
         yield ("import notes", str(number)), notes_content(db, number)
     for (number,) in db.rows("SELECT campaign_id FROM withdrawn_campaign ORDER BY ALL"):
         yield ("withdrawn campaign", str(number)), withdrawal_content(db, number)
-    for number, entry, own in db.rows("SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"):
-        yield ("certificate", f"{number} entry {entry}"), own
+    for number, entry, content in db.rows(
+        "SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"
+    ):
+        yield ("certificate", f"{number} entry {entry}"), content
 
 
 def _of_several(name: str, nth: int) -> str:

@@ -61,10 +61,12 @@ def _rms(db: Database, campaign: Campaign, run: int) -> float:
     """Root mean square of the residuals of a run in mm; infinite where it cannot be identified."""
     try:
         model = as_model(resolve(db, None, campaign.method))
-        one = only_run(campaign, run)
+        single_run = only_run(campaign, run)
         # Who simulates without noise may state none either, and nothing can be weighed by it.
-        one = replace(one, probe=replace(one.probe, standard_uncertainty=MICROMETRE.to_internal(1.0)))
-        return float(method_named(campaign.method).identify(one, model).runs[0].rms)
+        single_run = replace(
+            single_run, probe=replace(single_run.probe, standard_uncertainty=MICROMETRE.to_internal(1.0))
+        )
+        return float(method_named(campaign.method).identify(single_run, model).runs[0].rms)
     except MonitorError:
         return float("inf")
 

@@ -62,7 +62,7 @@ def backtested(series: Series, since: float) -> tuple[Document | None, str | Non
     except DataError as error:
         return None, f"no backtest: {error}"
     return {
-        "made": found.made, "inside": found.covered, "share_inside": found.coverage, "level": found.level,
+        "made": found.forecasts, "inside": found.covered, "share_inside": found.coverage, "level": found.level,
         "bias": found.bias, "rms": found.rms, "unit": series.unit,
         "method": "every day foretold by the days before it since the last change; its first run counts",
     }, None  # fmt: skip

@@ -17,6 +17,10 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics import (
+    ErrorVectors,
+    JointLines,
+    JointSeries,
+    LengthQuestion,
     Trend,
     backtest_longest,
     forecast_longest,
@@ -161,11 +165,13 @@ def _backtest(
         return trend(values[keep, column], t[keep], u=own_u, days=days[keep], robust=False)
 
     try:
-        found = backtest_longest(values, t, days, fit, vectors.sensitivity, vectors.at_zero, rng=rng)
+        found = backtest_longest(
+            JointSeries(values, t, days), fit, ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng
+        )
     except DataError as error:
         return None, f"no backtest of the volumetric error: {error}"
     return {
-        "made": found.made, "inside": found.covered, "share_inside": found.coverage, "level": found.level,
+        "made": found.forecasts, "inside": found.covered, "share_inside": found.coverage, "level": found.level,
         "bias_um": found.bias, "rms_um": found.rms,
     }, None  # fmt: skip
 
@@ -222,9 +228,11 @@ def volumetric_forecast(
     correlation, shrunk, _ = residual_correlation(_residuals(kept, followed, t), days)
     horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
     found = forecast_longest(
-        list(kept.values()), correlation, vectors.sensitivity, vectors.at_zero, limit, now, [max(check, now)],
-        rng=rng, reliability=reliability, horizon=horizon,
-    )  # fmt: skip
+        JointLines(list(kept.values()), correlation),
+        ErrorVectors(vectors.sensitivity, vectors.at_zero),
+        LengthQuestion(limit, now, [max(check, now)], horizon, reliability),
+        rng=rng,
+    )
     tested, why_untested = _backtest(kept, followed, t, days, vectors, rng)
     low, high = (date(x, offset) if x < horizon else None for x in found.crossing.interval)
     return {
