@@ -33,7 +33,7 @@ class FalseDiscoveries:
 def control_false_discoveries(
     p_values: npt.ArrayLike, *, rate: float = 0.05, method: Method = "benjamini-hochberg"
 ) -> FalseDiscoveries:
-    """q-values of ``p_values`` (m,) with the false discovery rate controlled at ``rate``.
+    """Return the q-values of ``p_values`` (m,) with the false discovery rate controlled at ``rate``.
 
     A NaN (a test that could not be made) stays NaN, is never called and is not counted among the tests.
     Raises ``DataError`` for a p-value outside 0 to 1, a rate outside 0 to 1 or an unknown method. Sources:

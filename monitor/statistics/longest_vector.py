@@ -20,7 +20,7 @@ _BLOCK = 100
 
 @dataclass(frozen=True)
 class ErrorVectors:
-    """k vectors ``offset`` (k, 3) + ``sensitivity`` (k, 3, p) parameters, in the unit of the limit.
+    """Error vectors ``offset`` (k, 3) + ``sensitivity`` (k, 3, p) parameters at k points, in the unit of the limit.
 
     ``offset`` are the vectors with all p parameters at zero.
     """

@@ -150,9 +150,10 @@ def assess(y: Array, x: Array) -> Assessed:
 
 
 def p_value_in_noise(y: Array, x: Array, added: Array, *, white: bool = False) -> float:
-    """p-value of the columns ``added`` (n, k) beside ``x`` (n, c): F in every process, averaged over what the data
-    say of the process once the columns are in. With ``white``, or with fewer than eight rows to spare, the noise is
-    taken as independent.
+    """Return the p-value of the columns ``added`` (n, k) beside ``x`` (n, c).
+
+    It is that of F in every process, averaged over what the data say of the process once the columns are in. With
+    ``white``, or with fewer than eight rows to spare, the noise is taken as independent.
     """
     fits = _likelihoods(y, np.column_stack([x, added]))
     if white or len(y) < x.shape[1] + added.shape[1] + 8:
@@ -189,7 +190,7 @@ def _f_test(before: Array, after: Array, added_rank: int, dof: int) -> float:
 
 
 def p_value_against_noise(y: Array, x: Array, added: Array) -> float:
-    """p-value of the columns ``added`` (n, k) against the rival that there is nothing but correlated noise.
+    """Return the p-value of the columns ``added`` (n, k) against the rival that there is nothing but correlated noise.
 
     Likelihood ratio of two explanations, the columns in their likeliest noise and no columns in theirs, told by F so
     that few rows do not exaggerate (they do not nest, so it is no exact level; see docs/trials-curve.md).

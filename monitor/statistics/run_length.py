@@ -85,7 +85,7 @@ def reference_nodes(n: float, dof: float) -> tuple[Array, Array, Array]:
 
 
 def run_length(chart: RunLength, limit: float, n: float, dof: float) -> float:
-    """1 / (expected rate of false alarms) of a chart whose reference had ``n`` runs and ``dof``."""
+    """Return 1 / (expected rate of false alarms) of a chart whose reference had ``n`` runs and ``dof``."""
     shift, scatter, weight = reference_nodes(n, dof)
     return float(1.0 / (weight / chart(limit, shift, scatter)).sum())
 

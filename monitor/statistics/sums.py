@@ -56,12 +56,12 @@ class GroupedSums:
 
     @property
     def dof_within(self) -> int:
-        """n - k."""
+        """Degrees of freedom within the groups, n - k."""
         return self.n - self.k
 
     @property
     def dof_between(self) -> int:
-        """k - 1."""
+        """Degrees of freedom between the groups, k - 1."""
         return self.k - 1
 
     @property

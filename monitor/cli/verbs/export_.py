@@ -16,7 +16,9 @@ EXAMPLE = "monitor export tables --format csv"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("folder", type=Path, metavar="DIR")
-    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", dest="format_")
+    parser.add_argument(
+        "--format", choices=("csv", "parquet"), default="csv", dest="format_", help="csv (default) or parquet"
+    )
 
 
 def run(options: Namespace) -> int:
