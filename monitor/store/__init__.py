@@ -50,7 +50,23 @@ from monitor.store.identifications import (
     save_identification,
 )
 from monitor.store.import_notes import campaign_notes, run_fingerprints
-from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
+from monitor.store.machine_runs import (
+    RecordedRun,
+    campaign_machines,
+    campaign_tolerances,
+    check_campaigns,
+    identified_runs,
+    machine_runs,
+    probing_counts,
+)
+from monitor.store.models import (
+    StoredModel,
+    last_used_campaign,
+    list_models,
+    load_model,
+    model_history,
+    save_model,
+)
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
@@ -67,6 +83,7 @@ __all__ = [
     "FleetSums",
     "Imported",
     "MachineHistory",
+    "RecordedRun",
     "RunRow",
     "StoredAnalysis",
     "StoredCertificate",
@@ -78,9 +95,12 @@ __all__ = [
     "Verification",
     "Withdrawal",
     "WithdrawnCampaign",
+    "campaign_machines",
     "campaign_notes",
+    "campaign_tolerances",
     "certificate_numbers",
     "check_analysis",
+    "check_campaigns",
     "clear_refusals",
     "curve_names",
     "described_machines",
@@ -89,10 +109,12 @@ __all__ = [
     "find_selection",
     "fleet_sums",
     "identification_by_number",
+    "identified_runs",
     "import_campaign",
     "import_curve",
     "is_curve",
     "last_entries",
+    "last_used_campaign",
     "latest_documents",
     "latest_tolerances",
     "list_analyses",
@@ -115,8 +137,10 @@ __all__ = [
     "load_model",
     "machine_events",
     "machine_history",
+    "machine_runs",
     "mark_certificate",
     "model_history",
+    "probing_counts",
     "record_event",
     "record_refusal",
     "refusals",

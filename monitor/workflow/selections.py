@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 from monitor.store import (
@@ -89,7 +89,7 @@ def selected_readings(
     loaded = load_campaign(db, owner)
     own = problem
     if owner != campaign:
-        own = method_named(loaded.method).problem_of(loaded, as_model(model))
+        own = campaign_method(loaded).problem_of(loaded, as_model(model))
         if not _same_plan(own, problem):
             raise DataError(
                 f"--select {name}: its campaign {owner} followed another plan than {campaign}; a covariance of the "
@@ -161,7 +161,7 @@ def side_by_side_figure(document: Document, folder: Path) -> list[str]:
     # The drawing library takes longer to load than most commands to run.
     from monitor.reporting.figures.style import save
     from monitor.reporting.figures.trend import selections_side_by_side
-    from monitor.workflow.figures import ENDINGS, make_folder
+    from monitor.workflow.figure_files import ENDINGS, make_folder
 
     make_folder(folder)
     found = document["selections"]

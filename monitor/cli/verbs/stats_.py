@@ -41,7 +41,7 @@ def run(options: Namespace) -> int:
             db, options.campaign, options.by, options.where, options.model, options.select, options.matrices
         )
         if options.figures is not None:
-            from monitor.workflow.figures import statistics_figure
+            from monitor.workflow.run_statistics.figures import statistics_figure
 
             days = {one.run: one.day for one in load_campaign(db, options.campaign).runs}
             found["figures"] = statistics_figure(

@@ -14,13 +14,16 @@ from typing import Any, TypeVar
 from threadpoolctl import threadpool_limits
 
 from monitor.discovery import Fit, fit
+from monitor.documents import to_document
 from monitor.exceptions import MonitorError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
-from monitor.workflow.explain.comparison import error_steps, explanation_document, explanation_of
-from monitor.workflow.identify.identification import identified
+from monitor.workflow.explain.explain import explanation_of
+from monitor.workflow.explain.machine_answer import explain_answer
+from monitor.workflow.explain.versions import error_steps
+from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.documents import document
 from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate_fit
@@ -93,7 +96,7 @@ class _Fitted:
     @cached_property
     def fit(self) -> Fit:
         known = self._work.known
-        return fit(method_named(known.method).problem_of(known, as_model(self._work.model)))
+        return fit(campaign_method(known).problem_of(known, as_model(self._work.model)))
 
     @cached_property
     def evaluated(self) -> Evaluated:
@@ -131,7 +134,7 @@ def _computed(work: Work, fitted: _Fitted) -> Done:
         )
     if work.explanation:
         explanation = kept(
-            lambda: explanation_document(explanation_of(work.known, work.model, first=fitted.fit)),
+            lambda: to_document(explain_answer(explanation_of(work.known, work.model, fitted.fit))),
             "model and measurement could not be compared",
             remarks,
         )
@@ -144,7 +147,7 @@ def _computed(work: Work, fitted: _Fitted) -> Done:
         )
     if work.versions:
         history = kept(
-            lambda: tuple(error_steps(work.known, work.versions)),
+            lambda: tuple(to_document(step) for step in error_steps(work.known, work.versions)),
             "the versions of the model could not be compared",
             remarks,
         )

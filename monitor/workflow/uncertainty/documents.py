@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from monitor.discovery.machine.compare import SOMETHING_IS_MISSING, compare
+from monitor.discovery import Verdict, compare
 from monitor.records import Array
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.uncertainty.coverage import ellipsoid_factor, joint_coverage, rectangle_factor
@@ -125,7 +125,7 @@ def _residuals(found: Evaluated) -> Document:
     return {
         "rms_um": MICROMETRE.to_display(compared.rms),
         "expected_rms_um": MICROMETRE.to_display(compared.expected_rms),
-        "something_is_missing": compared.verdict == SOMETHING_IS_MISSING,
+        "something_is_missing": compared.verdict == Verdict.SOMETHING_IS_MISSING,
         "by_target_um": {
             str(name): MICROMETRE.to_display(float(np.sqrt(np.mean(vectors[touched] ** 2))))
             for name in found.fit.problem.targets

@@ -22,7 +22,7 @@ from monitor.machine import MOTION
 from monitor.records import Array
 from monitor.uncertainty.volumetric import middle, volumetric_error
 from monitor.units import DEGREE, MICROMETRE
-from monitor.workflow.figures import make_folder
+from monitor.workflow.figure_files import make_folder
 from monitor.workflow.volumetric.volumetric import Mapped
 
 Row = list[Any]

@@ -265,7 +265,7 @@ def map_figures(document: Document, mapped: Mapped, folder: Path) -> list[str]:
     """The map as arrows and as slices, at the rotary axes' zero, and the errors along the axes."""
     from monitor.reporting.figures.style import save
     from monitor.reporting.figures.volumetric import volumetric_slices
-    from monitor.workflow.figures import make_folder
+    from monitor.workflow.figure_files import make_folder
 
     drawn = at_zero(mapped)
     worst = document["worst"]
