@@ -72,7 +72,7 @@ class Machine:
     ``chain`` holds the axes of a machine that places them freely, the work branch from the bed outwards, then
     the tool branch; ``topology`` then only names them in their order. It is empty where the letters of
     ``topology`` say everything. ``gravity`` is the direction of gravity in the machine's frame, None where the
-    file does not tell it.
+    file does not state it.
     """
 
     id: str
@@ -145,7 +145,7 @@ class SelfCalibration:
 
     ``nodes`` maps a linear axis to the readings in mm at which its errors are unknowns. ``conditions`` are the
     boundary conditions, each a parameter that is zero by choice (``EYX(0)``) or a word of the method; empty
-    means the method's own. ``length`` is the one error that has to be known, for the unit of length.
+    means the method's own. ``length`` is the one error that must be measured by other means, for the unit of length.
     """
 
     nodes: Mapping[str, tuple[float, ...]]

@@ -92,7 +92,7 @@ class _Lines(NamedTuple):
 
 
 def _lines(days: _Days, is_past: npt.NDArray[np.bool_], variance: Array) -> _Lines:
-    """Lines through the ``known`` (k, d) days with a component of ``variance`` (k,), in units of the scatter."""
+    """Return lines through the past days, ``is_past`` (k, d), with a component of ``variance`` (k,) of the scatter."""
     d = is_past.shape[1]
     t, m = days.time[:d], days.mean[:d]
     weight = is_past * (days.weight[:d] / (1.0 + variance[:, np.newaxis] * days.weight[:d]))
@@ -155,7 +155,7 @@ def backtest(
     first: int = 5,
     level: float = 0.95,
 ) -> Backtest:
-    """Forecasts each day from the ``first`` on by what was known ``ahead`` days before it.
+    """Forecast each day from the ``first`` on by the history up to ``ahead`` days before it.
 
     Arguments as in ``trend``. Only the first run of a forecast day counts, so that the counted errors are
     not copies of one day's. Raises ``DataError`` where the history has fewer than first + ahead days, or the first

@@ -1,6 +1,6 @@
 """When did the machine change? Steps and changes of slope with a stated false-alarm probability.
 
-A step is preferred over a trend where it explains more; a history that known events split is searched
+A step is preferred over a trend where it explains more; a history that recorded events split is searched
 piece by piece; several parameters share one false-alarm probability. For a change that many parameters
 share, none of which shows it alone, use ``common_change.joint_change``.
 """
@@ -76,7 +76,7 @@ class _Series:
 
 
 def _repeated(day: npt.NDArray[np.intp] | None) -> npt.NDArray[np.intp] | None:
-    """The days where a day component can be told from the scatter of the runs: several days, one with two runs."""
+    """Return the days where they have a component beside the scatter of runs: several days, one with two runs."""
     return None if day is None or not 0 < int(day.max()) < len(day) - 1 else day
 
 
@@ -139,7 +139,7 @@ def _change(series: _Series, best: Scan, base: Base, offset: int) -> Change:
 
 
 class _Search:
-    """One search with its scanners kept: parameters with the same plan share the preparation."""
+    """One search that reuses its scanners: parameters with the same plan share the preparation."""
 
     def __init__(self, rng: np.random.Generator, trials: int) -> None:
         self.rng, self.trials = rng, trials
@@ -237,10 +237,10 @@ def find_changes(
 ) -> History:
     """Steps and changes of slope of several parameters (name to (n,)) over ``times`` (n,), any unit, rising.
 
-    ``events`` are times of known changes (crash, repair, compensation): the history is split there, and the
+    ``events`` are times of recorded changes (crash, repair, compensation): the history is split there, and the
     change at an event is no finding. ``u`` (name to (n,)) weighs the runs; ``days`` (n,) are labels whose runs
     may share a component. ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
-    holds for whatever dependence among them; inside a piece every step that is found splits it again at the
+    holds for whatever dependence among them; inside a piece every detected step splits it again at the
     same level. It holds for runs whose neighbours correlate by up to 0.7 and for day components up to the
     scatter of a run, up to four times of it where several parameters show such: whatever of these a series
     does not refute is allowed for (see ``scan`` and ``day_evidence``), so for independent runs the rate is

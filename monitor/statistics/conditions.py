@@ -1,7 +1,7 @@
 """What a parameter depends on: temperature, warm-up time, any recorded channel, cycles of day and year.
 
 All coefficients are estimated together with the drift, so a machine that was measured in ever warmer weeks
-shows neither as the other; where they cannot be told apart the correlation of the estimates says so.
+shows neither as the other; where they cannot be separated the correlation of the estimates says so.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Extrapolates the drift of ``trend`` (run it on the piece since the last change). The predicted quantity is
 the result of one run on a day of its own: line, day component and scatter of the run together. How good
-such forecasts were is told by ``backtest`` on history that was held out.
+such forecasts were is reported by ``backtest`` on history that was held out.
 """
 
 from __future__ import annotations

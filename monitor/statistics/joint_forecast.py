@@ -25,7 +25,7 @@ from monitor.statistics.trend import Trend
 DRAWS = 2000
 #: Times searched between now and the horizon, denser near now; crossings are interpolated between them.
 TIMES = 60
-#: Fewest days without which the correlation of the parameters is taken as none.
+#: Fewest days without which the parameters count as uncorrelated.
 FEWEST_DAYS = 4
 #: Points at which chi-square is solved for; in between a polynomial has it to 1e-11 (measured, 1 to 1e6 degrees).
 NODES = 48

@@ -109,8 +109,8 @@ def mann_kendall(
     numbers. Sources: M. G. Kendall, Rank Correlation Methods, 1975; K. H. Hamed and A. R. Rao, J. Hydrology
     204 (1998) 182, for ranks of the detrended series; S. Yue and C. Wang, Water Resour. Manage. 18 (2004)
     201, for the first-order variance. Measured false alarms at 5 %: at most 5 % for correlations up to 0.6 from
-    10 values on (independent values: 2 to 3 %); 7 to 8 % with 0.8 and up to 20 values, of which no more can be
-    told from a trend (docs/trials-statistics.md).
+    10 values on (independent values: 2 to 3 %); 7 to 8 % with 0.8 and up to 20 values, which cannot be
+    distinguished from a trend (docs/trials-statistics.md).
     """
     y = as_vector(values, "values", least=6)
     n = len(y)

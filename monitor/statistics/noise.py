@@ -1,4 +1,4 @@
-"""Noise whose neighbours resemble each other: what it is, and how much less it lets one say.
+"""Correlated noise of neighbouring rows: its process, and p-values that allow for it.
 
 A first-order process plus independent noise (what a slow disturbance and a reading make together), seen at
 equal steps of the order of the rows. Nobody knows its two numbers beforehand, and a plug-in estimate of them
@@ -25,7 +25,7 @@ INDEPENDENT_SHARES = (0.0, 0.3, 0.6, 0.8, 0.9)
 ALTERNATING = (-0.7, -0.5, -0.3, -0.15)
 # Beforehand, noise of rows is as likely independent as not.
 INDEPENDENT = 0.5
-# Correlation is told from here on: one false alarm in a hundred campaigns.
+# Correlation is reported from here on: one false alarm in a hundred campaigns.
 NOTICED = 0.01
 # From here on the filter counts as stationary; the rest of its way moves no p-value by a part in a million.
 _SETTLED = 1e-8
@@ -153,7 +153,7 @@ def p_value_in_noise(y: Array, x: Array, added: Array, *, white: bool = False) -
     """Return the p-value of the columns ``added`` (n, k) beside ``x`` (n, c).
 
     It is that of F in every process, averaged over what the data say of the process once the columns are in. With
-    ``white``, or with fewer than eight rows to spare, the noise is taken as independent.
+    ``white``, or with fewer than eight rows to spare, the noise counts as independent.
     """
     fits = _likelihoods(y, np.column_stack([x, added]))
     if white or len(y) < x.shape[1] + added.shape[1] + 8:
@@ -192,7 +192,7 @@ def _f_test(before: Array, after: Array, added_rank: int, dof: int) -> float:
 def p_value_against_noise(y: Array, x: Array, added: Array) -> float:
     """Return the p-value of the columns ``added`` (n, k) against the rival that there is nothing but correlated noise.
 
-    Likelihood ratio of two explanations, the columns in their likeliest noise and no columns in theirs, told by F so
+    Likelihood ratio of two explanations, the columns in their likeliest noise and no columns in theirs, judged by F so
     that few rows do not exaggerate (they do not nest, so it is no exact level; see docs/trials-curve.md).
     """
     few = len(y) < x.shape[1] + added.shape[1] + 8

@@ -203,7 +203,7 @@ class Scanner:
         return np.asarray(plain.min(axis=0) - best.min(axis=0))
 
     def _simulated(self, family: int, index: int, count: int, rng: np.random.Generator) -> Array:
-        """The statistic of at least ``count`` series without a change, of one shape; kept and added to."""
+        """The statistic of at least ``count`` series without a change, of one shape; cached."""
         if self._seed is None:
             self._seed = int(rng.integers(2**63))
         gains = self._null.get((family, index), np.empty(0))
@@ -279,8 +279,8 @@ class Scanner:
                 break
         places = sorted({i for number in numbers for i in self.families[number]})
         likeliest = self.prepared[min(places, key=lambda i: best[i, 0])]
-        total, taken = self._residual(likeliest, self._sums(weighted))
-        unexplained = np.maximum(total - taken, 1e-15 * total + 1e-300)[:, 0]
+        total, explained = self._residual(likeliest, self._sums(weighted))
+        unexplained = np.maximum(total - explained, 1e-15 * total + 1e-300)[:, 0]
         best_candidate = int((unexplained * likeliest.weight).argmin())
         return Scan(
             self.kinds[best_candidate],

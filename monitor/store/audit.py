@@ -1,7 +1,7 @@
 """The audit chain: every change adds an entry that holds the hash of what was stored and of the entry before.
 
 An entry that is altered, or left out between two others, no longer fits its neighbours. Entries cut off at
-the end are seen where the things that they tell of are still there (``verification``).
+the end are detected where what they record is still there (``verification``).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def digest(*values: Any) -> str:
 
 
 def record(db: Database, action: str, subject: str, key: str, content_sha256: str) -> None:
-    """Add an entry, inside the transaction of the change that it tells of."""
+    """Add an entry, inside the transaction of the change that it records."""
     last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
     number, previous = last[0] if last else (0, NO_ENTRY_BEFORE)
     values = [number + 1, utc_now(), db.actor, action, subject, key, content_sha256, __version__, previous]

@@ -43,11 +43,11 @@ class Imported:
 
 
 def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ()) -> Imported:
-    """Keep a campaign and the bytes of its files, or say that the same is there already.
+    """Store a campaign and the bytes of its files, or say that the same is there already.
 
-    ``notes`` are sentences on what looked like a mistake; they are kept with it.
+    ``notes`` are sentences on what looked like a mistake; they are stored with it.
 
-    Raises CampaignError, with nothing kept, where a campaign of that name has other content, or its machine
+    Raises CampaignError, with nothing stored, where a campaign of that name has other content, or its machine
     has another topology in the database; DataError where a number is not finite.
     """
     rows = probings.printed(campaign.probings, campaign.machine)
@@ -96,7 +96,7 @@ def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ())
 
 
 def import_curve(db: Database, curve: CurveCampaign) -> Imported:
-    """Keep a curve and the bytes of its files, or say that the same is there already. Raises as ``import_campaign``."""
+    """Store a curve and the bytes of its files, or report that it is stored already. Raises as ``import_campaign``."""
     content = curve_content(curve)
     with db.transaction():
         same_name = db.rows(

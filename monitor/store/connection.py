@@ -37,7 +37,7 @@ _YOUNG_S, _LOOKS, _BETWEEN_LOOKS_S = 2.0, 10, 0.05
 
 
 def utc_now() -> datetime:
-    """The present moment in UTC without its zone, as every time is stored."""
+    """Return the present moment in UTC without its zone, as every time is stored."""
     return datetime.now(UTC).replace(tzinfo=None)
 
 
@@ -83,7 +83,7 @@ class Database:
             self._connection.execute(sql, parameters)
 
     def rows(self, sql: str, parameters: Parameters = ()) -> list[tuple[Any, ...]]:
-        """The rows of a query as tuples."""
+        """Return the rows of a query as tuples."""
         with self._lock, _stopped_by_ctrl_c():
             return self._connection.execute(sql, parameters).fetchall()
 
@@ -95,12 +95,12 @@ class Database:
             return tuple(kind(**dict(zip(names, row, strict=True))) for row in cursor.fetchall())
 
     def frame(self, sql: str, parameters: Parameters = ()) -> pd.DataFrame:
-        """The rows of a query as a table, for views that people read."""
+        """Return the rows of a query as a table, for views that people read."""
         with self._lock, _stopped_by_ctrl_c():
             return self._connection.execute(sql, parameters).df()
 
     def arrays(self, sql: str, parameters: Parameters = ()) -> dict[str, Any]:
-        """The columns of a query as numpy arrays, masked where NULL."""
+        """Return the columns of a query as numpy arrays, masked where NULL."""
         with self._lock, _stopped_by_ctrl_c():
             columns: dict[str, Any] = self._connection.execute(sql, parameters).fetchnumpy()
             return columns
@@ -118,18 +118,18 @@ class Database:
 
     @contextmanager
     def connected(self) -> Iterator[duckdb.DuckDBPyConnection]:
-        """DuckDB's own connection, for this block; no other thread uses the database meanwhile."""
+        """Yield DuckDB's connection for this block; no other thread uses the database meanwhile."""
         with self._lock, _stopped_by_ctrl_c():
             yield self._connection
 
     def next_number(self, table: str, column: str) -> int:
-        """One more than the largest number in use; call it inside the transaction that uses it."""
+        """Return one more than the largest number in use; call it inside the transaction that uses it."""
         ((number,),) = self.rows(f"SELECT coalesce(max({column}), 0) + 1 FROM {table}")
         return int(number)
 
     @contextmanager
     def attached(self, path: Path, name: str) -> Iterator[None]:
-        """A second database file under a name, for this block; no other thread uses the database meanwhile."""
+        """Attach a second database file under a name for this block; no other thread uses the database meanwhile."""
         with self._lock:
             literal = str(path).replace("'", "''")
             self._connection.execute(f"ATTACH '{literal}' AS {name} (READ_WRITE)")
@@ -143,7 +143,7 @@ class Database:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """All or nothing: what is done inside is kept as a whole, or not at all where it fails.
+        """Store all changes of the block, or none where it fails.
 
         A transaction inside another joins it.
         """
@@ -160,7 +160,7 @@ class Database:
                 self._connection.commit()
             except BaseException as fault:
                 self._roll_back()
-                # A disk that is full when the transaction ends is told as a fault of the transaction.
+                # A disk that is full when the transaction ends is reported as a fault of the transaction.
                 full = isinstance(fault, duckdb.TransactionException) and "Could not write file" in str(fault)
                 if full or isinstance(fault, duckdb.IOException | duckdb.OutOfMemoryException):
                     raise StoreError(
@@ -195,7 +195,7 @@ class Database:
 
 @contextmanager
 def _stopped_by_ctrl_c() -> Iterator[None]:
-    """DuckDB tells Ctrl-C during a query as a fault of the query; here it is what it is everywhere else."""
+    """Raise KeyboardInterrupt for Ctrl-C during a query, which DuckDB reports as a fault of the query."""
     try:
         yield
     except RuntimeError as fault:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def save_identification(db: Database, identification: StoredIdentification) -> int:
-    """Keep an identification; its number. Raises DataError for arrays that do not fit, NotFoundError."""
+    """Store an identification; its number. Raises DataError for arrays that do not fit, NotFoundError."""
     check_identification(identification)
     with db.transaction():
         campaign_id = campaign_number(db, identification.campaign)

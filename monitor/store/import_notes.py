@@ -1,4 +1,4 @@
-"""What was noticed at an import: sentences kept with the campaign, and runs that came in before.
+"""What was noticed at an import: sentences stored with the campaign, and runs that were imported before.
 
 Readings of a run that equal those of another in every digit are a copy, never chance; counted as independent they
 would make every uncertainty too small. The hash of a run's readings tells them without reading the readings again.
@@ -88,7 +88,7 @@ def notes_content(db: Database, campaign_id: int) -> str:
 
 
 def campaign_notes(db: Database, campaign: str) -> tuple[str, ...]:
-    """What is to be known of a campaign's data: the notes of its import, and runs that equal others' in every digit."""
+    """Return the notes of a campaign's import, and sentences on runs that equal others' in every digit."""
     notes = [
         str(note)
         for (note,) in db.rows(

@@ -1,4 +1,4 @@
-"""Models and their versions: a list of effects, where it came from, and what was added or taken away."""
+"""Models and their versions: a list of effects, where it came from, and what was added or removed."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def save_model(
     parent: tuple[str, int] | None = None,
     note: str = "",
 ) -> StoredModel:
-    """Keep a model under the next version of its name; the same effects again are the version that is there.
+    """Store a model under the next version of its name; the same effects again are the version that is there.
 
     Raises InputError for an empty name or an effect listed twice, NotFoundError for an unknown parent.
     """

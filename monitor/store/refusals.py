@@ -1,6 +1,6 @@
 """Imports that were refused: who reads a report later learns which data never arrived, and whether they came since.
 
-Nothing of a refused folder is kept; its path, its faults, and the names that it told are.
+Of a refused folder its path, its faults and the names in it are stored, nothing else.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from monitor import __version__
 from monitor.store import audit
 from monitor.store.connection import Database
 
-#: Faults kept in words, as many as a refusal shows; the others are counted.
+#: Faults stored as sentences, as many as a refusal shows; the others are counted.
 FAULTS_KEPT = 20
 
 
@@ -41,10 +41,10 @@ def record_refusal(
     machine: str | None = None,
     at: datetime | None = None,
 ) -> int:
-    """Keep that a folder was refused; its number. ``at`` (with its offset) is now where it is not given.
+    """Record that a folder was refused; its number. ``at`` (with its offset) is now where it is not given.
 
     A folder that is refused again on the same day for the same faults (a job that tries every five minutes) is
-    told once: the number is that of the refusal that is there.
+    recorded once: the number is that of the first refusal.
     """
     moment = at or datetime.now().astimezone()
     offset = moment.utcoffset() or timedelta()

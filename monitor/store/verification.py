@@ -1,7 +1,7 @@
-"""Is the database as it was written? Everything that is stored is hashed anew and held against the audit.
+"""Verification that the database is as it was written: everything is hashed anew and compared with the audit.
 
 Seen are: an altered, added or removed row of any result, campaign or file; an altered or missing audit entry,
-those at the end included as long as what they tell of is there. Not seen is a database put back as a whole to
+those at the end included as long as what they record is there. Not seen is a database put back as a whole to
 an earlier state: keep the last hash (``Verification.last_sha256``) elsewhere, for example on paper.
 """
 
@@ -30,7 +30,7 @@ from monitor.store.withdrawals import withdrawal_content
 
 @dataclass(frozen=True)
 class Verification:
-    """What was found: the number of audit entries, the hash of the last, and every fault in words."""
+    """Result of a verification: the number of audit entries, the hash of the last, and a sentence for every fault."""
 
     entries: int
     last_sha256: str
@@ -38,12 +38,12 @@ class Verification:
 
     @property
     def ok(self) -> bool:
-        """True where nothing is wrong."""
+        """Whether there is no fault."""
         return not self.faults
 
 
 def verify_audit(db: Database) -> Verification:
-    """Hash everything anew and hold it against the audit; takes as long as reading the whole database."""
+    """Hash everything anew and compare it with the audit; takes as long as reading the whole database."""
     faults = [
         *audit.chain_faults(db),
         *certificate_faults(db),

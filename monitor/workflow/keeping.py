@@ -20,7 +20,7 @@ from monitor.store import (
 
 @dataclass(frozen=True)
 class VerifyAnswer:
-    """Whether the database is as it was written, with the hash of the last audit entry to be kept elsewhere."""
+    """Whether the database is as it was written, with the hash of the last audit entry to be noted elsewhere."""
 
     ok: bool
     entries: int

@@ -1,7 +1,7 @@
 """Runs of one folder that are copies of each other: refused, since counted as independent they halve every u.
 
-Readings without noise are the exception: whoever simulates them exactly gets equal runs by right. They are known by
-residuals at the rounding of the file, which no machine leaves.
+Readings without noise are the exception: whoever simulates them exactly gets equal runs by right. They are recognised
+by residuals at the rounding of the file, which no machine leaves.
 """
 
 from __future__ import annotations
