@@ -42,7 +42,7 @@ def select(db: Database, campaign: str, name: str, where: str) -> Document:
     one that no run meets.
     """
     loaded = load_campaign(db, campaign)
-    if name in set(list_campaigns(db)["campaign"]):
+    if name in {row.campaign for row in list_campaigns(db)}:
         raise InputError(f"--name {name}: a campaign has that name; a selection needs another")
     columns = campaign_columns(loaded)
     if name in columns:
@@ -72,7 +72,7 @@ def group(db: Database, name: str, campaign: str | None = None) -> StoredSelecti
             return find_selection(db, name, campaign)
         except NotFoundError:
             pass
-    if name in set(list_campaigns(db)["campaign"]):
+    if name in {row.campaign for row in list_campaigns(db)}:
         return None
     return find_selection(db, name)
 

@@ -30,7 +30,7 @@ from monitor.workflow.explain.curve_figures import residual_figure
 from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.versions import history
 from monitor.workflow.identify.fitting import curve_problem
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import version_with
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.models import label, resolve
@@ -59,7 +59,7 @@ def tell(names: tuple[str, ...] | None = None) -> dict[str, Told]:
         for name, one in series().items():
             if names is not None and name not in names:
                 continue
-            import_folders(db, [write(one, Path(made) / name)])
+            import_folders(db, ImportRequest([write(one, Path(made) / name)]))
             model = "curve"
             explanation = explain_curve(curve_problem(load_curve(db, name), resolve(db, model)))
             answer = curve_explain_answer(explanation, model)

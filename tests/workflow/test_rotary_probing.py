@@ -21,7 +21,7 @@ from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
-from monitor.workflow.intake import campaigns
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.trend.trends import trends
 from monitor.workflow.uncertainty.evaluation import uncertainty
@@ -38,7 +38,7 @@ COMPENSATED = {"EX0A", "EY0A", "EZ0A", "EA0C"}
 def db(tmp_path_factory):
     with Database(tmp_path_factory.mktemp("rotary") / "x.duckdb") as own:
         for name in ("tilting-table", "tilting-table-compensated"):
-            campaigns.import_folders(own, [ROOT / "examples" / name])
+            import_folders(own, ImportRequest([ROOT / "examples" / name]))
         yield own
 
 
@@ -107,7 +107,7 @@ def both_methods(simulator: ModuleType, folder: Path, rotary: dict[str, float]) 
         first=datetime(2026, 3, 9, 9, 0, tzinfo=UTC),
     )  # fmt: skip
     own = Database(folder / "two.duckdb")
-    campaigns.import_folders(own, [folder / "s", folder / "r"])
+    import_folders(own, ImportRequest([folder / "s", folder / "r"]))
     return own
 
 
