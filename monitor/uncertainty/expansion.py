@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from monitor.records import Array
-from monitor.uncertainty.row_problem import RowProblem
+from monitor.uncertainty.row_run import RowRun
 
 #: The unknowns are moved by so many steps of the sensitivity (3 µm at the tip): 0.1 mm. The fourth order is below 1e-6
 #: of the second there, and the rounding of a double below 1e-11 of it.
@@ -31,7 +31,7 @@ class Expansion:
     """N whitened rows, each with at most a unknowns: ``at`` (N, a) their places, ``residual`` (N,), ``jacobian``
     (N, a), ``hessian`` (N, a, a); ``gather`` (p, N a) sums what the rows give to each unknown. ``centre`` (p,)."""
 
-    run: RowProblem
+    run: RowRun
     centre: Array
     at: npt.NDArray[np.int64]
     residual: Array
@@ -58,7 +58,7 @@ class Expansion:
         return found
 
 
-def expansion_of(run: RowProblem, unknowns: Array, steps: Array) -> Expansion:
+def expansion_of(run: RowRun, unknowns: Array, steps: Array) -> Expansion:
     """The expansion of a run about ``unknowns`` (p,); ``steps`` (p,) each move the tip by about 3 µm."""
     here = _linearised(run, unknowns[:, None])
     jacobian = here[1][0]
@@ -100,7 +100,7 @@ def expansion_of(run: RowProblem, unknowns: Array, steps: Array) -> Expansion:
     return Expansion(run, unknowns.copy(), order, here[0][0], slope, hessian, gather, bent)
 
 
-def _linearised(run: RowProblem, unknowns: Array) -> tuple[Array, Array]:
+def _linearised(run: RowRun, unknowns: Array) -> tuple[Array, Array]:
     """Whitened residuals (B, N) and derivatives (B, N, p) as measured, at unknowns (p, B)."""
     nothing = np.repeat(run.inputs[:, None], unknowns.shape[1], axis=1)
     at = run.repeated(nothing).linearise(np.ascontiguousarray(unknowns.T), run.common)

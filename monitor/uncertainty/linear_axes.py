@@ -13,14 +13,14 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.machine import COMPONENTS, MOTION, Chain, Joint
 from monitor.records import Array, LinearAxes
-from monitor.uncertainty.run_problem import OneRun
+from monitor.uncertainty.measured_run import MeasuredRun
 
 #: The spacing of the nodes is averaged over so many values: the covariance then is known to some 1e-3 of itself.
 _SPACINGS = 31
 _SHIFTS = "XYZ"
 
 
-def row_covariances(one: OneRun, unknowns: Array, axes: LinearAxes) -> dict[str, Array]:
+def row_covariances(one: MeasuredRun, unknowns: Array, axes: LinearAxes) -> dict[str, Array]:
     """Covariance (N, N) in mm² of the readings of a run at ``unknowns`` (p,), by source; one a kind of error and axis.
 
     Raises InputError for an axis that the machine does not have.

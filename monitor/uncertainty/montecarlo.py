@@ -24,9 +24,9 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.uncertainty.covariance import Inputs
+from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.program import LARGEST_ANGLE
 from monitor.uncertainty.roots import covariance_root
-from monitor.uncertainty.run_problem import OneRun
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
 
 #: What a trial may be away from its least-squares point, in standard uncertainties: two and a half
@@ -60,7 +60,7 @@ class RunEstimator:
     Hessian is at most ``worst`` standard uncertainties of any unknown. ``counts`` runs on over all calls.
     """
 
-    run: OneRun
+    run: MeasuredRun
     sensitivity: Sensitivity
     outputs: tuple[str, ...]
     u: Array
@@ -153,7 +153,7 @@ class RunEstimator:
 
 
 def run_estimator(
-    run: OneRun, inputs: Inputs, outputs: tuple[str, ...] | None = None, *, seed: int = 0
+    run: MeasuredRun, inputs: Inputs, outputs: tuple[str, ...] | None = None, *, seed: int = 0
 ) -> RunEstimator:
     """The Monte Carlo model of one ``run`` whose ``inputs`` are its readings and distances, in that order.
 

@@ -17,7 +17,7 @@ from monitor.effects import Context, Effect
 from monitor.effects.effect import ChainBasis
 from monitor.machine import LOCATION, MOTION, Joint
 from monitor.records import Array
-from monitor.uncertainty.run_problem import RunProblem
+from monitor.uncertainty.touched_run import TouchedRun
 
 Ints = npt.NDArray[np.int64]
 
@@ -84,7 +84,7 @@ class _Step:
     entries: tuple[tuple[int, int, Array], ...] = ()
 
 
-def compile_program(run: RunProblem) -> Program | None:
+def compile_program(run: TouchedRun) -> Program | None:
     """The program of a run's problem, or None where its model needs the plain way.
 
     That is so for effects of the artefact and for chains with more than three linear axes.
@@ -96,7 +96,7 @@ def compile_program(run: RunProblem) -> Program | None:
     return _assemble(run, steps)
 
 
-def _entries(run: RunProblem) -> dict[tuple[int, int, int], list[tuple[int, int, Array]]] | None:
+def _entries(run: TouchedRun) -> dict[tuple[int, int, int], list[tuple[int, int, Array]]] | None:
     """For every error term its entries: unknown, axis (-1: none) and value at every probing (n,)."""
     problem = run.problem
     context = problem.context
@@ -155,7 +155,7 @@ def _slant(joint: Joint) -> list[tuple[int, float]]:
     return [(main, float(np.arctan2(along[second], -along[third]))), (second, tilt)]
 
 
-def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int, Array]]]) -> list[_Step]:
+def _walk(run: TouchedRun, bases: dict[tuple[int, int, int], list[tuple[int, int, Array]]]) -> list[_Step]:
     chain = run.problem.context.chain
     count = run.probings
     places = {int(a): i for i, a in enumerate(run.linear)}
@@ -204,7 +204,7 @@ def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int
     return steps
 
 
-def _assemble(run: RunProblem, steps: list[_Step]) -> Program:
+def _assemble(run: TouchedRun, steps: list[_Step]) -> Program:
     count = run.probings
     problem = run.problem
     entries = [entry for step in steps for entry in step.entries]

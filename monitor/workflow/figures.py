@@ -1,4 +1,4 @@
-"""Figures of comparison, explanation and statistics, drawn from their results into a folder."""
+"""Figures of comparison and explanation, drawn from their results into a folder."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ from monitor.exceptions import DataError, InputError
 from monitor.records import Array
 from monitor.reporting.figures.drivers import predicted_against_measured, residual_against_driver
 from monitor.reporting.figures.models import error_falling, ranked_effects
-from monitor.reporting.figures.parameters import parameters_by_run
 from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import save
 from monitor.reporting.numbers import round_result
-from monitor.store import StoredIdentification
 from monitor.units import MICROMETRE
 from monitor.workflow.explain.residuals import drivers_followed, in_machine_frame, mean_over_runs
 from monitor.workflow.explain.residuals_against import against_effect
@@ -195,30 +193,3 @@ def history_figure(steps: list[Document], folder: Path) -> list[str]:
         f"the error falls from {steps[0]['rms_um']:.2f} to {steps[-1]['rms_um']:.2f} µm",
     )
     return _saved(figure, folder, "error-falling")
-
-
-def statistics_figure(
-    document: Document, found: StoredIdentification, days: dict[int, int], folder: Path
-) -> list[str]:
-    """Every parameter over the runs, days as bands: a step between days is seen at once."""
-    make_folder(folder)
-    names = document["parameter_order"]
-    places = [found.parameters.index(name) for name in names]
-    factors = np.array([found.units[place].factor for place in places])
-    estimate = np.array([run.estimate[places] for run in found.runs]) / factors
-    u = np.sqrt(np.array([np.diag(run.covariance)[places] for run in found.runs])) / factors
-    q = {name: document["parameters"][name]["anova_q"] for name in names}
-    moved = [name for name in names if q[name] is not None and q[name] < 0.001]
-    said = f"differ between days: {', '.join(moved)}" if moved else "no parameter differs between days"
-    figure = parameters_by_run(
-        [run.run for run in found.runs],
-        [days[run.run] for run in found.runs],
-        names,
-        [found.units[place].name for place in places],
-        estimate,
-        2.0 * u,
-        title=f"{document['campaign']}: {said}",
-        interval="± 2 standard uncertainties of the run",
-        highlight=moved,
-    )
-    return _saved(figure, folder, "parameters-by-run")

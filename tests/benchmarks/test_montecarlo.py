@@ -19,13 +19,13 @@ from monitor.uncertainty import (
     BlockSampler,
     block_generator,
     joined,
+    measured_run,
     monte_carlo,
     normal_inputs,
     overall,
     pooled_by_day,
     repeated_readings,
     run_estimator,
-    run_problem,
     sensitivity_of,
     uncorrelated,
 )
@@ -47,7 +47,7 @@ def problem():
 
 
 def set_up(problem, covariance):
-    run = run_problem(problem, 1)
+    run = measured_run(problem, 1)
     if covariance == "full rank":
         probing = full_rank(run)
     else:
@@ -119,7 +119,7 @@ def test_beside_solving_trial_by_trial_with_a_fresh_jacobian(benchmark, problem)
 
 
 def test_sensitivity_beside_one_identification(benchmark, problem):
-    run = run_problem(problem, 1)
+    run = measured_run(problem, 1)
     start = run.problem.start[0]
     times = []
     for _ in range(ROUNDS):

@@ -11,13 +11,13 @@ from monitor.uncertainty import (
     adaptive_monte_carlo,
     gum_framework,
     joined,
+    measured_run,
     monte_carlo,
     normal_inputs,
     overall,
     pooled_by_day,
     repeated_readings,
     run_estimator,
-    run_problem,
     uncorrelated,
     validate,
 )
@@ -36,7 +36,7 @@ def inputs_of(run, spread=1e-3, correlated=0.5, seed=3):
 
 @pytest.fixture(scope="module")
 def samba(campaign):
-    run = run_problem(campaign("five-days"), 1)
+    run = measured_run(campaign("five-days"), 1)
     inputs = inputs_of(run)
     return run, inputs, run_estimator(run, inputs)
 
@@ -116,7 +116,7 @@ def test_numbers_are_the_same_for_any_number_of_workers(samba):
 
 def test_los_2017_chapter_7_framework_is_validated_by_monte_carlo(campaign):
     problem = campaign("five-days")
-    run = run_problem(problem, 1)
+    run = measured_run(problem, 1)
     days = np.repeat(np.arange(5), 4)
     readings = repeated_readings(problem)
     probing = pooled_by_day(readings, days, run.input_names[:-1], ("mm",) * 186, source="probing")

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pypdf
 import pytest
+from monitor.workflow.uncertainty.documents import document
+from monitor.workflow.uncertainty.evaluations import Evaluation, evaluation_of
 
 from monitor.documents import from_document
 from monitor.exceptions import InputError, NotFoundError
@@ -24,9 +26,7 @@ from monitor.store import Database, import_campaign, load_certificate
 from monitor.workflow.certificate.checks import remake
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.results import results_of, stored_monte_carlo
-from monitor.workflow.uncertainty.documents import document
 from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate, uncertainty
-from monitor.workflow.uncertainty.evaluations import Evaluation, evaluation_of
 from monitor.workflow.volumetric.volumetric import volumetric_map
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -14,6 +14,8 @@ from pathlib import Path
 import numpy as np
 import pypdf
 import pytest
+from monitor.workflow.uncertainty.documents import document
+from monitor.workflow.uncertainty.evaluations import Evaluation, evaluation_of
 
 from monitor.cli import main
 from monitor.documents import from_document, to_document
@@ -27,9 +29,7 @@ from monitor.workflow.certificate.checks import digital, remake
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.results import results_of
-from monitor.workflow.uncertainty.documents import document
 from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate
-from monitor.workflow.uncertainty.evaluations import Evaluation, evaluation_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"

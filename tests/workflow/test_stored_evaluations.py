@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pypdf
 import pytest
+from monitor.workflow.uncertainty.evaluations import evaluation_of, stored_evaluation
 
 from monitor.exceptions import StoreError
 from monitor.readers import read_campaign, read_linear_axes
@@ -19,7 +20,6 @@ from monitor.store import Database, import_campaign, load_analysis, load_campaig
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.models import resolve
 from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate, uncertainty
-from monitor.workflow.uncertainty.evaluations import evaluation_of, stored_evaluation
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from monitor.workflow.uncertainty.documents import document
+from monitor.workflow.uncertainty.evaluations import evaluation_of
 from scipy import optimize
 
 from monitor.cli import main
@@ -19,9 +21,7 @@ from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.identify.identification import identify
 from monitor.workflow.intake.campaigns import import_folders
 from monitor.workflow.trend.trends import Choice, trends
-from monitor.workflow.uncertainty.documents import document
 from monitor.workflow.uncertainty.evaluation import evaluate
-from monitor.workflow.uncertainty.evaluations import evaluation_of
 from monitor.workflow.volumetric.volumetric import geometric_errors, poses_of, ranges_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

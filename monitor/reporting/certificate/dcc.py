@@ -23,6 +23,7 @@ from monitor.reporting.certificate.record import (
     ConformityStatement,
     Party,
     Replaced,
+    Verdict,
 )
 from monitor.reporting.certificate.words import amendment, answer, verdict_words
 from monitor.reporting.numbers import decimal_of
@@ -33,11 +34,11 @@ _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
 #: The schema's word for a verdict (stringConformityStatementStatusType).
 _STATUS = {
-    "pass": "pass",
-    "fail": "fail",
-    "conditional pass": "conditionalPass",
-    "conditional fail": "conditionalFail",
-    "undecided": "noPass",
+    Verdict.PASS: "pass",
+    Verdict.FAIL: "fail",
+    Verdict.CONDITIONAL_PASS: "conditionalPass",
+    Verdict.CONDITIONAL_FAIL: "conditionalFail",
+    Verdict.UNDECIDED: "noPass",
 }
 
 

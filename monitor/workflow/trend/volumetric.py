@@ -86,7 +86,8 @@ def _vectors(
     from monitor.effects import ChainEffect
     from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
     from monitor.workflow.explain.comparison import fitted
-    from monitor.workflow.volumetric.volumetric import POINTS, poses_of, ranges_of
+    from monitor.workflow.volumetric.error_map import poses_of, ranges_of
+    from monitor.workflow.volumetric.request import POINTS
 
     campaign, _, found = fitted(db, str(history.campaign[-1]), model)
     problem, run = found.problem, int(history.run[-1])
