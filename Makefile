@@ -6,6 +6,8 @@
 export MAKECMDGOALS
 RUN := .venv/bin/python
 PYTEST := $(RUN) -m pytest
+# A worker a core; -n 0 in ARGS runs them one after the other, in this process.
+PARALLEL := -n auto --dist worksteal
 # pytest ends with status 5 where there is nothing to collect; that is no failure for what may be empty.
 MAY_BE_EMPTY := || test $$? -eq 5
 
@@ -19,7 +21,7 @@ demo: setup  ## the main job on the example campaigns; leaves its results in dem
 	@.venv/bin/monitor demo --out demo-output $(ARGS)
 
 test: setup  ## the tests
-	@$(PYTEST) $(ARGS)
+	@$(PYTEST) $(PARALLEL) $(ARGS)
 
 check: setup  ## format, lint, types
 	@$(RUN) -m ruff format --check .
@@ -37,6 +39,7 @@ real-data: setup  ## docs/real-data.md and its pictures, from the measured serie
 	@OMP_NUM_THREADS=1 $(RUN) tests/curves/real_data.py $(ARGS)
 
 trials: setup  ## slow trials over many seeds, an hour; their last results are in docs/trials-*.md
+	@$(PYTEST) $(PARALLEL) --all-seeds
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_robots.py --seeds 10
@@ -44,11 +47,11 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_curve.py --seeds 40
 
 wheel: setup  ## build the wheel and run the tests against it, away from the checkout
-	@$(RUN) tests/setup/installed_wheel.py $(ARGS)
+	@$(RUN) tests/setup/installed_wheel.py $(PARALLEL) $(ARGS)
 
 # What a wheel can lack shows in these: files of the package, migrations, texts and fonts, the command.
 wheel-parts: setup
-	@$(RUN) tests/setup/installed_wheel.py tests/cli tests/readers tests/store tests/reporting tests/test_wheel.py $(ARGS)
+	@$(RUN) tests/setup/installed_wheel.py tests/cli tests/readers tests/store tests/reporting tests/test_wheel.py $(PARALLEL) $(ARGS)
 
 clean:  ## remove what the others left, except the virtual environment
 	@rm -rf demo-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info

@@ -30,6 +30,8 @@ Record = TypeVar("Record")
 OMITTED: Mapping[str, Any] = {"omitted": True}
 #: Metadata of a field whose record is written field by field into the document of its owner.
 INLINED: Mapping[str, Any] = {"inlined": True}
+#: Metadata of a field whose datetime is in UTC without its zone, as the store has it: it is written with Z.
+IN_UTC: Mapping[str, Any] = {"utc": True}
 
 
 def named(key: str) -> Mapping[str, Any]:
@@ -85,6 +87,8 @@ def _plain_record(record: Any) -> dict[str, Any]:
             continue
         if field.metadata.get("inlined"):
             document |= _plain_record(value)
+        elif field.metadata.get("utc") and value is not None:
+            document[_key(field)] = f"{value.isoformat()}Z"
         else:
             document[_key(field)] = _plain(value)
     return document
@@ -195,7 +199,9 @@ def _record(kind: Any, value: Mapping[str, Any], path: str) -> Any:
             if field.default is dataclasses.MISSING or _keys(inner)[0] <= set(value):
                 arguments[field.name] = _record(inner, value, path)
         elif _key(field) in value:
-            arguments[field.name] = _typed(hints[field.name], value[_key(field)], f"{path}.{field.name}")
+            element = _typed(hints[field.name], value[_key(field)], f"{path}.{field.name}")
+            zoned = field.metadata.get("utc") and element is not None
+            arguments[field.name] = element.replace(tzinfo=None) if zoned else element
         elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
             missing.append(_key(field))
     if missing:

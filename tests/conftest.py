@@ -1,13 +1,21 @@
-"""What all tests share: modules of the tests loaded by path, and the independent simulator."""
+"""What all tests share: modules loaded by path, the independent simulator, workers, rates over few or all seeds."""
 
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+# On matrices of this size BLAS threads mostly wait for each other in loops: beside another busy worker that took up to
+# fifty times the processor time. numpy reads this when it is imported, so it stands before everything else; processes
+# that tests start inherit it. Benchmarks measure what a user has.
+if "--benchmark-only" not in sys.argv:
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 if "by_path" not in sys.modules:
     _spec = importlib.util.spec_from_file_location("by_path", Path(__file__).with_name("by_path.py"))
@@ -15,6 +23,38 @@ if "by_path" not in sys.modules:
     assert _spec.loader is not None
     sys.modules["by_path"] = importlib.util.module_from_spec(_spec)
     _spec.loader.exec_module(sys.modules["by_path"])
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Return the number of workers of ``-n auto``: the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--all-seeds",
+        action="store_true",
+        help="run only the tests of rates, over all their seeds (make trials)",
+    )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what only ``make trials`` runs, or everything else."""
+
+    def is_run(item: pytest.Item) -> bool:
+        if item.get_closest_marker("all_seeds") is not None:
+            return all_seeds
+        return not all_seeds or "seeds" in getattr(item, "fixturenames", ())
+
+    all_seeds = config.getoption("--all-seeds")
+    config.hook.pytest_deselected(items=[item for item in items if not is_run(item)])
+    items[:] = filter(is_run, items)
+
+
+@pytest.fixture(scope="session")
+def seeds(pytestconfig: pytest.Config) -> Callable[[int, int], range]:
+    """``seeds(600, 60)``: numbers for a rate over 600 in ``make trials``, over the first 60 in ``make test``."""
+    return lambda count, sample: range(count if pytestconfig.getoption("--all-seeds") else sample)
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from monitor.documents import INLINED, OMITTED, from_document, named, to_document
+from monitor.documents import IN_UTC, INLINED, OMITTED, from_document, named, to_document
 from monitor.exceptions import StoreError
 
 
@@ -112,3 +112,17 @@ def test_an_alternative_is_recognised_by_its_keys() -> None:
     assert from_document(_Changes, to_document(changes)) == changes
     with pytest.raises(StoreError, match=r"the stored _Changes.changes has colour, size"):
         from_document(_Changes, {"changes": [{"colour": "red", "size": 1.0}]})
+
+
+@dataclass(frozen=True)
+class _Moment:
+    at: datetime | None = field(metadata=IN_UTC)
+    local: datetime
+
+
+def test_a_moment_in_utc_is_written_with_z_and_a_local_one_without() -> None:
+    moment = _Moment(datetime(2026, 3, 2, 14, 0), datetime(2026, 3, 2, 9, 0))
+    document = to_document(moment)
+    assert document == {"at": "2026-03-02T14:00:00Z", "local": "2026-03-02T09:00:00"}
+    assert from_document(_Moment, document) == moment
+    assert to_document(_Moment(None, datetime(2026, 3, 2)))["at"] is None

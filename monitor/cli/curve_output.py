@@ -181,7 +181,7 @@ def steps(found: Sequence[Document]) -> None:
             "BIC",
         ],
         rows,
-        left=2,
+        text_columns=2,
     )
 
 

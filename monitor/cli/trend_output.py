@@ -67,7 +67,7 @@ def say(found: dict[str, Any]) -> None:
         f"{found['machine']}: {held}" + ("; slopes a year" if names.index("slope") in told else ""),
         [names[place] for place in told],
         [[row[place] for place in told] for row in rows],
-        left=2,
+        text_columns=2,
     )
     for name, one in found["parameters"].items():
         for change in one["changes"]:

@@ -4,19 +4,21 @@
 apart from bad points, balls that moved and steps between runs.
 """
 
-from monitor.discovery.machine.compare import Comparison, compare
+from monitor.discovery.machine.compare import ChainComparison, compare
 from monitor.discovery.machine.explain import Explanation, explain
 from monitor.discovery.machine.fit import Fit, fit
-from monitor.discovery.machine.missing import Missing
+from monitor.discovery.machine.missing import ChainMissing
 from monitor.discovery.machine.mistakes import Mistake, find_mistakes, is_gross
 from monitor.discovery.machine.version_error import VersionError, version_error
+from monitor.discovery.search.comparison import Verdict
 
 __all__ = [
-    "Comparison",
+    "ChainComparison",
+    "ChainMissing",
     "Explanation",
     "Fit",
-    "Missing",
     "Mistake",
+    "Verdict",
     "VersionError",
     "compare",
     "explain",

@@ -7,11 +7,12 @@ have, and the angles at which people index. What a fit has to see is told by `id
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
 
+from monitor.readers.registry import method_rules
 from monitor.records import Array, Campaign
 from monitor.units import DEGREE, MICROMETRE
 
@@ -118,10 +119,11 @@ def _angles(campaign: Campaign) -> Iterator[str]:
 
 def _places(campaign: Campaign) -> Iterator[str]:
     """Distances between balls, or modules, at one pose against the declared ones: no rotary axis has a part in them."""
-    what, place = _declared(campaign)
-    if not place or not all(axis in campaign.probings.readings for axis in "XYZ"):
+    rules = method_rules().get(campaign.method)
+    declared = None if rules is None else rules.declared(campaign.artefact)
+    if declared is None or not all(axis in campaign.probings.readings for axis in "XYZ"):
         return
-    steps, nominal = _pairs(campaign, place)
+    steps, nominal = _pairs(campaign, declared.places)
     if not len(nominal):
         return
     off = _share_off(steps, nominal, np.ones(3))
@@ -129,7 +131,7 @@ def _places(campaign: Campaign) -> Iterator[str]:
         return
     ratio = float(np.median(np.linalg.norm(steps, axis=1) / nominal))
     head = (
-        f"the distances between {what} that were probed are {ratio:.3g} times the declared ones (median of "
+        f"the distances between {declared.noun} that were probed are {ratio:.3g} times the declared ones (median of "
         f"{len(nominal)})"
     )
     for factor, unit in FACTORS:
@@ -148,17 +150,7 @@ def _places(campaign: Campaign) -> Iterator[str]:
     )
 
 
-def _declared(campaign: Campaign) -> tuple[str, dict[str, Array]]:
-    """What stands at declared places, and where (3,) mm, up to a rigid motion; nothing for other methods."""
-    if campaign.method == "samba":
-        return "balls", {ball.id: np.array(ball.nominal) for ball in campaign.artefact.balls}
-    piece = campaign.artefact.l_shape
-    if campaign.method == "l-shape" and piece is not None:
-        return "modules", {module.id: np.array([*module.centre, 0.0]) for module in piece.modules}
-    return "", {}
-
-
-def _pairs(campaign: Campaign, place: dict[str, Array]) -> tuple[Array, Array]:
+def _pairs(campaign: Campaign, place: Mapping[str, Array]) -> tuple[Array, Array]:
     """Steps (n, 3) of X, Y, Z between targets probed at one pose of one run, and their declared distances (n,)."""
     probings = campaign.probings
     rows = np.flatnonzero(probings.run == probings.run[0])

@@ -46,6 +46,15 @@ from monitor.store.identifications import (
     save_identification,
 )
 from monitor.store.import_notes import campaign_notes, run_fingerprints
+from monitor.store.machine_runs import (
+    RecordedRun,
+    campaign_machines,
+    campaign_tolerances,
+    check_campaigns,
+    identified_runs,
+    machine_runs,
+    probing_counts,
+)
 from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
@@ -60,6 +69,7 @@ __all__ = [
     "FleetSums",
     "Imported",
     "MachineHistory",
+    "RecordedRun",
     "StoredAnalysis",
     "StoredCertificate",
     "StoredIdentification",
@@ -69,9 +79,12 @@ __all__ = [
     "StoredSelection",
     "Verification",
     "Withdrawal",
+    "campaign_machines",
     "campaign_notes",
+    "campaign_tolerances",
     "certificate_numbers",
     "check_analysis",
+    "check_campaigns",
     "clear_refusals",
     "curve_names",
     "described_machines",
@@ -80,6 +93,7 @@ __all__ = [
     "find_selection",
     "fleet_sums",
     "identification_by_number",
+    "identified_runs",
     "import_campaign",
     "import_curve",
     "is_curve",
@@ -105,8 +119,10 @@ __all__ = [
     "load_model",
     "machine_events",
     "machine_history",
+    "machine_runs",
     "mark_certificate",
     "model_history",
+    "probing_counts",
     "record_event",
     "record_refusal",
     "refusals",

@@ -2,8 +2,9 @@
 
 ``processes`` starts processes on this machine, ``cluster`` uses a Dask scheduler; either is an ``Engine``. ``spread``
 puts the trials of one Monte Carlo on it. Every block of trials has a random stream of its own (``BlockSampler``) and
-results are taken in their order, so the numbers depend neither on how many workers there are nor on who dies. Workers use one thread for linear algebra; on machines whose BLAS
-differs the numbers agree to about 3e-15 instead (measured between the kernels of OpenBLAS).
+results are taken in their order, so the numbers depend neither on how many workers there are nor on who dies. Workers
+use one thread for linear algebra; on machines whose BLAS differs the numbers agree to about 3e-15 instead (measured
+between the kernels of OpenBLAS).
 """
 
 from __future__ import annotations

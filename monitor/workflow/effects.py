@@ -14,9 +14,9 @@ from monitor.effects.curve import SEARCHED
 from monitor.effects.curve_words import describe_curve
 from monitor.effects.words import Words, describe
 from monitor.machine import parse_topology
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.curve.method import fit
+from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import grid
 from monitor.methods.curve.problem import problem_of as curve_problem_of
 from monitor.readers import read_campaign
@@ -98,7 +98,7 @@ def effects_of(campaign: Campaign | CurveCampaign, text: str | None = None) -> D
                 )
             found.append(_told(effect.text, unit, words))
         return {"campaign": campaign.name, "base": [campaign.base], "effects": _with(found, text)}
-    machine = method_named(campaign.method).problem_of(campaign)
+    machine = campaign_method(campaign).problem_of(campaign)
     drivers = drivers_of(machine.context)
     pitches = {
         name: axis.scale_pitch for name, axis in campaign.machine.axes.items() if axis.scale_pitch is not None

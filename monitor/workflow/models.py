@@ -14,10 +14,8 @@ from monitor.effects.curve_words import describe_curve
 from monitor.effects.words import describe
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
-from monitor.methods import METHODS
+from monitor.methods import ChainMethod, CurveMethod, methods
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.curve.problem import NAME as CURVE
-from monitor.methods.curve.problem import problem_of
 from monitor.methods.model import Model, chain_of
 from monitor.store import (
     Database,
@@ -33,7 +31,7 @@ from monitor.store import (
 Document = dict[str, Any]
 
 
-def resolve(db: Database, name: str | None, method: str = "samba") -> StoredModel:
+def resolve(db: Database, name: str | None, method: str = "") -> StoredModel:
     """The stored model of a name, ``NAME`` (its latest version) or ``NAME@VERSION``; the method's own by default."""
     wanted, _, version = (name or method).partition("@")
     if version and not version.isdigit():
@@ -41,7 +39,7 @@ def resolve(db: Database, name: str | None, method: str = "samba") -> StoredMode
     try:
         return load_model(db, wanted, int(version) if version else None)
     except NotFoundError as error:
-        own = (*METHODS, CURVE)
+        own = methods()
         if wanted in own and not version.strip("1"):
             # The method's own model needs nobody to make it.
             return save_model(db, wanted, (), note="the method's own model")
@@ -83,8 +81,10 @@ def _label_of(parent: tuple[str, int]) -> str:
 
 def list_(db: Database) -> Document:
     """All models with their versions."""
-    for method in (*METHODS, *([CURVE] if curve_names(db) else [])):
-        resolve(db, method)
+    curves = bool(curve_names(db))
+    for method in methods().values():
+        if curves or not isinstance(method, CurveMethod):
+            resolve(db, method.name)
     frame = list_models(db)
     return {
         "models": [
@@ -98,7 +98,7 @@ def show(db: Database, name: str) -> Document:
     """A model, its added effects in words, and its base effects on every machine that is there."""
     stored = resolve(db, name)
     method = _method_of(db, stored)
-    if method == CURVE:
+    if isinstance(method, CurveMethod):
         return {**_document(stored), **_curve_words(db, stored)}
     base: dict[str, list[str]] = {}
     words: dict[str, str] = {}
@@ -127,9 +127,12 @@ def add(
     """
     parent = resolve(db, to)
     method = _method_of(db, parent)
-    text = _known_to_curves(db, effect, campaign) if method == CURVE else _known(db, effect)
-    if method != CURVE and _is_base(db, text, method):
-        raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
+    if isinstance(method, CurveMethod):
+        text = _known_to_curves(db, method, effect, campaign)
+    else:
+        text = _known(db, effect)
+        if _is_base(db, text, method):
+            raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
     if text in parent.effects:
         raise InputError(
             f"model {label(parent)} has {text} already; add another effect, or take it out first"
@@ -159,12 +162,7 @@ def _name(as_: str | None, parent: StoredModel) -> str:
     return as_
 
 
-def is_curve_model(db: Database, stored: StoredModel) -> bool:
-    """Whether a model descends from that of curves."""
-    return _method_of(db, stored) == CURVE
-
-
-def _known_to_curves(db: Database, effect: str, campaign: str | None) -> str:
+def _known_to_curves(db: Database, method: CurveMethod, effect: str, campaign: str | None) -> str:
     """The effect in its own words, if the curve named, or any curve, has its columns and not the effect itself."""
     names = curve_names(db) if campaign is None else (campaign,)
     if not names:
@@ -174,7 +172,7 @@ def _known_to_curves(db: Database, effect: str, campaign: str | None) -> str:
         curve = load_curve(db, name)
         try:
             text = parse_curve_effect(effect, inputs_of(curve)).text
-            problem_of(curve, Model(name, added=(text,)))
+            method.problem_of(curve, Model(name, added=(text,)))
             return text
         except InputError as error:
             fault = fault or error
@@ -200,20 +198,19 @@ def _curve_words(db: Database, stored: StoredModel) -> Document:
     return {"base": base, "meaning": words}
 
 
-def _method_of(db: Database, stored: StoredModel) -> str:
-    """The method that a model descends from."""
+def _method_of(db: Database, stored: StoredModel) -> ChainMethod | CurveMethod | None:
+    """The method that a model descends from; None for a model that was made from none."""
     while stored.parent is not None:
         stored = load_model(db, *stored.parent)
-    return stored.name if stored.name in (*METHODS, CURVE) else next(iter(METHODS))
+    return methods().get(stored.name)
 
 
-def _base_of(method: str, chain: Chain) -> tuple[str, ...]:
-    """The effects that are free in every run of a method; a method that names none has the complete model's."""
-    found: tuple[str, ...] = getattr(METHODS[method], "base_effects", base_effects)(chain)
-    return found
+def _base_of(method: ChainMethod | None, chain: Chain) -> tuple[str, ...]:
+    """The effects that are free in every run of a method; those of the complete model for no method."""
+    return (base_effects if method is None else method.base_effects)(chain)
 
 
-def _is_base(db: Database, effect: str, method: str) -> bool:
+def _is_base(db: Database, effect: str, method: ChainMethod | None) -> bool:
     """Whether an effect is a base effect of a method on every machine that it can calibrate."""
     found = []
     for chain in _chains(db):

@@ -169,7 +169,7 @@ def main() -> None:
                     rng = generator(f"{name} {size} {phi}", seed)
                     missing = explain_curve(problem_of(hidden(shape, size, 120, phi)(rng))).missing
                     told += bool(missing)
-                    good += bool(missing) and missing[0].effect.shape in right
+                    good += bool(missing) and missing[0].fitted.shape in right
                 cells.append(f"{good} ({told}) of {options.seeds}")
             print(f"| {name} | {size} | {' | '.join(cells)} |", flush=True)
     print(f"\n{time.perf_counter() - begun:.0f} s.", file=sys.stderr)

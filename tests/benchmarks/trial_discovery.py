@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from by_path import load
 from by_path import simulator as simulator_of
 
-from monitor.discovery import Explanation, Missing, explain, fit
+from monitor.discovery import ChainMissing, Explanation, explain, fit
 from monitor.effects.catalogue import catalogue, drivers_of
 from monitor.methods.samba.method import problem_of
 from monitor.records import Campaign
@@ -102,11 +102,11 @@ def _hide(name: str, peak: float, rng: np.random.Generator) -> Any:
     return simulator.Effect(name, peak_um=peak, direction=direction, tau_s=tau)
 
 
-def _names(one: Missing) -> set[str]:
+def _names(one: ChainMissing) -> set[str]:
     return {one.effect, *(rival.effect for rival in one.rivals)}
 
 
-def _covered(one: Missing, truth: Any) -> bool | None:
+def _covered(one: ChainMissing, truth: Any) -> bool | None:
     """Whether the true size lies in the 95 % interval; None where the sizes are not comparable."""
     given = np.atleast_1d(np.asarray(truth.coefficients, float))
     if one.effect != truth.name or given.shape != one.coefficients.shape:

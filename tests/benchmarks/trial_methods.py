@@ -27,9 +27,9 @@ from simulator import rotary_probing as touches
 from simulator.chain import read_topology
 
 from monitor.discovery import Explanation, explain
-from monitor.methods.free_form import method as free_form
-from monitor.methods.l_shape import method as l_shape
-from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.free_form.method import METHOD as free_form
+from monitor.methods.l_shape.method import METHOD as l_shape
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 

@@ -124,11 +124,11 @@ def test_two_cycles_a_group_and_an_outlier_are_found() -> None:
     y = 2.0 * np.sin(2 * np.pi * t / 23.7) + 1.5 * np.cos(2 * np.pi * t / 9.1) + 0.5 * rng.normal(size=160)
     y[70] += 6.0
     found = explain_curve(problem_of(curve(y)))
-    assert [one.effect.shape for one in found.missing] == ["sin", "sin"]
+    assert [one.fitted.shape for one in found.missing] == ["sin", "sin"]
     for one, period in zip(found.missing, (23.7, 9.1), strict=True):
-        assert one.effect.value is not None
-        assert one.u_value is not None
-        assert abs(one.effect.value - period) < 4.0 * one.u_value
+        assert one.fitted.value is not None
+        assert one.searched.u is not None
+        assert abs(one.fitted.value - period) < 4.0 * one.searched.u
     assert [one.row for one in found.suspect] == [70]
 
 

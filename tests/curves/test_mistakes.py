@@ -10,9 +10,9 @@ import pytest
 
 from monitor.discovery.curve.compare import compare_curve
 from monitor.discovery.curve.explain import explain_curve
-from monitor.discovery.machine.compare import EXPLAINED, SOMETHING_IS_MISSING
+from monitor.discovery.search.comparison import Verdict
 from monitor.exceptions import CampaignError
-from monitor.methods.curve.method import fit
+from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import problem_of
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign, Instrument
@@ -43,12 +43,12 @@ def daily(seed: int, unit: str) -> CurveCampaign:
 def test_a_drift_and_a_cycle_that_hide_each_other_are_both_found(seed: int, unit: str) -> None:
     campaign = daily(seed, unit)
     found = explain_curve(problem_of(campaign))
-    assert {one.effect.shape for one in found.missing} == {"drift", "sin"}
+    assert {one.fitted.shape for one in found.missing} == {"drift", "sin"}
     for one in found.missing:
-        if one.effect.shape == "drift":
-            assert abs(one.amplitude - 0.0005) < 4.0 * one.u_amplitude
+        if one.fitted.shape == "drift":
+            assert abs(one.amplitude - 0.0005) < 4.0 * one.u
     assert not found.noise.noticed
-    assert compare_curve(fit(problem_of(campaign))).verdict == SOMETHING_IS_MISSING
+    assert compare_curve(fit(problem_of(campaign))).verdict == Verdict.SOMETHING_IS_MISSING
 
 
 def test_rows_at_different_times_that_drift_are_no_repeats() -> None:
@@ -62,8 +62,8 @@ def test_rows_at_different_times_that_drift_are_no_repeats() -> None:
     compared = compare_curve(fit(problem))
     assert compared.lack_of_fit is None
     assert compared.repeatability is None
-    assert compared.verdict == SOMETHING_IS_MISSING
-    assert [one.written for one in explain_curve(problem).missing] == ["stunde:drift"]
+    assert compared.verdict == Verdict.SOMETHING_IS_MISSING
+    assert [one.effect for one in explain_curve(problem).missing] == ["stunde:drift"]
     # Independent repeats at different times stay repeats.
     y = y - 0.0005 * HOURS
     problem = problem_of(
@@ -76,7 +76,7 @@ def test_without_an_input_nothing_was_repeated() -> None:
     y = np.random.default_rng(3).normal(size=40)
     compared = compare_curve(fit(problem_of(curve({"y": y}, "y ~ 1"))))
     assert compared.repeatability is None
-    assert compared.verdict == EXPLAINED
+    assert compared.verdict == Verdict.EXPLAINED
 
 
 def test_rounding_is_no_noise() -> None:
@@ -84,7 +84,7 @@ def test_rounding_is_no_noise() -> None:
     problem = problem_of(curve({"y": 2.0 + 3.0 * x, "x": x}, "y ~ 1 + x"))
     document = explanation_document(explain_curve(problem), "curve")
     assert document["missing"] == []
-    assert document["verdict"] == EXPLAINED
+    assert document["verdict"] == Verdict.EXPLAINED
     assert "fits exactly" in document["answer"]
     problem = problem_of(curve({"y": 2.0 + 3.0 * x + 0.5 * x**2, "x": x}, "y ~ 1 + x"))
     document = explanation_document(explain_curve(problem), "curve")

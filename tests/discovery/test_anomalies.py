@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from by_path import simulator
 
-from monitor.discovery import fit
+from monitor.discovery import Verdict, fit
 from monitor.discovery.machine.anomalies import bad_points, ball_moves, plan_places
 from monitor.methods.samba.method import problem_of
 
@@ -54,7 +54,7 @@ def test_bad_points_are_found_with_axis_and_size_and_are_no_effect(virtual_campa
     assert answer.missing == ()
     assert answer.moves == ()
     assert answer.steps == ()
-    assert answer.comparison.verdict == "explained"
+    assert answer.comparison.verdict is Verdict.EXPLAINED
     told = {(point.run, point.sequence): point for point in answer.suspect}
     assert set(told) == {(3, 9), (3, 40), (11, 9)}
     for run, sequence, off in bad:
@@ -110,7 +110,7 @@ def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns
     assert "not recorded" in found.words.cause
     assert answer.suspect == ()
     assert answer.moves == ()
-    assert answer.comparison.verdict == "something is missing"
+    assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING
 
 
 def test_what_a_recorded_column_follows_is_not_said_to_vary(virtual_campaigns, explained):

@@ -9,8 +9,9 @@ import pytest
 from by_path import simulator
 from scipy import stats
 
-from monitor.discovery import compare, fit
-from monitor.discovery.machine.compare import lack_of_fit, split
+from monitor.discovery import Verdict, compare, fit
+from monitor.discovery.machine.compare import lack_of_fit
+from monitor.discovery.search.comparison import split
 from monitor.methods.samba.method import problem_of
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd" / "linear"
@@ -72,7 +73,7 @@ def test_repeatability_and_lack_of_fit_from_the_means_over_runs(compared):
     # The effect is the same in every run: it does not spoil repeatability, and the fit lacks it.
     assert answer.repeatability == pytest.approx(1e-3, rel=0.05)
     assert test.p_value < 1e-9
-    assert answer.verdict == "something is missing"
+    assert answer.verdict is Verdict.SOMETHING_IS_MISSING
 
 
 def test_breakdown_tells_where(compared):
@@ -113,7 +114,7 @@ def test_one_run_has_no_repeatability(virtual_campaigns):
     answer = compare(fit(problem_of(campaign)), "virtual", "samba")
     assert answer.repeatability is None
     assert answer.lack_of_fit is None
-    assert answer.verdict == "explained"
+    assert answer.verdict is Verdict.EXPLAINED
 
 
 def test_what_varies_from_run_to_run_is_seen_against_the_stated_uncertainty(virtual_campaigns):
@@ -124,11 +125,11 @@ def test_what_varies_from_run_to_run_is_seen_against_the_stated_uncertainty(virt
     answer = compare(fit(problem_of(campaign)), "virtual", "samba")
     assert answer.repeatability > 1.25e-3
     assert answer.excess_p_value < 1e-9
-    assert answer.verdict == "something is missing"
+    assert answer.verdict is Verdict.SOMETHING_IS_MISSING
 
 
 def test_a_statement_twenty_per_cent_too_low_is_no_finding(virtual_campaigns):
     campaign, _ = virtual_campaigns.virtual(3, stated_um=1 / 1.2)
     answer = compare(fit(problem_of(campaign)), "virtual", "samba")
     assert answer.excess_p_value < 1e-9
-    assert answer.verdict == "explained"
+    assert answer.verdict is Verdict.EXPLAINED

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from by_path import simulator
 
-from monitor.discovery import explain
+from monitor.discovery import Verdict, explain
 from monitor.effects.catalogue import catalogue, drivers_of
 from monitor.effects.words import describe
 from monitor.methods.model import Model
@@ -157,7 +157,7 @@ def test_an_added_effect_is_missing_no_more_and_a_removed_one_is_again(virtual_c
     grown = problem_of(campaign, Model("grown", added=("EXX:reversal",)))
     answer = explain(campaign, grown, "grown", rng=rng)
     assert answer.missing == ()
-    assert answer.comparison.verdict == "explained"
+    assert answer.comparison.verdict is Verdict.EXPLAINED
     again = explain(campaign, problem_of(campaign), "samba", rng=rng)
     assert [one.effect for one in again.missing] == ["EXX:reversal"]
 
@@ -173,7 +173,7 @@ def test_an_added_effect_that_follows_a_driver_is_missing_no_more(virtual_campai
     grown = problem_of(campaign, Model("grown", added=(effect,)))
     answer = explain(campaign, grown, "grown", rng=np.random.default_rng(1))
     assert answer.missing == ()
-    assert answer.comparison.verdict == "explained"
+    assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
 def test_rates_over_forty_small_campaigns(virtual_campaigns, explained):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from monitor.discovery import Verdict
+
 # The noise floor of every example but cold-cold, in mm: 1 µm white noise on each reading.
 FLOOR = 1e-3
 
@@ -21,7 +23,7 @@ def nothing_else(answer):
     assert answer.suspect == ()
     assert answer.moves == ()
     assert answer.steps == ()
-    assert answer.comparison.verdict == "something is missing"
+    assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING
 
 
 @pytest.mark.parametrize("name", ["nothing-hidden", "cold-cold"])
@@ -31,7 +33,7 @@ def test_where_nothing_is_missing_the_answer_is_nothing(example, name):
     assert answer.suspect == ()
     assert answer.moves == ()
     assert answer.steps == ()
-    assert answer.comparison.verdict == "explained"
+    assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
 def test_spindle_growth_with_its_time_constant(example):
@@ -58,7 +60,7 @@ def test_b_indexing_is_the_sine_of_two_periods_a_turn(example):
     u = np.sqrt(np.diag(found.covariance))
     assert abs(found.coefficients[0]) < 3 * u[0]
     assert abs(abs(found.coefficients[1]) - 25e-6) < 3 * u[1]
-    assert found.unit_name == "µrad"
+    assert found.units[0].name == "µrad"
     within_the_floor(found)
 
 
@@ -77,7 +79,7 @@ def test_a_loose_ball_is_no_law_of_physics(example):
     assert answer.missing == ()
     assert answer.suspect == ()
     assert answer.steps == ()
-    assert answer.comparison.verdict == "explained"
+    assert answer.comparison.verdict is Verdict.EXPLAINED
     (move,) = answer.moves
     assert (move.target, move.run) == ("2", 3)
     # Four touches an indexation: the ball's touches before and after the moment are this far apart.
@@ -89,7 +91,7 @@ def test_a_step_of_the_zero_of_b_is_told_as_a_step(example):
     answer = example("five-days")
     assert answer.missing == ()
     assert answer.moves == ()
-    assert answer.comparison.verdict == "explained"
+    assert answer.comparison.verdict is Verdict.EXPLAINED
     (step,) = answer.steps
     assert (step.parameter, step.target, step.run) == ("EB0C", None, 13)
     assert step.size == pytest.approx(15e-6, abs=3e-6)

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from by_path import load
 
+from monitor.discovery import Verdict
 from monitor.methods.chain.problem import solve_problem
-from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 
 TESTS = Path(__file__).resolve().parents[1]
 
@@ -39,7 +40,7 @@ def named(trial: ModuleType, effect: str):
 def test_rotary_probing_nothing_is_missing(trial, perfect, seed):
     told = trial.explained(trial.rotary(np.random.default_rng(seed), 4, perfect=perfect))
     assert trial.groups(told) == []
-    assert told.comparison.verdict == "explained"
+    assert told.comparison.verdict is Verdict.EXPLAINED
 
 
 def test_free_form_nothing_is_missing(trial):

@@ -14,7 +14,7 @@ from monitor.discovery import find_mistakes, fit, is_gross
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.variants import cycles_of_unknown_pitch, resolvable
 from monitor.exceptions import DataError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
 from monitor.records import Campaign, Probings
@@ -36,7 +36,7 @@ def one_run(example: str) -> Campaign:
 def maker(campaign: Campaign) -> Callable[[Campaign], ChainProblem]:
     with Database(":memory:") as db:
         model = as_model(resolve(db, None, campaign.method))
-    return lambda one: method_named(campaign.method).problem_of(one, model)
+    return lambda one: campaign_method(campaign).problem_of(one, model)
 
 
 def recorded(example: str, change: Callable[[Probings], Probings]) -> Campaign:
@@ -51,7 +51,7 @@ def told(campaign: Campaign) -> list[str]:
         found = fit(problem_of(campaign))
     except DataError:
         found = None
-    assert found is None or is_gross(found)
+    assert found is None or is_gross(campaign, found)
     mistakes = find_mistakes(campaign, problem_of, found)
     for one in mistakes:
         assert one.rms_undone < 0.5 * one.rms_as_recorded
@@ -84,7 +84,7 @@ def exchanged(one: str, other: str, rows: slice) -> Callable[[Probings], Probing
 @pytest.mark.parametrize("example", ["five-days", "tracked-robot", "hidden-reversal-x", "tilting-table"])
 def test_no_example_is_gross(example: str) -> None:
     campaign = one_run(example)
-    assert not is_gross(fit(maker(campaign)(campaign)))
+    assert not is_gross(campaign, fit(maker(campaign)(campaign)))
 
 
 def test_exchanged_linear_columns_of_balls() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from by_path import simulator
 
+from monitor.discovery import Verdict
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.samba.method import problem_of
 
@@ -21,7 +22,7 @@ def test_nothing_is_told_where_nothing_is_hidden(virtual_campaigns, explained, m
     campaign, _ = virtual_campaigns.on_machine(machine, 80000)
     answer = explained(campaign)
     assert not answer.missing
-    assert answer.comparison.verdict == "explained"
+    assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
 @pytest.mark.parametrize("machine", ["fork head", "one rotary table"])

@@ -17,7 +17,7 @@ from monitor.discovery.machine.variants import variants_of
 from monitor.discovery.machine.visible import see
 from monitor.effects import parse_effect
 from monitor.exceptions import DataError
-from monitor.methods.tracker import method as tracker
+from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.workflow.identify.notes import note

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from monitor.discovery import Explanation, explain, fit
+from monitor.discovery import Explanation, Verdict, explain, fit
 from monitor.discovery.machine.held_out import held_out_error, pose_parts
 from monitor.discovery.machine.version_error import version_error
 from monitor.discovery.machine.visible import see
 from monitor.methods.model import Model
-from monitor.methods.tracker import method as tracker
+from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
 
 
@@ -45,7 +45,7 @@ def test_nothing_is_missing_where_nothing_is_hidden(robots, tmp_path, seed):
     told = explained(robots, tmp_path, seed, robots.Hidden(), fixed_every=30)
     assert told.missing == ()
     assert told.suspect == ()
-    assert told.comparison.verdict == "explained"
+    assert told.comparison.verdict is Verdict.EXPLAINED
 
 
 @pytest.mark.parametrize("seed", [3, 4])

@@ -17,8 +17,8 @@ from monitor.exceptions import DataError
 from monitor.machine import parse_topology
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.model import Model
-from monitor.methods.rotary_probing import method as rotary_probing
 from monitor.methods.rotary_probing.base import rotary_base
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 from monitor.methods.rotary_probing.patterns import PARAMETERS, SYMBOLS, Touches, closed_forms
 
 campaigns = load("rotary_campaigns", Path(__file__).with_name("rotary_campaigns.py"))
@@ -50,7 +50,7 @@ def as_touches(plan, seen) -> Touches:
     )
 
 
-def estimates(campaign, model=rotary_probing.DEFAULT_MODEL):
+def estimates(campaign, model=rotary_probing.own_model):
     found = rotary_probing.identify(campaign, model)
     return dict(zip(found.parameters, found.runs[0].estimate, strict=True)), found
 

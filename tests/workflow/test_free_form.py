@@ -8,7 +8,7 @@ import pytest
 
 from monitor.discovery import fit
 from monitor.exceptions import InputError
-from monitor.methods.free_form import method as free_form
+from monitor.methods.free_form.method import METHOD as free_form
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign, load_campaign
 from monitor.workflow import models

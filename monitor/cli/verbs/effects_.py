@@ -57,6 +57,6 @@ def run(options: Namespace) -> int:
         f"{len(rows)} effects of {whose}",
         ["effect", "unit", "what it is", "usual cause"],
         rows,
-        left=4,
+        text_columns=4,
     )
     return 0

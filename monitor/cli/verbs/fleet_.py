@@ -50,7 +50,7 @@ def run(options: Namespace) -> int:
         f"{machines}, {found['values']} values; q: false discovery rate over all rows",
         ["rank", "machine", "parameter", "attention", "unit", "latest", "mean", "s runs", "s days", "a year", "limit",
          "Bartlett q", "ANOVA q", "drift q"],
-        rows, left=5,
+        rows, text_columns=5,
     )  # fmt: skip
     for words, count in found["attention"].items():
         if count:

@@ -81,7 +81,7 @@ def _stepwise(options: Namespace) -> int:
         f"{found['campaign']}, run {found['run']}: step by step and all at once",
         ["parameter", "unit", "stepwise", "u", "at once", "u", "by method", "", "what tells them apart"],
         rows,
-        left=2,
+        text_columns=2,
     )
     output.say(
         "by method: what of the difference remains without noise; 'differs': the rest exceeds 2 u of it"
@@ -91,7 +91,7 @@ def _stepwise(options: Namespace) -> int:
 
 def show(found: dict[str, Any]) -> None:
     """The parameters of the runs, newest last, and what was refused."""
-    if found["method"] == "curve":
+    if "response" in found:
         curve_output.coefficients(found)
         return
     runs = found["runs"][-SHOWN_RUNS:]
@@ -110,7 +110,7 @@ def show(found: dict[str, Any]) -> None:
         f"{found['campaign']}, model {found['model']}{before}",
         ["parameter", "unit", *(f"run {one['run']}" for one in runs), "u"],
         rows,
-        left=2,
+        text_columns=2,
     )
     notes = [one["note"] for one in runs if one["note"]]
     if notes:

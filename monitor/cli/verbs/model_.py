@@ -64,7 +64,7 @@ def _list(options: Namespace) -> int:
         ]
         for one in found["models"]
     ]
-    output.table("", ["model", "parent", "effects added to the base", "note"], rows, left=4)
+    output.table("", ["model", "parent", "effects added to the base", "note"], rows, text_columns=4)
     return 0
 
 
@@ -141,7 +141,7 @@ def _history(options: Namespace) -> int:
         steps = comparison.history(db, options.name, options.campaign)
     files = []
     if options.figures is not None:
-        if steps[0].get("method") == "curve":
+        if "unit" in steps[0]:
             from monitor.workflow.explain.curve_figures import curve_history_figure
 
             files = curve_history_figure(steps, options.figures)
@@ -159,7 +159,7 @@ def _history(options: Namespace) -> int:
 
 
 def _steps(steps: list[comparison.Document]) -> None:
-    if steps[0].get("method") == "curve":
+    if "unit" in steps[0]:
         curve_output.steps(steps)
         return
     rows = [
@@ -177,5 +177,5 @@ def _steps(steps: list[comparison.Document]) -> None:
         f"on campaign {steps[0]['campaign']}",
         ["model", "added", "RMS / µm", "held-out / µm", "repeatability / µm", "lack of fit p"],
         rows,
-        left=2,
+        text_columns=2,
     )

@@ -112,7 +112,10 @@ def _tables(found: dict[str, Any]) -> None:
         rows.append(row)
     stated = found["stated_uncertainty_um"]
     output.table(
-        f"expected standard uncertainties of one run, {stated:g} µm a coordinate", columns, rows, left=2
+        f"expected standard uncertainties of one run, {stated:g} µm a coordinate",
+        columns,
+        rows,
+        text_columns=2,
     )
     if proposed:
         output.say(

@@ -25,7 +25,7 @@ def tables(found: dict[str, Any]) -> None:
         f"largest expected standard uncertainty of one run, {stated:g} µm a probing",
         ["of", "unit", "u", "u proposed"],
         rows,
-        left=2,
+        text_columns=2,
     )
     axis = f"{table.lower()}_deg"
     output.table(
@@ -36,7 +36,7 @@ def tables(found: dict[str, Any]) -> None:
              str(one["unseen_dimensions"]), str(one["points_beyond_nodes"])]
             for one in found["angles"]
         ],
-        left=1,
+        text_columns=1,
     )  # fmt: skip
     chosen = ", ".join(f"{angle:g}°" for angle in found["next_angles_deg"])
     output.say(f"probe next at {table} = {chosen}")

@@ -82,7 +82,7 @@ def run(options: Namespace) -> int:
                 ]
                 for one in found["machines"]
             ],
-            left=6,
+            text_columns=6,
         )
         if found["message"]:
             output.say(found["message"])

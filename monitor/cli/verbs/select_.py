@@ -95,7 +95,7 @@ def _comparison(answer: SideBySideAnswer) -> None:
         f"expanded uncertainty U = k_q u of a calibration, all parameters together with p = {answer.p:g}",
         ["parameter", "unit", *(f"{name} ({scatter.runs} runs)" for name, scatter in scatters.items())],
         rows,
-        left=2,
+        text_columns=2,
     )
     for file in answer.figures or ():
         output.say(file)

@@ -95,7 +95,7 @@ def _parameters(answer: StatisticsAnswer) -> None:
         f"{answer.campaign}, runs by {answer.by} ({groups})",
         ["parameter", "unit", "mean", "u all", "u pooled", "Bartlett p", "ANOVA p", "ANOVA q", "normal p"],
         rows,
-        left=2,
+        text_columns=2,
     )
 
 

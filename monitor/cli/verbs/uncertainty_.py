@@ -106,7 +106,7 @@ def _parameters(answer: UncertaintyAnswer) -> None:
                 output.rounded(expanded, expanded),
             ]
         )
-    output.table(f"{answer.campaign}, run {answer.run}, model {answer.model}", columns, rows, left=2)
+    output.table(f"{answer.campaign}, run {answer.run}, model {answer.model}", columns, rows, text_columns=2)
 
 
 def _coverage(answer: UncertaintyAnswer) -> None:

@@ -8,27 +8,27 @@ against the model, the search for a missing effect has the last word, so that `c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from monitor.discovery.curve.explain import explain_curve
 from monitor.discovery.curve.quality import noise_of
-from monitor.discovery.machine.compare import (
-    EXPLAINED,
-    LACK_OF_FIT_LEVEL,
-    SOMETHING_IS_MISSING,
-    STATEMENT_TOLERANCE,
+from monitor.discovery.search.comparison import (
+    Comparison,
     LackOfFit,
     Part,
+    Verdict,
+    excess_p_value,
+    lack_of_fit_test,
+    part_of,
     split,
+    verdict_of,
 )
 from monitor.effects.curve import SEQUENCE
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.statistics.noise import Assessed, assess
 
 # A breakdown by an input shows where it fails in so many parts of equal numbers of rows.
@@ -36,21 +36,12 @@ PARTS = 5
 
 
 @dataclass(frozen=True)
-class CurveComparison:
-    """A model against a curve, everything in the unit of the response.
-
-    ``repeatability`` is the standard deviation of repeats (None without), ``expected_rms`` what the stated
-    uncertainty would leave (None without), ``noise`` how neighbouring rows resemble each other under the model.
-    """
+class CurveComparison(Comparison):
+    """A model against a curve, in the unit of the response; ``noise`` is how neighbouring rows resemble each other
+    under the model."""
 
     fit: CurveFit
-    lack_of_fit: LackOfFit | None
-    repeatability: float | None
-    expected_rms: float | None
-    excess_p_value: float | None
     noise: Assessed
-    verdict: str
-    by: Mapping[str, Mapping[str, Part]]
 
 
 def places_of(fit: CurveFit) -> npt.NDArray[np.int64]:
@@ -75,16 +66,10 @@ def lack_of_fit(fit: CurveFit) -> tuple[LackOfFit | None, float | None]:
     if not fit.effects or fit.exact or _repeats_drift(fit):
         return None, None
     scatter, lack, repeated = split(fit.residual[kept, None], places_of(fit)[kept])
-    own = fit.degrees_of_freedom - repeated
     if repeated < 1:
         return None, None
-    repeatability = float(np.sqrt(scatter / repeated))
-    if own < 1 or scatter <= 0.0:
-        return None, repeatability
-    f = (lack / own) / (scatter / repeated)
-    return LackOfFit(
-        float(f), float(scipy.stats.f.sf(f, own, repeated)), float(own), float(repeated)
-    ), repeatability
+    test = lack_of_fit_test(lack, fit.degrees_of_freedom - repeated, scatter, repeated)
+    return test, float(np.sqrt(scatter / repeated))
 
 
 def _repeats_drift(fit: CurveFit) -> bool:
@@ -100,10 +85,6 @@ def _repeats_drift(fit: CurveFit) -> bool:
     return found.noticed and found.noise.lag_one > 0.0
 
 
-def _part(residual: npt.NDArray[np.float64]) -> Part:
-    return Part(float(np.sqrt(np.mean(residual**2))), float(np.abs(residual).max()), len(residual))
-
-
 def _breakdown(fit: CurveFit) -> dict[str, dict[str, Part]]:
     kept, inputs = ~fit.problem.left_out, fit.problem.inputs
     found: dict[str, dict[str, Part]] = {}
@@ -114,12 +95,12 @@ def _breakdown(fit: CurveFit) -> dict[str, dict[str, Part]]:
             last = number == len(edges) - 2
             inside = kept & (values >= low) & ((values <= high) if last else (values < high))
             if inside.any():
-                parts[f"{low:.6g} to {high:.6g}"] = _part(fit.residual[inside])
+                parts[f"{low:.6g} to {high:.6g}"] = part_of(fit.residual[inside])
         if len(parts) > 1:
             found[name] = parts
     for name, labels in inputs.groups.items():
         found[name] = {
-            str(label): _part(fit.residual[kept & (labels == label)])
+            str(label): part_of(fit.residual[kept & (labels == label)])
             for label in dict.fromkeys(labels[kept].tolist())
         }
     return found
@@ -133,19 +114,20 @@ def compare_curve(fit: CurveFit, *, rate: float = 0.01, lacks: bool | None = Non
     expected = excess = None
     if stated is not None:
         expected = stated * float(np.sqrt(fit.degrees_of_freedom / len(rows)))
-        excess = float(scipy.stats.chi2.sf(fit.sum_of_squares / stated**2, fit.degrees_of_freedom))
-    missing = bool(lacks) or (test is not None and test.p_value < LACK_OF_FIT_LEVEL)
-    if stated is not None and excess is not None:
-        missing |= fit.deviation > STATEMENT_TOLERANCE * stated and excess < LACK_OF_FIT_LEVEL
-    if lacks is None and not missing:
-        missing = bool(explain_curve(problem, rate=rate).missing)
+        excess = excess_p_value(fit.sum_of_squares / stated**2, fit.degrees_of_freedom)
+    verdict = Verdict.SOMETHING_IS_MISSING if lacks else verdict_of(test, fit.deviation, stated, excess)
+    if lacks is None and verdict is Verdict.EXPLAINED and explain_curve(problem, rate=rate).missing:
+        verdict = Verdict.SOMETHING_IS_MISSING
     return CurveComparison(
-        fit=fit,
-        lack_of_fit=test,
-        repeatability=repeatability,
+        rms=fit.rms,
         expected_rms=expected,
+        repeatability=repeatability,
+        residual_deviation=fit.deviation,
+        stated_uncertainty=stated,
+        lack_of_fit=test,
         excess_p_value=excess,
-        noise=noise_of(fit),
-        verdict=SOMETHING_IS_MISSING if missing else EXPLAINED,
+        verdict=verdict,
         by=_breakdown(fit),
+        fit=fit,
+        noise=noise_of(fit),
     )

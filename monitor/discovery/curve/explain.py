@@ -15,7 +15,7 @@ from monitor.discovery.curve.outliers import Outlier
 from monitor.discovery.curve.quality import noise_of
 from monitor.discovery.curve.search import Views, exhausted
 from monitor.discovery.machine.visible import SMALLEST_SHARE
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.statistics.noise import WHITE, Assessed
 
@@ -61,7 +61,7 @@ def explain_curve(problem: CurveProblem, *, rate: float = 0.01, most: int = MOST
         rounds.append(now)
     out = now.under.problem.left_out
     missing = tell(rounds, noise)
-    named = {one.effect.family for one in missing}
+    named = {one.fitted.family for one in missing}
     return CurveExplanation(
         first=first,
         final=now.under,

@@ -13,50 +13,30 @@ from monitor.discovery.curve.search import Round
 from monitor.discovery.machine.evidence import Evidence, orthonormal, without
 from monitor.discovery.machine.scan import Finding
 from monitor.discovery.machine.visible import Candidate
-from monitor.effects.curve import CurveEffect, coefficient_names
+from monitor.discovery.search.missing import COINCIDES, UNDECIDED, Missing, Rival, Searched
+from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, coefficient_names
 from monitor.effects.curve_words import calendar_period, describe_curve
-from monitor.effects.words import Words
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.records import Array
 from monitor.statistics.noise import Assessed
-
-#: As for machines: rivals whose evidence comes this close are not ruled out.
-UNDECIDED = 12.0
-COINCIDES = 0.999
+from monitor.units import Unit
 
 
 @dataclass(frozen=True)
-class CurveMissing:
-    """A missing effect, everything in the unit of the response or as its ``units`` say.
+class CurveMissing(Missing):
+    """A missing effect of a curve, in the unit of the response or as its ``units`` say.
 
-    ``effect`` is found from the data, ``written`` how it is to be added: a searched value rounded to its
+    ``fitted`` is the effect as estimated, ``effect`` how it is to be added: a searched value rounded to its
     uncertainty, or a period of the calendar that it agrees with. ``noise_alone`` is how often correlated noise alone
-    would do as well, its search paid for; above the rate of the scan the finding is likely, not ``certain``, and that
+    would do as well, its search paid for; above the rate of the scan the effect is likely, not ``certain``, and that
     is its p-value.
     """
 
-    effect: CurveEffect
+    fitted: CurveEffect
     certain: bool
     noise_alone: float
-    written: str
-    words: Words
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    coefficients: Array
-    u: Array
-    amplitude: float
-    u_amplitude: float
-    peak: float
-    u_value: float | None
-    p_value: float
-    q_value: float
-    rms_before: float
-    rms_after: float
-    held_out_before: float | None
-    held_out_after: float | None
     bic_before: float
     bic_after: float
-    rivals: tuple[tuple[str, bool], ...]
 
 
 def tell(rounds: Sequence[Round], noise: Assessed) -> tuple[CurveMissing, ...]:
@@ -69,7 +49,7 @@ def tell(rounds: Sequence[Round], noise: Assessed) -> tuple[CurveMissing, ...]:
         for finding in now.result.findings:
             after = fit(before.settled.with_effects([effect_of(finding.candidate)]))
             fits = before, after, rounds[-1].under
-            told.append(_missing(now, finding, len(told), fits, noise, doubts[finding.candidate.family]))
+            told.append(_missing(now, finding, len(told) + 1, fits, noise, doubts[finding.candidate.family]))
             before = after
     return tuple(told)
 
@@ -107,12 +87,12 @@ def _doubts(now: Round) -> dict[str, float]:
 def _missing(
     now: Round,
     finding: Finding,
-    place: int,
+    rank: int,
     fits: tuple[CurveFit, CurveFit, CurveFit],
     noise: Assessed,
     doubt: float,
 ) -> CurveMissing:
-    """One finding at ``place``; ``fits`` are those before it, with it, and with everything."""
+    """One finding; ``fits`` are those before it, with it, and with everything."""
     before, after, final = fits
     at = len(now.scene.fit.problem.base) + len(before.problem.added)
     effect = final.effects[at]
@@ -136,29 +116,41 @@ def _missing(
     if not certain:
         p_value = max(p_value, doubt)
     return CurveMissing(
-        effect=effect,
-        certain=certain,
-        noise_alone=doubt,
-        written=written.text,
+        rank=rank,
+        effect=written.text,
         words=describe_curve(written, final.problem.curve.response, unit, clock=clock),
-        names=tuple(final.names[n] for n in own),
-        units=tuple(final.units[n] for n in own),
+        parameters=tuple(final.names[n] for n in own),
+        units=tuple(Unit(final.units[n], 1.0) for n in own),
         coefficients=coefficients,
-        u=np.sqrt(np.diag(covariance)),
+        covariance=covariance,
         amplitude=amplitude,
-        u_amplitude=u_amplitude,
+        u=u_amplitude,
         peak=float(np.abs(contribution - contribution.mean()).max()),
-        u_value=u_value,
+        searched=_searched(effect, u_value, unit),
         p_value=p_value,
         q_value=min(1.0, p_value * now.acceptance.families) if certain else p_value,
         rms_before=before.rms,
         rms_after=after.rms,
         held_out_before=held_out(before),
         held_out_after=held_out(after),
+        rivals=_rivals(now, finding, now.result.findings),
+        fitted=effect,
+        certain=certain,
+        noise_alone=doubt,
         bic_before=bic(before),
         bic_after=bic(after),
-        rivals=_rivals(now, finding, now.result.findings),
     )
+
+
+def _searched(effect: CurveEffect, u: float | None, unit: str) -> Searched | None:
+    """The searched value of an effect, or its period of the calendar, which has no uncertainty."""
+    if effect.value is None or not (effect.free or effect.shape == "sin"):
+        return None
+    name = SEARCHED[effect.shape]
+    if not effect.free:
+        return Searched(name, effect.value, None, unit or "1")
+    frequency = 1.0 / effect.value if effect.shape == "sin" else None
+    return Searched(name, effect.value, u, unit or ("row" if effect.column == SEQUENCE else "1"), frequency)
 
 
 def _own_names(fitted: CurveFit, effect: CurveEffect) -> tuple[str, ...]:
@@ -195,7 +187,7 @@ def _written(fitted: CurveFit, effect: CurveEffect, u: float | None) -> CurveEff
     return effect.at(float(np.round(effect.value, max(1 - int(np.floor(np.log10(u))), 0))))
 
 
-def _rivals(now: Round, finding: Finding, findings: Sequence[Finding]) -> tuple[tuple[str, bool], ...]:
+def _rivals(now: Round, finding: Finding, findings: Sequence[Finding]) -> tuple[Rival, ...]:
     """Effects that the rows do not rule out, and whether they coincide with the one found."""
     own = finding.evidence
     others = [one.candidate.columns for one in findings if one is not finding]
@@ -210,8 +202,8 @@ def _rivals(now: Round, finding: Finding, findings: Sequence[Finding]) -> tuple[
             continue
         if (effect.column, effect.shape) == (chosen.column, chosen.shape):
             continue
-        told.append((_named(one), _share(basis, one, vector) > COINCIDES))
-    return tuple(sorted(told, key=lambda pair: not pair[1]))
+        told.append(Rival(_named(one), _share(basis, one, vector) > COINCIDES))
+    return tuple(sorted(told, key=lambda rival: not rival.coincides))
 
 
 def _named(one: Evidence) -> str:

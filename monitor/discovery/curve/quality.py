@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from monitor.discovery.machine.held_out import held_out_rms
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.solver import inverse_normal
 from monitor.records import Array
 from monitor.statistics.noise import WHITE, Assessed, assess

@@ -16,7 +16,7 @@ from monitor.discovery.machine.evidence import without
 from monitor.discovery.machine.visible import SMALLEST_SHARE, Candidate, Variant
 from monitor.effects import ChainEffect
 from monitor.effects.curve import CurveEffect, curve_columns
-from monitor.methods.curve.method import CurveFit
+from monitor.methods.curve.fit import CurveFit
 from monitor.records import Array
 from monitor.statistics.noise import Noise
 

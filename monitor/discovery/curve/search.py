@@ -13,7 +13,7 @@ from monitor.discovery.curve.outliers import Outlier, outliers
 from monitor.discovery.curve.scene import Scene, effect_of, scene_of
 from monitor.discovery.machine.scan import Finding, ScanResult, scan
 from monitor.discovery.machine.visible import Visible
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.statistics.noise import Noise
 

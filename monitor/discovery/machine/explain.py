@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.anomalies import BadPoint, BallMove
-from monitor.discovery.machine.compare import SOMETHING_IS_MISSING, Comparison, compare
+from monitor.discovery.machine.compare import ChainComparison, compare
 from monitor.discovery.machine.evidence import p_value_against_runs
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.gears import gear_variants
 from monitor.discovery.machine.held_out import held_out_error
-from monitor.discovery.machine.missing import Missing, Surroundings, stands_out, tell
+from monitor.discovery.machine.missing import ChainMissing, Surroundings, stands_out, tell
 from monitor.discovery.machine.mistakes import Mistake
 from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows
 from monitor.discovery.machine.refine import refine, refine_all
@@ -31,6 +31,7 @@ from monitor.discovery.machine.tables import with_tables
 from monitor.discovery.machine.variants import cycles_of_unknown_pitch, resolvable, variants_of, with_drivers
 from monitor.discovery.machine.varying import tell_varying
 from monitor.discovery.machine.visible import SMALLEST_SHARE, Candidate, Variant, Visible, see
+from monitor.discovery.search.comparison import Verdict
 from monitor.effects.catalogue import catalogue, drivers_of
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign
@@ -50,8 +51,8 @@ class Explanation:
     recorded column follows it. Where the file itself looks wrong, ``mistakes`` says how, and nothing else is told.
     """
 
-    comparison: Comparison
-    missing: tuple[Missing, ...]
+    comparison: ChainComparison
+    missing: tuple[ChainMissing, ...]
     suspect: tuple[BadPoint, ...]
     moves: tuple[BallMove, ...]
     steps: tuple[Step, ...]
@@ -127,7 +128,7 @@ def explain(
     )
     comparison = compare(first, campaign.name, model)
     # A bad point or a ball that moved is told as that: what counts is the verdict without them.
-    verdict = SOMETHING_IS_MISSING if missing else compare(under, campaign.name, model).verdict
+    verdict = Verdict.SOMETHING_IS_MISSING if missing else compare(under, campaign.name, model).verdict
     named = {name for one in missing for name in (one.effect, *(rival.effect for rival in one.rivals))}
     return Explanation(
         comparison=replace(comparison, verdict=verdict),

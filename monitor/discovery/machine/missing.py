@@ -12,24 +12,20 @@ from monitor.discovery.machine.evidence import Evidence, best_of_families, ortho
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.held_out import held_out_error
 from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows, widening
-from monitor.discovery.machine.refine import Refined, Searched, refine
+from monitor.discovery.machine.refine import Refined, refine
 from monitor.discovery.machine.scan import Finding, ScanResult, amplitudes
 from monitor.discovery.machine.separate import Separation, separating_poses
 from monitor.discovery.machine.variants import with_drivers
 from monitor.discovery.machine.visible import Candidate, Visible, see
+from monitor.discovery.search.missing import COINCIDES, UNDECIDED, Missing, Rival
 from monitor.effects import ChainEffect
 from monitor.effects.drivers import EachRun
 from monitor.effects.shapes import Cyclic, Harmonic
-from monitor.effects.words import Words, describe
+from monitor.effects.words import describe
 from monitor.records import Array
 
-# Rivals whose evidence comes this close are not ruled out. Where two effects are s standard deviations apart,
-# the wrong one leads by more than z^2 with a probability of at most Phi(-z); z = 3.5 here.
-UNDECIDED = 12.0
 # A time constant between two of the grid may lose so much there; rivals are compared at their best value.
 GRID_LOSS = 12.0
-# An effect coincides with another where so much of it is explained by the other at any size.
-COINCIDES = 0.999
 # An effect of less than twice its standard uncertainty is no answer.
 SMALLEST_RATIO = 2.0
 # Orders of a gear closer than this are the same: less than a turn of the joint tells no more.
@@ -37,44 +33,16 @@ ONE_ORDER = 2.0
 
 
 @dataclass(frozen=True)
-class Rival:
-    """An effect that is not ruled out; ``coincides`` says that no data of this plan could rule it out."""
+class ChainMissing(Missing):
+    """A missing effect of a chain; lengths in mm.
 
-    effect: str
-    coincides: bool
-
-
-@dataclass(frozen=True)
-class Missing:
-    """A missing effect, in internal units (amplitude, u) and mm (everything else that is a length).
-
-    ``amplitude`` is the coefficient, or the length of several (cosine and sine). ``rms_before`` and
-    ``rms_after`` are of all coordinates; the held-out ones per degree of freedom (with one run of many
-    poses: of blocks of poses left out; with one of few: None); those of days None with fewer than three
-    days. ``separation`` holds the poses that would tell the rivals apart.
+    Held-out errors are of runs left out (with one run of many poses: of blocks of poses; with one of few: None), those
+    of days None with fewer than three days. ``separation`` holds the poses that would separate the rivals; ``varies``
+    says that the effect has another size in every run.
     """
 
-    rank: int
-    effect: str
-    words: Words
-    parameters: tuple[str, ...]
-    coefficients: Array
-    covariance: Array
-    amplitude: float
-    u: float
-    unit_name: str
-    unit_factor: float
-    peak: float
-    searched: Searched | None
-    p_value: float
-    q_value: float
-    rms_before: float
-    rms_after: float
-    held_out_before: float | None
-    held_out_after: float | None
     held_out_days_before: float | None
     held_out_days_after: float | None
-    rivals: tuple[Rival, ...]
     separation: Separation
     varies: bool
 
@@ -95,7 +63,7 @@ class Surroundings:
 
 def tell(
     fit: Fit, visible: Visible, result: ScanResult, refined: Sequence[Refined], known: Surroundings
-) -> tuple[Missing, ...]:
+) -> tuple[ChainMissing, ...]:
     """Everything that is told of the findings of a scan, the most convincing first; ``refined`` are the same at
     their best time constants and pitches."""
     findings = result.findings
@@ -197,7 +165,7 @@ def _missing(
     covariance: Array,
     known: Surroundings,
     poses: npt.NDArray[np.int64] | None,
-) -> Missing:
+) -> ChainMissing:
     candidate = refined.candidate
     p_value, q_value = finding.evidence.p_value, finding.q_value
     if poses is not None:
@@ -210,17 +178,16 @@ def _missing(
     amplitude, u = _amplitude(candidate, coefficients, covariance)
     before, after = chosen[:place], chosen[: place + 1]
     rivals = _rivals(fit, visible, finding, candidate, chosen, place, coefficients, known.drivers)
-    return Missing(
+    return ChainMissing(
         rank=place + 1,
         effect=_name(candidate),
         words=describe(effect),
         parameters=effect.parameters(fit.problem.context),
+        units=(effect.unit,) * len(coefficients),
         coefficients=coefficients,
         covariance=covariance,
         amplitude=amplitude,
         u=u,
-        unit_name=effect.unit.name,
-        unit_factor=effect.unit.factor,
         peak=float(np.linalg.norm(candidate.raw @ coefficients, axis=1).max()),
         searched=refined.searched,
         p_value=p_value,

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
 from monitor.exceptions import MonitorError
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.records import Array, Campaign
 
@@ -32,8 +33,6 @@ BETTER_SHARE = 0.3
 MOST_ROUNDS = 6
 #: Every target is tried at every row up to so many; a part with a hundred points has a name for each.
 MOST_TARGETS = 12
-#: Trials need no more rows than this of one run; the answer is fitted to all.
-MOST_ROWS = 150
 #: Readings that fit converge in some eight steps; a trial that does not is none.
 MOST_STEPS = 15
 #: Rows that are named one by one.
@@ -52,9 +51,9 @@ class Mistake:
     rms_undone: float
 
 
-def is_gross(found: Fit) -> bool:
+def is_gross(campaign: Campaign, found: Fit) -> bool:
     """Whether a residual is beyond what effects of a machine leave."""
-    return found.rms > found.problem.gross_times * found.sigma or found.rms > GROSS_MM
+    return found.rms > campaign_method(campaign).gross_times * found.sigma or found.rms > GROSS_MM
 
 
 def find_mistakes(campaign: Campaign, problem_of: Maker, found: Fit | None) -> tuple[Mistake, ...]:
@@ -116,11 +115,12 @@ def _part(campaign: Campaign, found: Fit | None) -> Campaign:
         runs = np.unique(probings.run)
         run = runs[int(np.argmax([squares[found.problem.context.run == one].mean() for one in runs]))]
     rows = np.flatnonzero(probings.run == run)
-    if campaign.method == "tracker" and len(rows) > MOST_ROWS:
+    most_rows = campaign_method(campaign).trial_rows
+    if most_rows is not None and len(rows) > most_rows:
         joints = np.column_stack(list(probings.readings.values()))[rows]
         _, pose = np.unique(joints, axis=0, return_inverse=True)
         pose = pose.reshape(-1)
-        step = int(np.ceil(len(rows) / MOST_ROWS))
+        step = int(np.ceil(len(rows) / most_rows))
         rows = rows[pose % step == 0]
     return replace(
         campaign,
@@ -194,7 +194,7 @@ def _column(axis: str, linear: bool) -> str:
 
 
 def _word(campaign: Campaign) -> str:
-    return {"tracker": "reflector", "l-shape": "module", "samba": "ball"}.get(campaign.method, "target")
+    return campaign_method(campaign).words.target
 
 
 def _exchange(

@@ -14,6 +14,7 @@ from monitor.discovery.machine.gears import STEP as ORDER_STEP
 from monitor.discovery.machine.scan import ScanResult, amplitudes
 from monitor.discovery.machine.variants import TIME_CONSTANTS_S
 from monitor.discovery.machine.visible import Candidate, Variant, Visible, see
+from monitor.discovery.search.missing import Searched
 from monitor.effects import ChainEffect, with_time_constant
 from monitor.effects.catalogue import SCREW_LEADS_MM
 from monitor.effects.drivers import WarmUp
@@ -25,16 +26,6 @@ from monitor.records import Array
 GRID_FACTOR = TIME_CONSTANTS_S[1] / TIME_CONSTANTS_S[0]
 # Relative step of the numerical derivative by the searched value.
 STEP = 1e-3
-
-
-@dataclass(frozen=True)
-class Searched:
-    """A value that was searched: name, best value and standard uncertainty in ``unit``."""
-
-    name: str
-    value: float
-    u: float
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -142,7 +133,7 @@ def refine(fit: Fit, visible: Visible, chosen: Sequence[Candidate], place: int) 
         if near:
             value = min(near, key=lambda lead: abs(lead - value))
             now = at(value)
-    return Refined(now, Searched(name, value, u, unit), slope)
+    return Refined(now, Searched(name, value, u if np.isfinite(u) else None, unit), slope)
 
 
 def _uncertainty(visible: Visible, candidate: Candidate, slope: Array, others: Array) -> float:

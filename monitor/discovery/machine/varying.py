@@ -9,7 +9,7 @@ import numpy as np
 
 from monitor.discovery.machine.evidence import Evidence, weigh_in_each_run
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.missing import Missing, Surroundings, tell
+from monitor.discovery.machine.missing import ChainMissing, Surroundings, tell
 from monitor.discovery.machine.refine import refine_all
 from monitor.discovery.machine.scan import scan
 from monitor.discovery.machine.variants import each_run, with_drivers
@@ -75,7 +75,7 @@ def tell_varying(
     others: Sequence[Variant],
     rate: float,
     known: Surroundings,
-) -> tuple[Missing, ...]:
+) -> tuple[ChainMissing, ...]:
     """Everything that is told of effects that vary; ``steady`` is the fit with all else that was found, ``others``
     the effects that may be their rivals.
 

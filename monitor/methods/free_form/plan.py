@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError
-from monitor.methods.free_form.method import problem_of
+from monitor.methods.free_form.assembly import problem_of
 from monitor.methods.free_form.problem import FreeFormProblem
 from monitor.methods.model import Model
 from monitor.records import Array, Campaign, Probings
-from monitor.units import DEGREE
+from monitor.units import DEGREE, Unit
 
 # Eigenvalues of the scaled information below this part of the largest are unseen: those of plans that barely see an
 # unknown stay above 1e-7, rounding leaves 1e-15.
@@ -59,6 +59,22 @@ class Candidates:
     inside: npt.NDArray[np.bool_]
     always: Array
     own: dict[float, tuple[int, ...]]
+
+    @property
+    def table(self) -> str:
+        """The name of the axis that turns the workpiece."""
+        return self.problem.plane.table.name
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """Every boundary condition with what it fixes, the known error last."""
+        return self.problem.conditions
+
+    @property
+    def units(self) -> dict[str, Unit]:
+        """The display unit of every parameter."""
+        context = self.problem.context
+        return {name: effect.unit for effect in self.problem.base for name in effect.parameters(context)}
 
     def expected(self, angles: Sequence[float]) -> Expected:
         """What a plan of these angles promises."""

@@ -18,39 +18,17 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError
+from monitor.methods.chain.identification import StepwiseCoefficient
 from monitor.methods.chain.least_squares import RANK_TOLERANCE, Solution
-from monitor.methods.l_shape.method import ORDERS, LShapeProblem
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.l_shape.base import ORDERS
+from monitor.methods.l_shape.problem import LShapeProblem
 from monitor.records import Array
 
 STRAIGHT_LINES = "straight lines through curved paths instead of tangents where the axes read zero"
 ALIGNMENT = "its first order holds how the piece was laid down"
 Rows = npt.NDArray[np.int64]
 NOISE = "noise that one step hands on to the next"
-
-
-@dataclass(frozen=True)
-class Step:
-    """A coefficient by both ways, in internal units.
-
-    ``stepwise`` and ``at_once`` with their standard uncertainties; ``by_method`` is the part of the difference that
-    remains without noise (the method's own), ``u_noise`` the standard uncertainty of the rest. ``at_once`` is NaN for
-    the first order of a straightness, which that fit does not have, and for what it refused.
-    """
-
-    parameter: str
-    stepwise: float
-    u_stepwise: float
-    at_once: float
-    u_at_once: float
-    by_method: float
-    u_noise: float
-    why: str
-
-    @property
-    def agrees(self) -> bool:
-        """Whether what the method does not explain lies within twice its standard uncertainty."""
-        left = self.stepwise - self.at_once - self.by_method
-        return not np.isfinite(left) or abs(left) <= 2.0 * self.u_noise
 
 
 @dataclass(frozen=True)
@@ -166,12 +144,13 @@ def _lever(problem: LShapeProblem, arm: _Arm) -> Array:
     return lever
 
 
-def stepwise(problem: LShapeProblem, solution: Solution, run: int) -> tuple[Step, ...]:
+def stepwise(problem: ChainProblem, solution: Solution, run: int) -> tuple[StepwiseCoefficient, ...]:
     """One run by both ways. ``solution`` is that of all at once.
 
     Raises DataError where the machine is not the paper's, X carrying Y carrying Z carrying the sensor, or the run has
     fewer than four modules on an arm.
     """
+    assert isinstance(problem, LShapeProblem)
     chain = problem.context.chain
     if chain.work or [joint.name for joint in chain.tool] != ["X", "Y", "Z"]:
         raise DataError(
@@ -194,13 +173,15 @@ def stepwise(problem: LShapeProblem, solution: Solution, run: int) -> tuple[Step
     names = list(measured)
     slopes, at_once = _sensitivities(problem, solution, rows, place, measured)
     base = {effect.text: at for at, effect in enumerate(problem.base) if solution.local_free[place, at]}
+    units = {effect.text: effect.unit for effect in problem.all_orders()}
     told = []
     for row, name in enumerate(names):
         at = base.get(name)
         once = float(solution.local[place, at]) if at is not None else float("nan")
         told.append(
-            Step(
+            StepwiseCoefficient(
                 parameter=name,
+                unit=units[name],
                 stepwise=measured[name],
                 u_stepwise=float(np.linalg.norm(slopes[row])),
                 at_once=once,

@@ -13,15 +13,14 @@ import numpy as np
 from monitor.effects import ChainEffect, context_of
 from monitor.exceptions import DataError
 from monitor.machine import refuse_untouchable
-from monitor.methods.chain.identification import Identification
-from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
-from monitor.methods.chain.results import identification
+from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.touch import Distance, TouchProblem
+from monitor.methods.method import ChainMethod, TouchPlan, Words
 from monitor.methods.model import Model, chain_of
 from monitor.records import Array, Campaign
 
 NAME = "samba"
-DEFAULT_MODEL = Model("samba")
+DEFAULT_MODEL = Model(NAME)
 
 
 def bar_length(campaign: Campaign) -> Array:
@@ -98,18 +97,11 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     return f": {', '.join(joint.name for joint in still)} stands at one angle throughout; index it too"
 
 
-def identify(
-    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
-) -> Identification:
-    """The geometric errors of every run of a campaign, with the covariance of the probe and bar uncertainties.
-
-    Raises DataError where a run has fewer readings than its unknowns need or the readings contradict the
-    machine file, EffectError where the model names an effect that the machine or the data do not have.
-    """
-    problem = problem_of(campaign, model)
+def refuse(campaign: Campaign, problem: ChainProblem) -> None:
+    """DataError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
-        targets = campaign.probings.target[campaign.probings.run == run]
-        readings = 3 * len(targets) + len(problem.distances)
+        targets = problem.context.target[problem.context.run == run]
+        readings = 3 * len(targets) + len(problem.extra_names)
         # A ball that this run left out is no unknown of it.
         unknowns = len(problem.local_names) - 3 * (len(problem.targets) - len(np.unique(targets)))
         if readings < unknowns:
@@ -117,4 +109,15 @@ def identify(
                 f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "probe more balls or indexations"
             )
-    return identification(campaign, model, problem, solve(problem), advice)
+
+
+METHOD = ChainMethod(
+    name=NAME,
+    title="scale and master balls",
+    description="balls and a scale bar, touched at indexed angles",
+    words=Words(target="ball", row="touch", tool_point="tip"),
+    problem_of=problem_of,
+    refuse=refuse,
+    advice=advice,
+    plan=TouchPlan(),
+)

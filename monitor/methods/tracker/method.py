@@ -16,15 +16,15 @@ from monitor.effects import Context, context_of
 from monitor.effects.tracker import measured_points
 from monitor.exceptions import DataError
 from monitor.machine import Chain
-from monitor.methods.chain.identification import Identification
-from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
-from monitor.methods.chain.results import identification
+from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.method import ChainMethod, Unable, Words
 from monitor.methods.model import Model, chain_of
 from monitor.methods.tracker.problem import TrackingProblem, first_guess
 from monitor.records import Array, Campaign
 
 NAME = "tracker"
-DEFAULT_MODEL = Model("tracker")
+DEFAULT_MODEL = Model(NAME)
 # Three coordinates agree to the last digit by chance once in thousands of rows.
 MOST_COPIES = 0.05
 
@@ -36,6 +36,11 @@ def tool_side(chain: Chain) -> Chain:
             f"'{chain.topology}' has no axis on the tool's side; a tracker beside the machine sees none of it move"
         )
     return Chain(chain.topology, (), chain.tool, chain.down)
+
+
+def tracker_base(chain: Chain) -> tuple[str, ...]:
+    """The effects that are free in every run: those of the tool's side, looked at from outside."""
+    return base_effects(tool_side(chain), outside=True)
 
 
 def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProblem:
@@ -92,21 +97,27 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     return "; add poses over the whole range of the joints"
 
 
-def identify(
-    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
-) -> Identification:
-    """The geometric errors of every run of a campaign, with the covariance of the stated uncertainty.
-
-    Raises DataError where a run has fewer readings than its unknowns need or the readings contradict the
-    machine file, EffectError where the model names an effect that the machine or the data do not have.
-    """
-    problem = problem_of(campaign, model)
+def refuse(campaign: Campaign, problem: ChainProblem) -> None:
+    """DataError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
-        targets = campaign.probings.target[campaign.probings.run == run]
+        targets = problem.context.target[problem.context.run == run]
         unknowns = len(problem.local_names) - 3 * (len(problem.targets) - len(np.unique(targets)))
         if 3 * len(targets) < unknowns:
             raise DataError(
                 f"run {run} of campaign {campaign.name} has {3 * len(targets)} readings for {unknowns} unknowns; "
                 "measure more poses"
             )
-    return identification(campaign, model, problem, solve(problem), advice)
+
+
+METHOD = ChainMethod(
+    name=NAME,
+    title="tracker",
+    description="reflectors on a robot or any serial machine, seen by a laser tracker or camera",
+    words=Words(target="reflector", row="reading", tool_point="reflectors"),
+    problem_of=problem_of,
+    refuse=refuse,
+    advice=advice,
+    base_effects=tracker_base,
+    trial_rows=150,
+    coordinates=Unable("points seen by a tracker stand in another frame in every run"),
+)

@@ -8,7 +8,8 @@ import numpy as np
 
 from monitor.exceptions import Fault
 from monitor.readers.faults import one_of, quoted
-from monitor.readers.method_rules import MethodRules, Plan
+from monitor.readers.method_rules import DeclaredPlaces, MethodRules, Plan
+from monitor.records import Artefact
 from monitor.units import CONDITION_SUFFIXES
 
 SPOTS = ("plane_u_um", "plane_v_um", "paraboloid_u_um", "paraboloid_v_um")
@@ -47,10 +48,19 @@ def check(plan: Plan) -> Iterable[Fault]:
         yield Fault(plan.file, line, "target", told)
 
 
+def declared(artefact: Artefact) -> DeclaredPlaces | None:
+    """The calibrated centres of the modules in the plane of the piece."""
+    piece = artefact.l_shape
+    if piece is None:
+        return None
+    return DeclaredPlaces("modules", {module.id: np.array([*module.centre, 0.0]) for module in piece.modules})
+
+
 RULES = MethodRules(
     "l-shape",
     needs_l_shape=True,
     suffixes=(*CONDITION_SUFFIXES, "um"),
     plain_columns=(PLACEMENT,),
     check=check,
+    declared=declared,
 )

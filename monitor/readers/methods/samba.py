@@ -8,7 +8,8 @@ import numpy as np
 
 from monitor.exceptions import Fault
 from monitor.readers.faults import quoted
-from monitor.readers.method_rules import CHANNELS_ONLY, MethodRules, Plan
+from monitor.readers.method_rules import CHANNELS_ONLY, DeclaredPlaces, MethodRules, Plan
+from monitor.records import Artefact
 
 #: Campaign format 1: a ball seen at fewer indexations in a run is refused (the bar's two aside).
 FEWEST_INDEXATIONS = 3
@@ -55,6 +56,16 @@ def check(plan: Plan) -> Iterable[Fault]:
                 )
 
 
+def declared(artefact: Artefact) -> DeclaredPlaces:
+    """The nominal centres of the balls."""
+    return DeclaredPlaces("balls", {ball.id: np.array(ball.nominal) for ball in artefact.balls})
+
+
 RULES = MethodRules(
-    "samba", needs_scale_bar=True, targets_are_balls=True, suffixes=CHANNELS_ONLY, check=check
+    "samba",
+    needs_scale_bar=True,
+    targets_are_balls=True,
+    suffixes=CHANNELS_ONLY,
+    check=check,
+    declared=declared,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from monitor.discovery import fit
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.records import Array
 from monitor.reporting.certificate.volumetric_result import Length, Place, VolumetricResult
 from monitor.units import DEGREE, MICROMETRE
@@ -14,9 +14,7 @@ from monitor.workflow.volumetric.error_map import VolumetricMap, at_zero, map_of
 
 def volumetric_result(evaluated: StatedUncertainty, state: str) -> VolumetricResult:
     """The map of an evaluated run in display units. Raises InputError where not three linear axes moved."""
-    problem = method_named(evaluated.campaign.method).problem_of(
-        evaluated.campaign, as_model(evaluated.model)
-    )
+    problem = campaign_method(evaluated.campaign).problem_of(evaluated.campaign, as_model(evaluated.model))
     mapped = map_of(evaluated, fit(problem))
     drawn = at_zero(mapped)
     error, p = mapped.error, evaluated.answer.p

@@ -66,8 +66,8 @@ def measured_runs(campaign: Campaign, run: int | None, as_left: int | None) -> t
     if run is None and as_left is None:
         if len(by_number) > 1:
             raise InputError(
-                f"campaign {campaign.name} has {len(by_number)} runs ({min(by_number)} to {max(by_number)}): --run N says "
-                "which one the certificate is of"
+                f"campaign {campaign.name} has {len(by_number)} runs ({min(by_number)} to {max(by_number)}): --run N "
+                "says which one the certificate is of"
             )
         run = next(iter(by_number))
     measured = [Measured(run, AS_FOUND)] if run is not None else []

@@ -140,9 +140,10 @@ def results_of(
 
 def _certifiable(evaluated: StatedUncertainty, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:
     if monte_carlo is None:
+        run, campaign = evaluated.run, evaluated.campaign.name
         raise NotFoundError(
-            f"there is no stored Monte Carlo result of run {evaluated.run} of campaign {evaluated.campaign.name}; first: "
-            f"monitor uncertainty {evaluated.campaign.name} --run {evaluated.run} --method both"
+            f"there is no stored Monte Carlo result of run {run} of campaign {campaign}; first: "
+            f"monitor uncertainty {campaign} --run {run} --method both"
         )
     if evaluated.counts_lack_of_fit:
         raise InputError(

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import (
-    Comparison,
+    ChainComparison,
+    ChainMissing,
     Explanation,
     Fit,
-    Missing,
     Mistake,
+    Verdict,
     explain,
     find_mistakes,
     fit,
@@ -22,10 +23,10 @@ from monitor.discovery import (
     version_error,
 )
 from monitor.discovery import compare as compare_fit
-from monitor.discovery.machine.compare import SOMETHING_IS_MISSING, Part
 from monitor.discovery.machine.steps import Step
+from monitor.discovery.search.comparison import Part
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.shared_effects import shared_parameters
 from monitor.records import Campaign
@@ -63,7 +64,7 @@ def fitted(db: Database, campaign: str, model: str | None) -> tuple[Campaign, St
     """A campaign, the stored model, and the model fitted to it."""
     loaded = load_campaign(db, campaign)
     stored = resolve(db, model, loaded.method)
-    return loaded, stored, fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
+    return loaded, stored, fit(campaign_method(loaded).problem_of(loaded, as_model(stored)))
 
 
 def _parts(parts: dict[str, Part]) -> Document:
@@ -73,7 +74,7 @@ def _parts(parts: dict[str, Part]) -> Document:
     }
 
 
-def comparison_document(found: Comparison) -> Document:
+def comparison_document(found: ChainComparison) -> Document:
     """A comparison as people see it."""
     test = found.lack_of_fit
     return {
@@ -113,8 +114,8 @@ def _pose(pose: dict[str, float]) -> Document:
     return {f"{axis.lower()}_deg": round(DEGREE.to_display(value), 6) for axis, value in pose.items()}
 
 
-def _missing(found: Missing) -> Document:
-    unit = Unit(found.unit_name, found.unit_factor)
+def _missing(found: ChainMissing) -> Document:
+    unit = found.units[0]
     document: Document = {
         "rank": found.rank,
         "effect": found.effect,
@@ -154,7 +155,7 @@ def _missing(found: Missing) -> Document:
         document["searched"] = {
             "what": found.searched.name,
             "value": found.searched.value,
-            "u": found.searched.u if np.isfinite(found.searched.u) else None,
+            "u": found.searched.u,
             "unit": found.searched.unit,
         }
     return document
@@ -191,7 +192,7 @@ def explanation_document(found: Explanation) -> Document:
         }
         for move in found.moves
     ] + [_change(step, units) for step in found.steps]
-    document["verdict"] = "something is missing" if missing else document["verdict"]
+    document["verdict"] = Verdict.SOMETHING_IS_MISSING if missing else document["verdict"]
     document |= {
         "missing": missing,
         "suspect_data": [
@@ -229,7 +230,7 @@ def explanation_document(found: Explanation) -> Document:
     # Where nothing is missing there is nothing to picture.
     document |= (
         picture_documents(found, missing[0]["effect"] if missing else None)
-        if document["verdict"] == SOMETHING_IS_MISSING
+        if document["verdict"] == Verdict.SOMETHING_IS_MISSING
         else {"residual_map": None, "residual_against": None}
     )
     return document
@@ -246,7 +247,7 @@ def _answer(document: Document) -> str:
         if first["indistinguishable_from"]:
             others = ", ".join(first["indistinguishable_from"])
             parts.append(f"These data cannot tell it apart from {others}.")
-    elif document["verdict"] == "something is missing":
+    elif document["verdict"] == Verdict.SOMETHING_IS_MISSING:
         parts.append(
             "The model does not explain the measurements, but no effect of the catalogue explains more."
         )
@@ -294,7 +295,7 @@ def explanation_of(
     """
 
     def problem_of(one: Campaign) -> ChainProblem:
-        found: ChainProblem = method_named(campaign.method).problem_of(one, as_model(model))
+        found: ChainProblem = campaign_method(campaign).problem_of(one, as_model(model))
         return found
 
     try:
@@ -302,9 +303,11 @@ def explanation_of(
     except DataError as error:
         mistakes = find_mistakes(campaign, problem_of, None)
         raise DataError(f"{error}. {mistakes_in_words(mistakes)}" if mistakes else str(error)) from error
-    mistakes = find_mistakes(campaign, problem_of, first) if is_gross(first) else ()
+    mistakes = find_mistakes(campaign, problem_of, first) if is_gross(campaign, first) else ()
     if mistakes:
-        comparison = replace(compare_fit(first, campaign.name, label(model)), verdict=SOMETHING_IS_MISSING)
+        comparison = replace(
+            compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING
+        )
         return Explanation(comparison, (), (), (), (), (), (), first, mistakes)
     rng = np.random.default_rng(SEED)
     found = explain(campaign, first.problem, label(model), rate=rate, rng=rng, first=first)
@@ -379,7 +382,7 @@ def error_steps(loaded: Campaign, versions: Sequence[StoredModel]) -> list[Docum
     """The error of every version of a model on a campaign."""
     steps = []
     for version in versions:
-        found = fit(method_named(loaded.method).problem_of(loaded, as_model(version)))
+        found = fit(campaign_method(loaded).problem_of(loaded, as_model(version)))
         error = version_error(found)
         unseen = shared_parameters(found.problem, found.solution).refused
         steps.append(

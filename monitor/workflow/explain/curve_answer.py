@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery.curve.explain import CurveExplanation
-from monitor.discovery.machine.compare import SOMETHING_IS_MISSING
+from monitor.discovery.search.comparison import Verdict
 from monitor.methods.curve.problem import problem_of
 from monitor.records import CurveCampaign
 
@@ -67,7 +67,7 @@ def answer(document: Mapping[str, Any], found: CurveExplanation) -> str:
             parts.append(
                 f"These rows cannot rule out {', '.join(missing[0]['indistinguishable_from'])} in its place."
             )
-    elif document["verdict"] == SOMETHING_IS_MISSING:
+    elif document["verdict"] == Verdict.SOMETHING_IS_MISSING:
         parts.append(
             "The model does not explain the measurements, but no effect that the columns allow explains more."
         )

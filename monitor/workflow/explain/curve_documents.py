@@ -15,9 +15,8 @@ from monitor.discovery.curve.compare import CurveComparison, compare_curve
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.discovery.curve.missing import CurveMissing
 from monitor.discovery.curve.quality import bic
-from monitor.discovery.machine.compare import SOMETHING_IS_MISSING, Part
-from monitor.effects.curve import SEARCHED
-from monitor.methods.curve.method import CurveFit
+from monitor.discovery.search.comparison import Part, Verdict
+from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import NAME
 from monitor.records import CurveCampaign
 from monitor.statistics.noise import Assessed, effective_number
@@ -95,10 +94,10 @@ def comparison_document(found: CurveComparison, model: str) -> Document:
     }
 
 
-def _missing(curve: CurveCampaign, rank: int, found: CurveMissing) -> Document:
+def _missing(curve: CurveCampaign, found: CurveMissing) -> Document:
     document: Document = {
-        "rank": rank,
-        "effect": found.written,
+        "rank": found.rank,
+        "effect": found.effect,
         "certain": found.certain,
         "noise_alone_p": found.noise_alone,
         "meaning": found.words.meaning,
@@ -106,12 +105,12 @@ def _missing(curve: CurveCampaign, rank: int, found: CurveMissing) -> Document:
         "remedy": found.words.remedy,
         "described_in": found.words.described_in,
         "amplitude": found.amplitude,
-        "u": found.u_amplitude,
-        "unit": found.units[0],
+        "u": found.u,
+        "unit": found.units[0].name,
         "coefficients": {
-            name: {"value": float(value), "u": float(u), "unit": unit}
+            name: {"value": float(value), "u": float(u), "unit": unit.name}
             for name, value, u, unit in zip(
-                found.names, found.coefficients, found.u, found.units, strict=True
+                found.parameters, found.coefficients, found.u_coefficients, found.units, strict=True
             )
         },
         **both(curve, "peak", found.peak),
@@ -123,27 +122,20 @@ def _missing(curve: CurveCampaign, rank: int, found: CurveMissing) -> Document:
         **both(curve, "heldout_after", found.held_out_after),
         "bic_before": found.bic_before,
         "bic_after": found.bic_after,
-        "indistinguishable_from": [name for name, _ in found.rivals],
-        "coinciding": [name for name, coincides in found.rivals if coincides],
+        "indistinguishable_from": [rival.effect for rival in found.rivals],
+        "coinciding": [rival.effect for rival in found.rivals if rival.coincides],
         "tell_apart_by": [],
         "varies_from_run_to_run": False,
     }
-    if found.effect.free and found.effect.value is not None:
-        value = found.effect.value
+    if found.searched is not None:
         document["searched"] = {
-            "what": SEARCHED[found.effect.shape],
-            "value": value,
-            "u": found.u_value,
-            "unit": curve.units.get(found.effect.column, "")
-            or ("row" if found.effect.column == "sequence" else "1"),
+            "what": found.searched.name,
+            "value": found.searched.value,
+            "u": found.searched.u,
+            "unit": found.searched.unit,
         }
-        if found.effect.shape == "sin":
-            document["searched"]["frequency"] = 1.0 / value
-    elif found.effect.shape == "sin":
-        document["searched"] = {
-            "what": SEARCHED["sin"], "value": found.effect.value, "u": None,
-            "unit": curve.units.get(found.effect.column, "") or "1",
-        }  # fmt: skip
+        if found.searched.frequency is not None:
+            document["searched"]["frequency"] = found.searched.frequency
     return document
 
 
@@ -152,9 +144,9 @@ def explanation_document(found: CurveExplanation, model: str) -> Document:
     curve = found.first.problem.curve
     compared = compare_curve(found.first, lacks=bool(found.missing))
     document = comparison_document(compared, model)
-    document["missing"] = [_missing(curve, rank, one) for rank, one in enumerate(found.missing, start=1)]
+    document["missing"] = [_missing(curve, one) for one in found.missing]
     if found.missing:
-        document["verdict"] = SOMETHING_IS_MISSING
+        document["verdict"] = Verdict.SOMETHING_IS_MISSING
     elif found.suspect:
         # A bad reading is told as that: what counts is the verdict without it.
         document["verdict"] = compare_curve(found.final, lacks=False).verdict

@@ -10,7 +10,7 @@ import numpy as np
 
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.effects.curve import SEQUENCE
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.reporting.figures.curve import Residuals, residuals_figure
 from monitor.reporting.figures.models import error_falling
@@ -23,7 +23,7 @@ Document = dict[str, Any]
 def _axis(found: CurveFit, explanation: CurveExplanation | None) -> str:
     """The input to draw over: that of the first missing effect, else the first of the model, else the time."""
     numbers = found.problem.inputs.numbers
-    wanted = [] if explanation is None else [one.effect.column for one in explanation.missing]
+    wanted = [] if explanation is None else [one.fitted.column for one in explanation.missing]
     wanted += [effect.column for effect in found.effects]
     clock = found.problem.curve.time or SEQUENCE
     return next((name for name in wanted if name in numbers), clock)
@@ -45,8 +45,8 @@ def residual_figure(found: CurveFit, explanation: CurveExplanation | None) -> An
         now = fit(_without(found, explanation))
         panels = [Residuals(f"model as it is: RMS {now.rms:.4g}", now.residual)]
         for one in explanation.missing:
-            now = fit(now.settled.with_effects([one.effect]))
-            panels.append(Residuals(f"+ {one.written}: RMS {now.rms:.4g}", now.residual))
+            now = fit(now.settled.with_effects([one.fitted]))
+            panels.append(Residuals(f"+ {one.effect}: RMS {now.rms:.4g}", now.residual))
     return residuals_figure(
         found.problem.inputs.numbers[name],
         curve.measured,

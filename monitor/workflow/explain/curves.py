@@ -9,7 +9,7 @@ from monitor.discovery.curve.explain import CurveExplanation, explain_curve
 from monitor.discovery.curve.quality import allowed_for, bic, held_out, inflation, noise_of
 from monitor.effects.curve import SEARCHED
 from monitor.exceptions import DataError, InputError
-from monitor.methods.curve.method import CurveFit, fit
+from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import NAME, problem_of
 from monitor.records import CurveCampaign
 from monitor.store import Database, StoredModel, load_curve, model_history, save_analysis

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import Any
+from typing import Any, TypeVar
 
+from monitor.documents import to_document
 from monitor.exceptions import NotFoundError
 from monitor.records import Campaign
 from monitor.store import (
@@ -26,11 +27,12 @@ from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.explain.comparison import save_explanation
 from monitor.workflow.health.work import METHOD, Done, Work, kept
 from monitor.workflow.history.health_history import PastRun, Span
-from monitor.workflow.uncertainty.documents import save_uncertainty
-from monitor.workflow.uncertainty.evaluations import COVERAGE
+from monitor.workflow.uncertainty.request import COVERAGE
+from monitor.workflow.uncertainty.stored import covariance_source, save_uncertainty
 from monitor.workflow.volumetric.volumetric import save_map
 
 Document = dict[str, Any]
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def found_in(db: Database, last: PastRun, method: str, model: StoredModel, span:
     uncertainty = _stored(db, "uncertainty", span.before, METHOD, **of_run)
     # A user may have asked for another probability, or for the runs of another campaign.
     if uncertainty is not None and (
-        uncertainty["p"] != COVERAGE or uncertainty["input_covariance"].startswith("selection")
+        uncertainty["p"] != COVERAGE or covariance_source(uncertainty).selection is not None
     ):
         uncertainty = None
     explanation = _stored(db, "explanation", span.before, method, **of_campaign)
@@ -151,21 +153,21 @@ def stored_with(
             model_version=model.version,
         )  # fmt: skip
     every = Results(
-        found.uncertainty or uncertainty,
+        found.uncertainty or (None if uncertainty is None else to_document(uncertainty)),
         found.explanation or explanation,
-        found.map or mapped,
+        found.map or (None if mapped is None else to_document(mapped)),
         found.history if found.history is not None else done.history,
     )
     return every if every.uncertainty is not None else replace(every, map=None)
 
 
 def _saved(
-    new: Document | None, save: Callable[[Document], None], failure: str, remarks: list[str]
-) -> Document | None:
+    new: Answer | None, save: Callable[[Answer], None], failure: str, remarks: list[str]
+) -> Answer | None:
     if new is None:
         return None
 
-    def saved() -> Document:
+    def saved() -> Answer:
         save(new)
         return new
 

@@ -15,17 +15,21 @@ from threadpoolctl import threadpool_limits
 
 from monitor.discovery import Fit, fit
 from monitor.exceptions import MonitorError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
 from monitor.workflow.explain.comparison import error_steps, explanation_document, explanation_of
 from monitor.workflow.identify.identification import identified
 from monitor.workflow.models import as_model
-from monitor.workflow.uncertainty.documents import document
-from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate_fit
-from monitor.workflow.uncertainty.evaluations import COVERAGE, Evaluation, evaluation_of
-from monitor.workflow.volumetric.volumetric import map_document, map_of
+from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+from monitor.workflow.uncertainty.evaluation import evaluate_fit
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.stating import answer_of
+from monitor.workflow.uncertainty.stored import StatedUncertainty
+from monitor.workflow.volumetric.answer import VolumetricAnswer
+from monitor.workflow.volumetric.error_map import map_of
+from monitor.workflow.volumetric.stating import map_answer
 
 Document = dict[str, Any]
 Result = TypeVar("Result")
@@ -57,9 +61,9 @@ class Done:
     """What was computed; None for what was not wanted or could not be, the latter with a remark that says why."""
 
     identified: tuple[StoredIdentification, ...] = ()
-    uncertainty: Document | None = None
+    uncertainty: UncertaintyAnswer | None = None
     explanation: Document | None = None
-    map: Document | None = None
+    map: VolumetricAnswer | None = None
     history: tuple[Document, ...] | None = None
     remarks: tuple[str, ...] = ()
 
@@ -93,20 +97,17 @@ class _Fitted:
     @cached_property
     def fit(self) -> Fit:
         known = self._work.known
-        return fit(method_named(known.method).problem_of(known, as_model(self._work.model)))
+        return fit(campaign_method(known).problem_of(known, as_model(self._work.model)))
 
     @cached_property
-    def evaluated(self) -> Evaluated:
+    def uncertainty(self) -> UncertaintyAnswer:
         work = self._work
-        return evaluate_fit(work.known, work.model, self.fit, work.run, method=METHOD, p=COVERAGE)
-
-    @cached_property
-    def uncertainty(self) -> Document:
-        return document(self.evaluated)
+        request = UncertaintyRequest(work.known.name, work.run, method=METHOD)
+        return answer_of(evaluate_fit(work.known, work.model, self.fit, request))
 
     @property
-    def evaluation(self) -> Evaluation:
-        return evaluation_of(self.uncertainty, self._work.known, self._work.model)
+    def evaluated(self) -> StatedUncertainty:
+        return StatedUncertainty(self._work.known, self._work.model, self.uncertainty)
 
 
 def _computed(work: Work, fitted: _Fitted) -> Done:
@@ -138,7 +139,7 @@ def _computed(work: Work, fitted: _Fitted) -> Done:
     # Without an uncertainty there is no map, and its remark says why.
     if work.map and (uncertainty is not None or not work.uncertainty):
         mapped = kept(
-            lambda: map_document(map_of(fitted.evaluation, fitted.fit), COVERAGE),
+            lambda: map_answer(map_of(fitted.evaluated, fitted.fit)),
             "the volumetric error could not be mapped",
             remarks,
         )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.problem import Solver, solve_problem
 from monitor.records import Array, Campaign, Machine
@@ -89,7 +89,7 @@ def identified(
 
     ``solve`` gives the solution of the method's problem. Raises as ``identify``.
     """
-    found: Identification = method_named(campaign.method).identify(campaign, as_model(model), solve)
+    found = campaign_method(campaign).identify(campaign, as_model(model), solve)
     return found, _stored(campaign, found, model.name, model.version)
 
 

@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 
 from monitor.exceptions import DataError
-from monitor.methods import method_named
+from monitor.methods import Unable, campaign_method, methods
+from monitor.methods.chain.identification import StepwiseCoefficient
 from monitor.methods.chain.problem import solve_problem
-from monitor.methods.l_shape.method import LShapeProblem
-from monitor.methods.l_shape.stepwise import Step, stepwise
 from monitor.store import Database, load_campaign
-from monitor.units import Unit
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.models import as_model, resolve
 
@@ -25,25 +23,27 @@ def steps(db: Database, campaign: str, model: str | None = None, run: int | None
     Raises NotFoundError for an unknown campaign or run, DataError for a campaign of another method.
     """
     loaded = load_campaign(db, campaign)
-    if loaded.method != "l-shape":
+    stepwise = campaign_method(loaded).stepwise
+    if isinstance(stepwise, Unable):
+        able = " and ".join(name for name, one in methods().items() if not isinstance(one.stepwise, Unable))
         raise DataError(
-            f"campaign {campaign} was measured by {loaded.method}; only l-shape has a stepwise way"
+            f"campaign {campaign} was measured by {loaded.method}; only {able} has a stepwise way"
         )
     number = max(one.run for one in loaded.runs) if run is None else run
     loaded = only_run(loaded, number)
     stored = resolve(db, model, loaded.method)
-    problem = method_named(loaded.method).problem_of(loaded, as_model(stored))
-    assert isinstance(problem, LShapeProblem)
-    found = stepwise(problem, solve_problem(problem), number)
-    units = {effect.text: effect.unit for effect in problem.all_orders()}
+    problem = campaign_method(loaded).problem_of(loaded, as_model(stored))
+    found = stepwise.coefficients(problem, solve_problem(problem), number)
     return {
         "campaign": campaign,
         "run": number,
-        "stepwise": {one.parameter: _document(one, units[one.parameter]) for one in found},
+        "stepwise": {one.parameter: _document(one) for one in found},
     }
 
 
-def _document(one: Step, unit: Unit) -> Document:
+def _document(one: StepwiseCoefficient) -> Document:
+    unit = one.unit
+
     def shown(value: float) -> float | None:
         return unit.to_display(value) if np.isfinite(value) else None
 

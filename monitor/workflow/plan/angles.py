@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from monitor.exceptions import InputError
-from monitor.methods.free_form.plan import Candidates, Expected, candidates_of
+from monitor.methods import AnglePlan
+from monitor.methods.method import AngleCandidates, ExpectedAngles
 from monitor.records import Campaign
 from monitor.store import StoredModel
 from monitor.units import MICROMETRE
@@ -23,7 +24,9 @@ LISTED = 5
 K = 2.0
 
 
-def plan_angles(loaded: Campaign, stored: StoredModel, count: int | None, p: float) -> Document:
+def plan_angles(
+    method: AnglePlan, loaded: Campaign, stored: StoredModel, count: int | None, p: float
+) -> Document:
     """What the plan of the campaign's first run promises, the worth of one more angle, and the best ``count``.
 
     Raises InputError for a number of angles that cannot be, DataError for a campaign that cannot be planned.
@@ -31,9 +34,9 @@ def plan_angles(loaded: Campaign, stored: StoredModel, count: int | None, p: flo
     wanted = 1 if count is None else count
     if not 1 <= wanted <= MOST_ANGLES:
         raise InputError(f"--poses {wanted}: choose 1 to {MOST_ANGLES} more angles")
-    there = candidates_of(loaded, as_model(stored), range(0, 360, STEP_DEG))
+    there = method.candidates_of(loaded, as_model(stored), range(0, 360, STEP_DEG))
     single, chosen = there.next_angles(wanted)
-    table = there.problem.plane.table.name
+    table = there.table
     return {
         "campaign": loaded.name,
         "machine": loaded.machine.id,
@@ -43,7 +46,7 @@ def plan_angles(loaded: Campaign, stored: StoredModel, count: int | None, p: flo
         "k": K,
         "table": table,
         "stated_uncertainty_um": MICROMETRE.to_display(loaded.probe.standard_uncertainty),
-        "conditions": there.problem.conditions,
+        "conditions": dict(there.conditions),
         "present": _plan(there, there.expected(there.present)),
         "angles": [
             {f"{table.lower()}_deg": plan.angles[-1], **_shape(plan), "unseen_dimensions": plan.nullity}
@@ -54,7 +57,7 @@ def plan_angles(loaded: Campaign, stored: StoredModel, count: int | None, p: flo
     }
 
 
-def _shape(plan: Expected) -> Document:
+def _shape(plan: ExpectedAngles) -> Document:
     found = plan.shape[np.isfinite(plan.shape)]
     size = K * MICROMETRE.to_display(1.0)
     none = not len(found)
@@ -66,12 +69,8 @@ def _shape(plan: Expected) -> Document:
     }
 
 
-def _plan(there: Candidates, plan: Expected) -> Document:
-    units = {
-        name: effect.unit
-        for effect in there.problem.base
-        for name in effect.parameters(there.problem.context)
-    }
+def _plan(there: AngleCandidates, plan: ExpectedAngles) -> Document:
+    units = there.units
     return {
         "angles_deg": list(plan.angles),
         "probings": plan.probings,

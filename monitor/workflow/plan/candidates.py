@@ -9,7 +9,7 @@ import numpy as np
 from monitor.discovery import fit
 from monitor.exceptions import DataError
 from monitor.machine import Chain
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.expected import candidate_touches, planned_context
 from monitor.methods.chain.planning import Candidates, Choice, TimeModel, more_balls, pose_grid
 from monitor.methods.chain.touch import TouchProblem
@@ -76,7 +76,7 @@ def _with_found_tip(problem: TouchProblem) -> TouchProblem:
 
 def planned(loaded: Campaign, stored: StoredModel, most_balls: int) -> Planned:
     """The candidates of a campaign; where it has fewer than ``most_balls`` balls, places for more are added."""
-    problem = method_named(loaded.method).problem_of(loaded, as_model(stored))
+    problem = campaign_method(loaded).problem_of(loaded, as_model(stored))
     if not isinstance(problem, TouchProblem):
         raise DataError(
             f"plan weighs where balls are touched, and campaign {loaded.name} was measured by {loaded.method}; what"

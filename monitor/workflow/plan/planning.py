@@ -17,7 +17,7 @@ from monitor.effects import parse_effect
 from monitor.effects.catalogue import catalogue
 from monitor.exceptions import InputError
 from monitor.machine import Chain
-from monitor.methods import method_named
+from monitor.methods import AnglePlan, campaign_method
 from monitor.methods.chain.expected import planned_context
 from monitor.methods.chain.planning import (
     MOST_BALLS,
@@ -25,7 +25,6 @@ from monitor.methods.chain.planning import (
     best_plan,
     quickest_plan,
 )
-from monitor.methods.free_form import method as free_form
 from monitor.records import Array, Campaign
 from monitor.reporting.figures.style import save
 from monitor.reporting.figures.volumetric import expected_uncertainties
@@ -63,12 +62,14 @@ def plan(
         raise InputError(f"--balls {balls}: choose 1 to {MOST_BALLS}")
     loaded = load_campaign(db, campaign)
     stored = resolve(db, model, loaded.method)
-    if loaded.method == free_form.NAME:
+    angles = campaign_method(loaded).plan
+    if isinstance(angles, AnglePlan):
         if balls is not None or wanted or separate is not None:
             raise InputError(
-                "a plan of the method free-form is its angles of the table: --poses N proposes the next N of them"
+                f"a plan of the method {loaded.method} is its angles of the table: --poses N proposes the next N "
+                "of them"
             )
-        return _kept(db, plan_angles(loaded, stored, poses, p), loaded, stored)
+        return _kept(db, plan_angles(angles, loaded, stored, poses, p), loaded, stored)
     found = planned(loaded, stored, balls or 1)
     units = {
         name: effect.unit
@@ -249,7 +250,7 @@ def _blind(found: Planned, choice: Choice) -> list[str]:
 def _separate(loaded: Campaign, stored: StoredModel, texts: tuple[str, str]) -> Document:
     if texts[0] == texts[1]:
         raise InputError(f"--separate {texts[0]},{texts[1]}: name two different effects")
-    fitted = fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
+    fitted = fit(campaign_method(loaded).problem_of(loaded, as_model(stored)))
     chain = fitted.problem.context.chain
     effect, rival = (parse_effect(text, chain) for text in texts)
     basis = effect.basis(fitted.problem.context)

@@ -6,15 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from monitor.methods.tracker import method as tracker
+from monitor.methods import Unable, campaign_method
 from monitor.records import Array, Campaign
 from monitor.statistics import Homogeneity
 from monitor.units import DEGREE
 from monitor.workflow.run_statistics.answer import CoordinateStatistics
 from monitor.workflow.run_statistics.pooling import pooled_by_group
 from monitor.workflow.run_statistics.tests import finite, histogram, normal_scatter
-
-OWN_FRAMES = "points seen by a tracker stand in another frame in every run"
 
 
 def coordinates(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | None:
@@ -50,9 +48,9 @@ def coordinates(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] 
 
 def probed(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | str:
     """Names and values (R, 3 m), mm, of the probed coordinates, or why there are none."""
-    # What a tracker sees stands in a frame of its own in every run: there are no coordinates to put side by side.
-    if campaign.method == tracker.NAME:
-        return OWN_FRAMES
+    comparable = campaign_method(campaign).coordinates
+    if isinstance(comparable, Unable):
+        return comparable.why
     return coordinates(campaign, runs) or "the runs do not follow one plan"
 
 

@@ -52,6 +52,10 @@ def _matrix(identification: StoredIdentification, runs: list[int]) -> tuple[list
     return names, units, values[:, complete] / np.array([unit.factor for unit in units])
 
 
+#: The keys of p-values and false discovery rates.
+_TESTS = ("bartlett_p", "levene_p", "anova_p", "welch_p", "kruskal_p", "anova_q", "bartlett_q")
+
+
 def _p_values(tests: Homogeneity | None, index: int) -> Mapping[str, float | None]:
     """p-values and false discovery rates of one parameter; None where a test was not made."""
 
@@ -61,14 +65,16 @@ def _p_values(tests: Homogeneity | None, index: int) -> Mapping[str, float | Non
     def q_value(discoveries: FalseDiscoveries | None) -> float | None:
         return None if discoveries is None else finite(discoveries.q_value[index])
 
+    if tests is None:
+        return dict.fromkeys(_TESTS)
     return {
-        "bartlett_p": p_value(tests and tests.bartlett),
-        "levene_p": p_value(tests and tests.levene),
-        "anova_p": p_value(tests and tests.anova),
-        "welch_p": p_value(tests and tests.welch),
-        "kruskal_p": p_value(tests and tests.kruskal),
-        "anova_q": q_value(tests and tests.anova_discoveries),
-        "bartlett_q": q_value(tests and tests.bartlett_discoveries),
+        "bartlett_p": p_value(tests.bartlett),
+        "levene_p": p_value(tests.levene),
+        "anova_p": p_value(tests.anova),
+        "welch_p": p_value(tests.welch),
+        "kruskal_p": p_value(tests.kruskal),
+        "anova_q": q_value(tests.anova_discoveries),
+        "bartlett_q": q_value(tests.bartlett_discoveries),
     }
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 from monitor.store import Database, StoredModel, load_campaign
@@ -39,7 +39,7 @@ def selected_readings(
     loaded = load_campaign(db, owner)
     of_owner = problem
     if owner != campaign:
-        of_owner = method_named(loaded.method).problem_of(loaded, as_model(model))
+        of_owner = campaign_method(loaded).problem_of(loaded, as_model(model))
         if not _same_plan(of_owner, problem):
             raise DataError(
                 f"--select {name}: its campaign {owner} followed another plan than {campaign}; a covariance of the "

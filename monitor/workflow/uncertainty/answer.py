@@ -35,8 +35,8 @@ class FrameworkAnswer:
 
     ``k_p`` and ``k_q`` are those of 6.5 for normal outputs; those ``with_degrees_of_freedom`` are what so few runs
     allow to claim, and belong to the ``expanded`` uncertainty. None: infinite, or no joint region. ``budget`` has the
-    part of every source in the variance of every parameter. ``joint_coverage_of_k_2_each`` takes half a second of sampling and
-    is left out where nobody reads it.
+    part of every source in the variance of every parameter. ``joint_coverage_of_k_2_each`` takes half a second of
+    sampling and is left out where nobody reads it.
     """
 
     estimate: Mapping[str, float]

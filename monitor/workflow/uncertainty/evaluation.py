@@ -15,7 +15,7 @@ from monitor.discovery.machine.model_uncertainty import model_uncertainty
 from monitor.discovery.machine.variants import variants_of
 from monitor.effects.catalogue import catalogue
 from monitor.exceptions import DataError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.results import refusals
 from monitor.records import Array, Campaign
 from monitor.reporting.covariance_source import CovarianceSource, TakenAsKnown
@@ -85,7 +85,7 @@ def evaluate(db: Database, request: UncertaintyRequest) -> RunUncertainty:
     """Evaluate the uncertainty of one run. Raises InputError, DataError, NotFoundError."""
     campaign = runs_before(load_campaign(db, request.campaign), request.before)
     model = resolve(db, request.model, campaign.method)
-    fitted = fit(method_named(campaign.method).problem_of(campaign, as_model(model)))
+    fitted = fit(campaign_method(campaign).problem_of(campaign, as_model(model)))
     selected = None
     if request.select is not None:
         selected = selected_readings(db, request.select, campaign.name, model, fitted.problem)
@@ -118,7 +118,7 @@ def evaluate_fit(
     )
     sampled = None if request.method == "guf" else _sampled(propagated, request)
     validation = _validated(propagated, sampled, request) if sampled and request.method == "both" else None
-    advice = method_named(campaign.method).advice
+    advice = campaign_method(campaign).advice
     return RunUncertainty(
         campaign=campaign,
         model=model,
@@ -157,7 +157,7 @@ def _propagated(
     if request.linear_axes is not None:
         inputs, of_axes = with_linear_axes(run, inputs, at, names, request.linear_axes)
         propagated = replace(propagated, inputs=inputs, contributions=(*of_axes, *propagated.contributions))
-    known = [TakenAsKnown(name) for name in getattr(method_named(campaign.method), "TAKEN_AS_KNOWN", ())]
+    known = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
     stated = request.linear_axes is not None
     source = replace(
         source,

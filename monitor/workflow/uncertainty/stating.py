@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from monitor.discovery.machine.compare import SOMETHING_IS_MISSING, compare
+from monitor.discovery import Verdict, compare
 from monitor.records import Array
 from monitor.reporting.certificate.results import RefusedParameters
 from monitor.reporting.covariance_source import covariance_sentence
@@ -37,7 +37,7 @@ def answer_of(result: RunUncertainty) -> UncertaintyAnswer:
 
 
 def statement(result: RunUncertainty) -> UncertaintyAnswer:
-    """As ``answer_of``, without what k = 2 each covers: sampling that takes half a second, and no certificate states."""
+    """As ``answer_of``, without what k = 2 each covers: half a second of sampling that no certificate states."""
     causes = tuple(LackOfFitCause(effect, probability) for effect, probability in result.causes[:MOST_CAUSES])
     return UncertaintyAnswer(
         campaign=result.campaign.name,
@@ -149,6 +149,6 @@ def _residuals(result: RunUncertainty) -> RunResiduals:
     return RunResiduals(
         rms_um=MICROMETRE.to_display(compared.rms),
         expected_rms_um=MICROMETRE.to_display(compared.expected_rms),
-        something_is_missing=compared.verdict == SOMETHING_IS_MISSING,
+        something_is_missing=compared.verdict is Verdict.SOMETHING_IS_MISSING,
         by_target_um={name: _rms(vectors[rows]) for name, rows in touched.items() if int(np.sum(rows)) > 1},
     )

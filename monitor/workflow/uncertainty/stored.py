@@ -127,9 +127,15 @@ def save_uncertainty(
 def restored(document: Mapping[str, Any]) -> UncertaintyAnswer:
     """The answer that a stored document holds. Raises StoreError where it was written by another version or altered."""
     answer = from_document(UncertaintyAnswer, document)
-    if answer.input_covariance_source is not None:
-        return answer
-    return replace(answer, input_covariance_source=covariance_source_of(answer.input_covariance))
+    return replace(answer, input_covariance_source=covariance_source(document))
+
+
+def covariance_source(document: Mapping[str, Any]) -> CovarianceSource:
+    """Where the covariance of the readings of a stored document comes from. Raises StoreError as ``restored``."""
+    stored = document.get("input_covariance_source")
+    if stored is None:
+        return covariance_source_of(document["input_covariance"])
+    return from_document(CovarianceSource, stored)
 
 
 def stored_uncertainty(

@@ -46,7 +46,7 @@ def _number(value: float, digits: int = 4) -> str:
 
 
 def _along(mapped: VolumetricMap, axis: int) -> tuple[Array, Array, Array]:
-    """Readings (n,) of the linear axis at an index of the chain, the error of its own motion along itself, its u; mm."""
+    """Readings (n,) of the linear axis at an index of the chain, its positioning error along itself, its u; mm."""
     errors = mapped.errors
     joint = errors.chain.joints[axis]
     readings = np.linspace(*mapped.ranges[joint.name], TABLE_POINTS)

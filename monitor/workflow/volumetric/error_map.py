@@ -71,7 +71,8 @@ def map_of(
     errors, left_out = geometric_errors(evaluated, fit)
     if not errors.names:
         raise DataError(
-            f"run {evaluated.run} of campaign {evaluated.campaign.name} determines no geometric error; there is nothing to map"
+            f"run {evaluated.run} of campaign {evaluated.campaign.name} determines no geometric error; "
+            "there is nothing to map"
         )
     ranges, from_strokes = ranges_of(evaluated.campaign, errors.chain)
     poses = poses_of(errors.chain, errors.context.positions)

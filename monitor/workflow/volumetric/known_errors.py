@@ -1,4 +1,4 @@
-"""The geometric errors of a machine that one evaluated run determines, with their covariance, and those that it does not."""
+"""The geometric errors that one evaluated run determines, with their covariance, and those that it does not."""
 
 from __future__ import annotations
 
