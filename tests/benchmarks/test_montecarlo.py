@@ -17,6 +17,7 @@ from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
 from monitor.uncertainty import (
     BlockSampler,
+    MonteCarloOptions,
     block_generator,
     joined,
     measured_run,
@@ -141,7 +142,9 @@ def test_peak_memory_does_not_grow_with_the_trials(benchmark, problem):
 
     def run(trials):
         tracemalloc.start()
-        monte_carlo(estimator, sampler, estimator.outputs, ("",) * 34, trials, workers=WORKERS)
+        monte_carlo(
+            estimator, sampler, estimator.outputs, ("",) * 34, trials, MonteCarloOptions(workers=WORKERS)
+        )
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
 

@@ -8,6 +8,7 @@ import pytest
 from monitor.exceptions import DataError
 from monitor.uncertainty import (
     BlockSampler,
+    MonteCarloOptions,
     adaptive_monte_carlo,
     gum_framework,
     joined,
@@ -107,8 +108,8 @@ def test_numbers_are_the_same_for_any_number_of_workers(samba):
     _, inputs, estimator = samba
     sampler = BlockSampler(normal_inputs(inputs), 9, 500)
     units = ("",) * len(estimator.outputs)
-    one = monte_carlo(estimator, sampler, estimator.outputs, units, 20_000, workers=1)
-    two = monte_carlo(estimator, sampler, estimator.outputs, units, 20_000, workers=2)
+    one = monte_carlo(estimator, sampler, estimator.outputs, units, 20_000, MonteCarloOptions(workers=1))
+    two = monte_carlo(estimator, sampler, estimator.outputs, units, 20_000, MonteCarloOptions(workers=2))
     assert np.array_equal(one.covariance, two.covariance)
     assert np.array_equal(one.estimate, two.estimate)
     assert (one.k_p, one.k_q) == (two.k_p, two.k_q)
@@ -137,7 +138,7 @@ def test_los_2017_chapter_7_framework_is_validated_by_monte_carlo(campaign):
     assert framework.rank == 13
     sampler = BlockSampler(normal_inputs(inputs), 10, 1000)
     result = adaptive_monte_carlo(
-        estimator, sampler, estimator.outputs, units, digits=1, tighten=5.0, workers=2
+        estimator, sampler, estimator.outputs, units, MonteCarloOptions(digits=1, tighten=5.0, workers=2)
     )
     assert result.stable
     assert result.not_converged == 0
