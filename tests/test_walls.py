@@ -177,7 +177,7 @@ def import_circles(package: Path) -> list[list[str]]:
 
 
 def test_house_no_module_is_imported_in_a_circle() -> None:
-    """Imports inside functions and under ``TYPE_CHECKING`` included: late imports are for speed, not to hide a circle."""
+    """Imports inside functions and under ``TYPE_CHECKING`` count: late imports are for speed, not to hide a circle."""
     assert import_circles(PACKAGE) == []
 
 
