@@ -19,7 +19,7 @@ from monitor.records import Array
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class ChainPose:
     """What the chain says of n poses.
 
     ``residual`` (..., 3) in mm, from target to tip in the frame of the last work axis. ``by_error``
@@ -119,7 +119,7 @@ def _derivatives(branch: _Branch, point: Array, to_work: Array, sign: float, out
 
 def evaluate(
     chain: Chain, positions: Array, errors: Array, target: Array, tip: Array, *, jacobian: bool = False
-) -> Evaluation:
+) -> ChainPose:
     """The vector from target to tip for every pose.
 
     ``positions`` (..., J) physical displacements in mm or rad in the order of ``chain.joints``; ``errors``
@@ -139,4 +139,4 @@ def evaluate(
         # The work branch is inverted: r = T_work^-1 x, so dr = -R_work' (turn x (x - centre)).
         _derivatives(work, tip_in_bed, to_work, -1.0, by_error[..., :count, :, :])
         _derivatives(tool, tip_in_bed, to_work, 1.0, by_error[..., count:, :, :])
-    return Evaluation(residual, to_work @ tool.rotation, work.rotation, by_error)
+    return ChainPose(residual, to_work @ tool.rotation, work.rotation, by_error)

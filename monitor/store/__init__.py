@@ -55,7 +55,14 @@ from monitor.store.machine_runs import (
     machine_runs,
     probing_counts,
 )
-from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
+from monitor.store.models import (
+    StoredModel,
+    last_used_campaign,
+    list_models,
+    load_model,
+    model_history,
+    save_model,
+)
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
@@ -97,6 +104,7 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "last_used_campaign",
     "latest_documents",
     "latest_tolerances",
     "list_analyses",

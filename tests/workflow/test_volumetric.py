@@ -8,9 +8,10 @@ from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
 from monitor.methods.samba.virtual import virtual_campaign
 from monitor.store import Database
-from monitor.workflow import models
 from monitor.workflow.intake.campaigns import import_folders
-from monitor.workflow.simulation import simulate
+from monitor.workflow.model.change import add_effect
+from monitor.workflow.model.request import AddEffectRequest
+from monitor.workflow.simulation import SimulateRequest, simulate
 from monitor.workflow.volumetric.error_map import at_zero
 from monitor.workflow.volumetric.known_errors import _of_shared
 from monitor.workflow.volumetric.request import VolumetricRequest
@@ -58,10 +59,10 @@ def test_two_ways_covariance_with_shared_effects_is_that_of_all_unknowns_at_once
 def database(tmp_path_factory):
     """A database with one virtual campaign that hides an indexing error of B."""
     folder = tmp_path_factory.mktemp("volumetric")
-    simulate(folder / "hidden", "EBB:harmonic2", 8.0, 1.0, 3)
+    simulate(SimulateRequest(folder / "hidden", "EBB:harmonic2", 8.0, 1.0, 3))
     with Database(folder / "map.duckdb") as db:
         import_folders(db, [folder / "hidden"])
-        models.add(db, "EBB:harmonic2", "samba", "with-b")
+        add_effect(db, AddEffectRequest("EBB:harmonic2", "samba", "with-b"))
         yield db
 
 

@@ -14,7 +14,7 @@ from monitor.discovery.curve.scene import Scene, effect_of, variant
 from monitor.discovery.machine.evidence import orthonormal, weigh, without
 from monitor.discovery.machine.visible import Candidate, Visible
 from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, group_names
-from monitor.effects.curve_words import CALENDAR
+from monitor.effects.curve.calendar import CALENDAR
 from monitor.methods.curve.problem import SHORTEST_CONSTANT, CurveProblem, grid
 from monitor.records import Array
 

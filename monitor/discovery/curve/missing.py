@@ -15,7 +15,8 @@ from monitor.discovery.machine.scan import Finding
 from monitor.discovery.machine.visible import Candidate
 from monitor.discovery.search.missing import COINCIDES, UNDECIDED, Missing, Rival, Searched
 from monitor.effects.curve import SEARCHED, SEQUENCE, CurveEffect, coefficient_names
-from monitor.effects.curve_words import calendar_period, describe_curve
+from monitor.effects.curve.calendar import calendar_period
+from monitor.effects.curve.words import describe_curve
 from monitor.methods.curve.fit import CurveFit, fit
 from monitor.records import Array
 from monitor.statistics.noise import Assessed

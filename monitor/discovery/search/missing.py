@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from monitor.effects.words import Words
+from monitor.effects.description import Description
 from monitor.records import Array
 from monitor.units import Unit
 
@@ -49,7 +49,7 @@ class Missing:
 
     rank: int
     effect: str
-    words: Words
+    words: Description
     parameters: tuple[str, ...]
     units: tuple[Unit, ...]
     coefficients: Array

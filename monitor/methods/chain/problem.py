@@ -21,7 +21,7 @@ import numpy.typing as npt
 from monitor.effects import Basis, ChainEffect, Context, Effect
 from monitor.effects.catalogue import of_balls
 from monitor.exceptions import DataError
-from monitor.machine import MOTION, Evaluation, evaluate
+from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.methods.chain.searched import STARTS_S, Added, added_in, resolved
 from monitor.records import Array
@@ -65,7 +65,7 @@ class ChainProblem(ABC):
         that of the last tool axis, for own unknowns (R, q). A fresh array each: effects shift the first in place."""
 
     @abstractmethod
-    def by_own(self, own: Array, seen: Evaluation) -> Array:
+    def by_own(self, own: Array, seen: ChainPose) -> Array:
         """Derivatives (n, 3, q) of the vector from the work end to the tool end by the own unknowns."""
 
     def observe(self, rows: Array) -> Array:
@@ -256,7 +256,7 @@ class ChainProblem(ABC):
             place += added.unknowns
         return errors, target, tip
 
-    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """The chain at (R, p) and (c,): vectors (n, 3) in mm between its ends, and their derivatives if asked for."""
         errors, target, tip = self.state(local, common)
         return evaluate(self.context.chain, self.context.positions, errors, target, tip, jacobian=jacobian)

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from monitor.machine import Evaluation
+from monitor.machine import ChainPose
 from monitor.methods.chain.problem import ChainProblem, solve_problem, stops
 from monitor.records import Array
 
@@ -80,7 +80,7 @@ class TouchProblem(ChainProblem):
             beside=bare.evaluated(solution.local, solution.common).residual,
         )
 
-    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """The chain where it stands, and what the readings differ by."""
         seen = super().evaluated(local, common, jacobian=jacobian)
         return seen if self.beside is None else replace(seen, residual=seen.residual + self.beside)
@@ -104,7 +104,7 @@ class TouchProblem(ChainProblem):
         balls = own[:, :-3].reshape(len(self.runs), len(self.targets), 3)
         return balls[self._run, self._target], own[self._run, -3:]
 
-    def by_own(self, own: Array, seen: Evaluation) -> Array:
+    def by_own(self, own: Array, seen: ChainPose) -> Array:
         """Derivatives (n, 3, q) by balls and tip."""
         found = np.zeros((len(self.context), 3, own.shape[1]))
         for axis in range(3):

@@ -10,7 +10,7 @@ import numpy as np
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.artefact import normals_of
 from monitor.effects.shapes import nodes_text
-from monitor.machine import Evaluation, Term, evaluate, parse_term
+from monitor.machine import ChainPose, Term, evaluate, parse_term
 from monitor.methods.chain.least_squares import Linearisation
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.free_form.axes import WORKPIECE_CONDITIONS, Plane, all_conditions, at
@@ -95,7 +95,7 @@ class FreeFormProblem(ChainProblem):
         told: Array = np.einsum("ni,ni...->n...", self.normals, rows)[:, None]
         return told
 
-    def by_own(self, own: Array, seen: Evaluation) -> Array:
+    def by_own(self, own: Array, seen: ChainPose) -> Array:
         """Derivatives (n, 3, 1) by the known error."""
         assert seen.by_error is not None
         term, hat = self._length_effect
@@ -151,7 +151,7 @@ class FreeFormProblem(ChainProblem):
         return replace(self, context=self.context.expecting(self.nominal.context.positions))
 
     @cached_property
-    def _at_nominal(self) -> Evaluation:
+    def _at_nominal(self) -> ChainPose:
         """The derivatives of the vectors at the nominal points, at no errors."""
         nominal = self.nominal
         none = np.zeros((len(self.context), len(self.context.chain.joints), 2, 6))

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
-from monitor.machine import Evaluation, evaluate
+from monitor.machine import ChainPose, evaluate
 from monitor.methods.chain.least_squares import Linearisation
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array, LShape
@@ -135,7 +135,7 @@ class LShapeProblem(ChainProblem):
         target = corners + np.einsum("nk,nki->ni", turned + setup[:, :2], self.frames[:, :2])
         return target, np.tile(np.array(self.tip), (len(target), 1))
 
-    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """Residuals (n, 6): displacement in mm from the module to the sensor, then how much further a point 1 mm
         along the faces' normal is displaced, in mm/mm, both less what the spots say."""
         errors, target, tip = self.state(local, common)
@@ -160,9 +160,9 @@ class LShapeProblem(ChainProblem):
             second = evaluate(chain, positions, errors, target + normal, tip + normal, jacobian=True)
             assert second.by_error is not None
             by_error = np.concatenate([first.by_error, second.by_error - first.by_error], axis=1)
-        return Evaluation(residual, first.by_tip, first.work_rotation, by_error)
+        return ChainPose(residual, first.by_tip, first.work_rotation, by_error)
 
-    def by_own(self, own: Array, seen: Evaluation) -> Array:
+    def by_own(self, own: Array, seen: ChainPose) -> Array:
         """Derivatives (n, 6, q) by setup and modules."""
         found = np.zeros((len(self.context), 6, own.shape[1]))
         setup, deviation = self._parts(own)
@@ -188,7 +188,7 @@ class LShapeProblem(ChainProblem):
         return found
 
     @cached_property
-    def _perfect(self) -> Evaluation:
+    def _perfect(self) -> ChainPose:
         """A machine without errors and a piece laid down exactly: what the spots say of it, and the derivatives."""
         return self.evaluated(self.start, np.zeros(len(self.added_names)), jacobian=True)
 

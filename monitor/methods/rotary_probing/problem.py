@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from monitor.effects import Context, context_of
 from monitor.exceptions import DataError
-from monitor.machine import Evaluation, evaluate
+from monitor.machine import ChainPose, evaluate
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.methods.model import Model, chain_of
 from monitor.methods.rotary_probing.base import rotary_base
@@ -98,7 +98,7 @@ class RotaryProblem(ChainProblem):
             ends[self.ball, axis] += mine[self.ball, self._first[self.ball] + axis]
         return ends, np.broadcast_to(np.array(self.tip), ends.shape)
 
-    def by_own(self, own: Array, seen: Evaluation) -> Array:
+    def by_own(self, own: Array, seen: ChainPose) -> Array:
         """Derivatives (n, 3, q) by heights, centres and radii."""
         found = np.zeros((len(self.context), 3, own.shape[1]))
         rows = np.arange(len(self.context))

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from monitor.effects import Context, context_of
-from monitor.effects.tracker import measured_points
+from monitor.effects.artefact.tracker import measured_points
 from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from monitor.effects import Context
 from monitor.effects.catalogue import of_tracker
 from monitor.exceptions import DataError
-from monitor.machine import Evaluation, evaluate
+from monitor.machine import ChainPose, evaluate
 from monitor.machine.chain import rotation_about
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
@@ -105,7 +105,7 @@ class TrackingProblem(ChainProblem):
         places = own[:, 6:].reshape(len(self.runs), len(self.targets), 3)
         return points, places[self._run, self._target]
 
-    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """The chain at (R, p) and (c,); reflectors beside the machine are not carried by it."""
         errors, points, places = self.state(local, common)
         context = self.context
@@ -120,7 +120,7 @@ class TrackingProblem(ChainProblem):
             by_error[self._fixed] = 0.0
         return replace(seen, residual=residual, by_tip=by_tip, by_error=by_error)
 
-    def by_own(self, own: Array, seen: Evaluation) -> Array:
+    def by_own(self, own: Array, seen: ChainPose) -> Array:
         """Derivatives (n, 3, q) by frame and reflectors."""
         found = np.zeros((len(self.context), 3, own.shape[1]))
         found[:, :, :3] = -np.eye(3)

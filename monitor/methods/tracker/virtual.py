@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from monitor.effects import parse_effect
-from monitor.effects.tracker import TRACKER_COLUMNS
+from monitor.effects.artefact.tracker import TRACKER_COLUMNS
 from monitor.exceptions import EffectError
 from monitor.machine import Chain, evaluate
 from monitor.machine.chain import rotation_about

@@ -17,7 +17,7 @@ from typing import Any
 
 from matplotlib import rc_context, rcdefaults, rcParams
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Figure
 
 from monitor.exceptions import InputError
 from monitor.reporting.palette import INK, MID

@@ -15,7 +15,7 @@ from monitor.methods.curve.problem import CurveProblem
 from monitor.reporting.figures.curve import Residuals, residuals_figure
 from monitor.reporting.figures.models import error_falling
 from monitor.reporting.figures.style import save
-from monitor.workflow.figures import make_folder
+from monitor.workflow.figure_files import make_folder
 
 Document = dict[str, Any]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, TypeVar
 
-from monitor.documents import to_document
+from monitor.documents import from_document, to_document
 from monitor.exceptions import NotFoundError
 from monitor.records import Campaign
 from monitor.store import (
@@ -24,7 +24,8 @@ from monitor.store import (
     save_identification,
 )
 from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
-from monitor.workflow.explain.comparison import save_explanation
+from monitor.workflow.explain.explain import save_explanation
+from monitor.workflow.explain.explain_answer import ExplainAnswer
 from monitor.workflow.health.work import METHOD, Done, Work, kept
 from monitor.workflow.history.health_history import PastRun, Span
 from monitor.workflow.uncertainty.request import COVERAGE
@@ -136,7 +137,7 @@ def stored_with(
     )
     explanation = _saved(
         done.explanation,
-        lambda new: save_explanation(db, new, method, model, span.before),
+        lambda new: save_explanation(db, from_document(ExplainAnswer, new), method, model, span.before),
         "model and measurement could not be compared",
         remarks,
     )

@@ -14,13 +14,16 @@ from typing import Any, TypeVar
 from threadpoolctl import threadpool_limits
 
 from monitor.discovery import Fit, fit
+from monitor.documents import to_document
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
-from monitor.workflow.explain.comparison import error_steps, explanation_document, explanation_of
-from monitor.workflow.identify.identification import identified
+from monitor.workflow.explain.explain import explanation_of
+from monitor.workflow.explain.machine_answer import explain_answer
+from monitor.workflow.explain.versions import error_steps
+from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.evaluation import evaluate_fit
@@ -132,7 +135,7 @@ def _computed(work: Work, fitted: _Fitted) -> Done:
         )
     if work.explanation:
         explanation = kept(
-            lambda: explanation_document(explanation_of(work.known, work.model, first=fitted.fit)),
+            lambda: to_document(explain_answer(explanation_of(work.known, work.model, fitted.fit))),
             "model and measurement could not be compared",
             remarks,
         )
@@ -145,7 +148,7 @@ def _computed(work: Work, fitted: _Fitted) -> Done:
         )
     if work.versions:
         history = kept(
-            lambda: tuple(error_steps(work.known, work.versions)),
+            lambda: tuple(to_document(step) for step in error_steps(work.known, work.versions)),
             "the versions of the model could not be compared",
             remarks,
         )

@@ -1,8 +1,6 @@
-"""A run of the L-shaped piece identified step by step, beside the fit of all at once."""
+"""A run of the L-shaped piece identified step by step, beside the fit of all parameters at once."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
@@ -12,49 +10,50 @@ from monitor.methods.chain.identification import StepwiseCoefficient
 from monitor.methods.chain.problem import solve_problem
 from monitor.store import Database, load_campaign
 from monitor.workflow.campaign_parts import only_run
-from monitor.workflow.models import as_model, resolve
+from monitor.workflow.identify.answer import StepwiseAnswer, StepwiseParameter
+from monitor.workflow.identify.fitting import machine_problem
+from monitor.workflow.identify.request import StepwiseRequest
+from monitor.workflow.models import resolve
 
-Document = dict[str, Any]
 
-
-def steps(db: Database, campaign: str, model: str | None = None, run: int | None = None) -> Document:
-    """One run (the last unless ``run`` says another) by both ways, with what tells them apart.
+def identify_stepwise(db: Database, request: StepwiseRequest) -> StepwiseAnswer:
+    """One run by both ways, with what tells them apart.
 
     Raises NotFoundError for an unknown campaign or run, DataError for a campaign of another method.
     """
-    loaded = load_campaign(db, campaign)
-    stepwise = campaign_method(loaded).stepwise
+    campaign = load_campaign(db, request.campaign)
+    stepwise = campaign_method(campaign).stepwise
     if isinstance(stepwise, Unable):
-        able = " and ".join(name for name, one in methods().items() if not isinstance(one.stepwise, Unable))
+        able = (name for name, method in methods().items() if not isinstance(method.stepwise, Unable))
         raise DataError(
-            f"campaign {campaign} was measured by {loaded.method}; only {able} has a stepwise way"
+            f"campaign {request.campaign} was measured by {campaign.method}; only {' and '.join(able)} has a "
+            "stepwise way"
         )
-    number = max(one.run for one in loaded.runs) if run is None else run
-    loaded = only_run(loaded, number)
-    stored = resolve(db, model, loaded.method)
-    problem = campaign_method(loaded).problem_of(loaded, as_model(stored))
-    found = stepwise.coefficients(problem, solve_problem(problem), number)
-    return {
-        "campaign": campaign,
-        "run": number,
-        "stepwise": {one.parameter: _document(one) for one in found},
-    }
+    number = max(run.run for run in campaign.runs) if request.run is None else request.run
+    campaign = only_run(campaign, number)
+    problem = machine_problem(campaign, resolve(db, request.model, campaign.method))
+    coefficients = stepwise.coefficients(problem, solve_problem(problem), number)
+    return StepwiseAnswer(
+        request.campaign,
+        number,
+        {coefficient.parameter: _parameter(coefficient) for coefficient in coefficients},
+    )
 
 
-def _document(one: StepwiseCoefficient) -> Document:
-    unit = one.unit
+def _parameter(coefficient: StepwiseCoefficient) -> StepwiseParameter:
+    unit = coefficient.unit
 
-    def shown(value: float) -> float | None:
+    def displayed(value: float) -> float | None:
         return unit.to_display(value) if np.isfinite(value) else None
 
-    return {
-        "unit": unit.name,
-        "stepwise": shown(one.stepwise),
-        "u_stepwise": shown(one.u_stepwise),
-        "at_once": shown(one.at_once),
-        "u_at_once": shown(one.u_at_once),
-        "difference_by_method": shown(one.by_method),
-        "u_difference_by_noise": shown(one.u_noise),
-        "agrees": one.agrees,
-        "why": one.why,
-    }
+    return StepwiseParameter(
+        unit=unit.name,
+        stepwise=displayed(coefficient.stepwise),
+        u_stepwise=displayed(coefficient.u_stepwise),
+        at_once=displayed(coefficient.at_once),
+        u_at_once=displayed(coefficient.u_at_once),
+        difference_by_method=displayed(coefficient.by_method),
+        u_difference_by_noise=displayed(coefficient.u_noise),
+        agrees=coefficient.agrees,
+        why=coefficient.why,
+    )

@@ -31,7 +31,7 @@ from monitor.reporting.figures.volumetric import expected_uncertainties
 from monitor.store import Database, StoredModel, load_campaign, save_analysis
 from monitor.uncertainty.coverage import rectangle_factor
 from monitor.units import DEGREE, MICROMETRE, Unit
-from monitor.workflow.figures import ENDINGS, make_folder
+from monitor.workflow.figure_files import ENDINGS, make_folder
 from monitor.workflow.models import as_model, label, resolve
 from monitor.workflow.plan.angles import plan_angles
 from monitor.workflow.plan.candidates import Planned, planned, strokes_of

@@ -23,7 +23,8 @@ from monitor.store import (
     save_analysis,
 )
 from monitor.units import Unit
-from monitor.workflow.identify.identification import identify
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.models import resolve
 from monitor.workflow.run_statistics.answer import (
     GroupCorrelation,
@@ -111,7 +112,7 @@ def _identified(db: Database, campaign: Campaign, model: str | None) -> StoredId
             return identification
     except NotFoundError:
         pass
-    identify(db, campaign.name, model)
+    identify(db, IdentifyRequest(campaign.name, model))
     return load_identification(db, campaign.name, stored.name, stored.version)
 
 
@@ -199,7 +200,7 @@ def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
         answer = replace(answer, matrices=(*of_parameters, *of_coordinates))
     if request.figures is not None:
         # The drawing library takes longer to load than most commands to run.
-        from monitor.workflow.run_statistics.figure import statistics_figure
+        from monitor.workflow.run_statistics.figures import statistics_figure
 
         drawings = statistics_figure(answer, campaign, identification, request.figures)
         answer = replace(answer, figures=drawings)

@@ -62,9 +62,8 @@ def _scatter(db: Database, name: str, request: SideBySideRequest) -> SelectionSc
 def _figure(answer: SideBySideAnswer, folder: Path) -> tuple[str, ...]:
     """The expanded uncertainties of the selections, bars side by side."""
     # The drawing library takes longer to load than most commands to run.
-    from monitor.reporting.figures.style import save
     from monitor.reporting.figures.trend import selections_side_by_side
-    from monitor.workflow.figures import ENDINGS, make_folder
+    from monitor.workflow.figure_files import make_folder, save_figure
 
     make_folder(folder)
     units, scatters = answer.units, answer.selections
@@ -74,4 +73,4 @@ def _figure(answer: SideBySideAnswer, folder: Path) -> tuple[str, ...]:
         title="Expanded uncertainty of a calibration, by the runs that its covariance is from",
         meaning=f"bars: U = k_q u of all parameters together with p = {answer.p:g}",
     )  # fmt: skip
-    return tuple(str(save(figure, folder / f"selections{ending}")) for ending in ENDINGS)
+    return tuple(save_figure(figure, folder, "selections"))

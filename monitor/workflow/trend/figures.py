@@ -12,7 +12,7 @@ from monitor.reporting.figures.style import save
 from monitor.reporting.figures.trend import parameter_over_time
 from monitor.reporting.health.words import in_words
 from monitor.statistics import predict
-from monitor.workflow.figures import ENDINGS, make_folder
+from monitor.workflow.figure_files import ENDINGS, make_folder
 from monitor.workflow.history.series import SECONDS_PER_DAY
 from monitor.workflow.trend.parameter import Document
 from monitor.workflow.trend.trends import Trends

@@ -92,11 +92,12 @@ def _history(db: Database, machine: str, choice: Choice) -> MachineHistory:
     found = read()
     if not db.read_only and found.unidentified:
         # Loaded here: most pages have nothing to identify, and the methods take as long to load as a page to make.
-        from monitor.workflow.identify.identification import identify
+        from monitor.workflow.identify.identify import identify
+        from monitor.workflow.identify.request import IdentifyRequest
 
         for campaign in found.unidentified:
             try:
-                identify(db, campaign, choice.model)
+                identify(db, IdentifyRequest(campaign, choice.model))
             except DataError:
                 # A campaign that cannot be identified does not keep the others from being followed.
                 continue

@@ -25,7 +25,7 @@ from monitor.statistics import (
     residual_correlation,
     trend,
 )
-from monitor.store import Database, MachineHistory
+from monitor.store import Database, MachineHistory, load_campaign
 from monitor.units import MICROMETRE
 from monitor.workflow.trend.forecast import HORIZON_YEARS
 from monitor.workflow.trend.parameter import DAYS_PER_YEAR, Series, date
@@ -83,13 +83,16 @@ def _vectors(
 ) -> _Vectors:
     """The error vectors over the strokes of the latest campaign's machine about ``levels``, name to display value."""
     # Loaded here: pages without a limit of the volumetric error start without the methods and all that they need.
+    from monitor.discovery import fit
     from monitor.effects import ChainEffect
     from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
-    from monitor.workflow.explain.comparison import fitted
+    from monitor.workflow.identify.fitting import machine_problem
+    from monitor.workflow.models import resolve
     from monitor.workflow.volumetric.error_map import poses_of, ranges_of
     from monitor.workflow.volumetric.request import POINTS
 
-    campaign, _, found = fitted(db, str(history.campaign[-1]), model)
+    campaign = load_campaign(db, str(history.campaign[-1]))
+    found = fit(machine_problem(campaign, resolve(db, model, campaign.method)))
     problem, run = found.problem, int(history.run[-1])
     effects = [
         effect

@@ -21,7 +21,7 @@ from monitor.machine import MOTION
 from monitor.records import Array
 from monitor.uncertainty.volumetric import middle, volumetric_error
 from monitor.units import DEGREE, MICROMETRE
-from monitor.workflow.figures import make_folder
+from monitor.workflow.figure_files import make_folder
 from monitor.workflow.volumetric.error_map import VolumetricMap
 
 Row = list[Any]

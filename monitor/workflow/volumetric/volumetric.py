@@ -12,7 +12,6 @@ from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.stating import statement
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 from monitor.workflow.volumetric.answer import VolumetricAnswer
-from monitor.workflow.volumetric.compensation import write_tables
 from monitor.workflow.volumetric.error_map import VolumetricMap, map_of
 from monitor.workflow.volumetric.request import VolumetricRequest
 from monitor.workflow.volumetric.stating import map_answer
@@ -35,10 +34,12 @@ def volumetric_map(db: Database, request: VolumetricRequest) -> VolumetricAnswer
     save_map(db, answer, mapped.evaluated.model, request.before)
     if request.figures is not None:
         # The drawing library takes longer to load than most commands to run.
-        from monitor.workflow.volumetric.figure import map_figures
+        from monitor.workflow.volumetric.figures import map_figures
 
         answer = replace(answer, figures=map_figures(answer, mapped, request.figures))
     if request.compensation is not None:
+        from monitor.workflow.volumetric.compensation import write_tables
+
         answer = replace(answer, tables=write_tables(mapped, request.compensation, request.out))
     return answer
 
