@@ -130,18 +130,18 @@ def test_the_volumetric_error_is_that_of_the_map_and_travels_as_csv(db: Database
     document = volumetric_map(db, VolumetricRequest("five-days", 20))
     (printed,) = record_of(db, "V-1").volumetric
     for length, name in ((printed.largest, "worst"), (printed.mean, "mean"), (printed.rms, "rms")):
-        assert length.value_um == document[name].error_um
-        assert length.expanded_um == document[name].expanded_um
+        assert length.value_um == getattr(document, name).error_um
+        assert length.expanded_um == getattr(document, name).expanded_um
     assert printed.k == document.k
     text = text_of(made.file)
     assert "Volumetric error, as found" in text
     assert re.search(rf"largest error X .* {printed.largest.value_um:.1f} 1\.\d 2\.\d µm", text)
-    assert f"Region: {document['region']['points']} points, 7 along each linear axis" in text
+    assert f"Region: {document.region.points} points, 7 along each linear axis" in text
     attached = pypdf.PdfReader(made.file).attachments
     rows = list(csv.DictReader(io.StringIO(attached["volumetric-error-1.csv"][0].decode())))
     assert len(rows) == 7**3
     lengths = [np.linalg.norm([float(row[f"error_{axis}_um"]) for axis in "xyz"]) for row in rows]
-    assert max(lengths) == pytest.approx(document["by_pose"][0]["worst_um"], rel=1e-12)
+    assert max(lengths) == pytest.approx(document.by_pose[0].worst_um, rel=1e-12)
     assert b"volumetric error, as found" in attached["certificate.dcc.xml"][0]
     assert remake(db, RemakeRequest("V-1")).identical is True
 

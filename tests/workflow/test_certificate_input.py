@@ -36,7 +36,7 @@ def test_the_run_may_be_left_out_where_there_is_one_only(tmp_path: Path) -> None
                 db, CertificateRequest("five-days", None, laboratory=LABORATORY, out=tmp_path, issued_on=DAY)
             )
         with pytest.raises(
-            InputError, match=f"the number {made['number']} is taken, by the issued certificate"
+            InputError, match=f"the number {made.certificate.number} is taken, by the issued certificate"
         ):
             issue(
                 db,

@@ -94,7 +94,7 @@ def test_one_byte_changed_at_200_random_places_is_found_by_the_hash_and_by_the_s
         altered[place] ^= 1 << int(rng.integers(0, 8))
         file.write_bytes(altered)
         found = verify_file(db, VerificationRequest(file))
-        where = f"byte {place}: {found['faults']}"
+        where = f"byte {place}: {found.faults}"
         # What fails is the file, by both of its seals; the database and its chain of entries are as they were.
         assert found.checks == CertificateChecks(hash=False, chain=True, signature=False, database=False), (
             where
