@@ -94,18 +94,18 @@ class MeasuredRun(ABC):
         From ``start`` (p,); returns the unknowns (p, B), NaN where not converged, and which converged (B,).
         """
         trials = inputs.shape[1]
-        found = np.full((self.unknowns, trials), np.nan)
+        solved = np.full((self.unknowns, trials), np.nan)
         at_once = max(1, min(CHUNK, LARGEST_JACOBIAN // max(1, self.probings * 3 * self.unknowns)))
         for first in range(0, trials, at_once):
-            chosen = slice(first, min(first + at_once, trials))
+            chunk = slice(first, min(first + at_once, trials))
             try:
-                found[:, chosen] = self._solve(inputs[:, chosen], start)
+                solved[:, chunk] = self._solve(inputs[:, chunk], start)
             except (DataError, np.linalg.LinAlgError):
-                if inputs[:, chosen].shape[1] == 1:
+                if inputs[:, chunk].shape[1] == 1:
                     continue
-                for trial in range(chosen.start, chosen.stop):
-                    found[:, [trial]] = self.solve(inputs[:, [trial]], start)[0]
-        return found, np.all(np.isfinite(found), axis=0)
+                for trial in range(chunk.start, chunk.stop):
+                    solved[:, [trial]] = self.solve(inputs[:, [trial]], start)[0]
+        return solved, np.all(np.isfinite(solved), axis=0)
 
     def _solve(self, inputs: Array, start: Array) -> Array:
         several = self.repeated(inputs)
@@ -122,18 +122,20 @@ class MeasuredRun(ABC):
 
 def rows_of(context: Context, rows: npt.NDArray[np.int64]) -> Context:
     """A context of the chosen rows (any number of them), in that order, with repetitions."""
-    chosen: dict[str, Any] = {
+    columns: dict[str, Any] = {
         field.name: value[rows]
         for field in fields(Context)
         if isinstance(value := getattr(context, field.name), np.ndarray)
     }
-    chosen["columns"] = {name: value[rows] for name, value in context.columns.items()}
-    return replace(context, **chosen)
+    columns["columns"] = {name: value[rows] for name, value in context.columns.items()}
+    return replace(context, **columns)
 
 
-def same_plan(one: ChainProblem, other: ChainProblem) -> bool:
+def same_plan(first: ChainProblem, other: ChainProblem) -> bool:
     """Whether two problems of one run each have the same targets, at the same set angles, in the same order."""
-    if len(one.context) != len(other.context) or not np.array_equal(one.context.target, other.context.target):
+    if len(first.context) != len(other.context) or not np.array_equal(
+        first.context.target, other.context.target
+    ):
         return False
-    turning = [place for place, joint in enumerate(one.context.chain.joints) if joint.turns]
-    return bool(np.allclose(one.context.positions[:, turning], other.context.positions[:, turning]))
+    turning = [index for index, joint in enumerate(first.context.chain.joints) if joint.turns]
+    return bool(np.allclose(first.context.positions[:, turning], other.context.positions[:, turning]))

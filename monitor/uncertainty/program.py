@@ -170,15 +170,15 @@ def _walk(run: TouchedRun, bases: dict[tuple[int, int, int], list[tuple[int, int
                 steps.append(_Step(kind, component % 3, sign, np.zeros(count), entries=entries))
         return steps
 
-    def motion(place: int, joint: Joint, sign: float) -> list[_Step]:
+    def motion(index: int, joint: Joint, sign: float) -> list[_Step]:
         axis = joint.main
-        move = _Step(SHIFT_READING, axis, sign, np.zeros(count), reading=places.get(place, -1))
+        move = _Step(SHIFT_READING, axis, sign, np.zeros(count), reading=places.get(index, -1))
         if joint.turns:
-            move = _Step(TURN_SET, axis, sign, run.problem.context.positions[:, place])
+            move = _Step(TURN_SET, axis, sign, run.problem.context.positions[:, index])
         # A slanted axis: turned into place, moved, turned back; the inverse of that is the same with the move inverted.
-        there = [_Step(TURN_SET, about, 1.0, np.full(count, angle)) for about, angle in _slant(joint)]
+        slant = [_Step(TURN_SET, about, 1.0, np.full(count, angle)) for about, angle in _slant(joint)]
         back = [_Step(TURN_SET, about, 1.0, np.full(count, -angle)) for about, angle in _slant(joint)[::-1]]
-        return [*there, move, *back]
+        return [*slant, move, *back]
 
     def offset(joint: Joint, sign: float) -> list[_Step]:
         return [
@@ -188,14 +188,14 @@ def _walk(run: TouchedRun, bases: dict[tuple[int, int, int], list[tuple[int, int
         ]
 
     steps: list[_Step] = []
-    for place in range(len(chain.work) - 1, -1, -1):
-        joint = chain.joints[place]
-        steps += small(place, MOTION, -1.0) + motion(place, joint, -1.0)
-        steps += small(place, LOCATION, -1.0) + offset(joint, -1.0)
-    for place in range(len(chain.work), len(chain.joints)):
-        joint = chain.joints[place]
-        steps += offset(joint, 1.0) + small(place, LOCATION, 1.0)
-        steps += motion(place, joint, 1.0) + small(place, MOTION, 1.0)
+    for index in range(len(chain.work) - 1, -1, -1):
+        joint = chain.joints[index]
+        steps += small(index, MOTION, -1.0) + motion(index, joint, -1.0)
+        steps += small(index, LOCATION, -1.0) + offset(joint, -1.0)
+    for index in range(len(chain.work), len(chain.joints)):
+        joint = chain.joints[index]
+        steps += offset(joint, 1.0) + small(index, LOCATION, 1.0)
+        steps += motion(index, joint, 1.0) + small(index, MOTION, 1.0)
     tip = len(run.problem.local_names) - 3
     ones = np.ones(count)
     steps += [
@@ -278,10 +278,10 @@ def _segments(
         else:
             items.append((-1, k, k + 1))
     moves = np.zeros((len(items), AXES), dtype=np.bool_)
-    for place, (_, begin, end) in enumerate(items):
+    for index, (_, begin, end) in enumerate(items):
         for step in steps[begin:end]:
             acting = {along for _, along, _ in step.entries if along >= 0}
             for axis in acting | ({step.reading} if step.reading >= 0 else set()):
-                moves[place, axis] = True
+                moves[index, axis] = True
     item, begin_of, end_of = (np.array(column, dtype=np.int64) for column in zip(*items, strict=True))
     return item, begin_of, end_of, moves

@@ -29,17 +29,17 @@ def taken(problem: ChainProblem, rows: npt.NDArray[np.int64], run: npt.NDArray[n
     Every array of the problem with one entry a row is taken along. A method with other arrays of its own (one entry
     a run) gives its problem a method ``taken(rows, run)``.
     """
-    own = getattr(problem, "taken", None)
-    if own is not None:
-        found: ChainProblem = own(rows, run)
-        return found
-    chosen: dict[str, Any] = {
+    method_taken = getattr(problem, "taken", None)
+    if method_taken is not None:
+        several: ChainProblem = method_taken(rows, run)
+        return several
+    arrays: dict[str, Any] = {
         field.name: value[rows]
         for field in fields(problem)
         if isinstance(value := getattr(problem, field.name), np.ndarray)
         and len(value) == len(problem.context)
     }
-    return replace(problem, context=replace(rows_of(problem.context, rows), run=run), **chosen)
+    return replace(problem, context=replace(rows_of(problem.context, rows), run=run), **arrays)
 
 
 @dataclass(frozen=True)
@@ -117,13 +117,13 @@ def repeated_readings(problem: ChainProblem) -> Array:
     Raises DataError where a run probed other targets or indexations than the first.
     """
     runs = [measured_run(problem, int(run)) for run in problem.runs]
-    for number, one in zip(problem.runs, runs, strict=True):
-        if not same_plan(one.problem, runs[0].problem):
+    for number, single in zip(problem.runs, runs, strict=True):
+        if not same_plan(single.problem, runs[0].problem):
             raise DataError(
                 f"run {number} follows another plan than run {problem.runs[0]}; a covariance of the readings needs "
                 f"the same targets and indexations in the same order"
             )
     if isinstance(problem, TouchProblem):
-        return np.array([one.inputs[: len(one.reading_names)] for one in runs])
+        return np.array([single.inputs[: len(single.reading_names)] for single in runs])
     start, common = runs[0].problem.start, problem.common_start
-    return np.array([one.problem.vectors(start, common).ravel() for one in runs])
+    return np.array([single.problem.vectors(start, common).ravel() for single in runs])

@@ -77,10 +77,10 @@ def sensitivity_of(run: MeasuredRun, inputs: Array | None = None, start: Array |
     x = run.inputs if inputs is None else np.asarray(inputs, dtype=np.float64)
     if x.shape != (len(run.input_names),):
         raise DataError(f"this run has {len(run.input_names)} inputs, not {x.shape}")
-    found, converged = run.solve(x[:, None], run.problem.start[0] if start is None else start)
+    solved, converged = run.solve(x[:, None], run.problem.start[0] if start is None else start)
     if not converged[0]:
         raise DataError("the identification of this run did not converge")
-    theta = found[:, 0]
+    theta = solved[:, 0]
     space, determined, steps = _space(run, x, theta)
     fast = _fast(run, theta, steps)
     quick = fast is not None and _agree(fast, run.gradient, theta, x, steps)
@@ -176,5 +176,5 @@ def _differences(gradient: Gradient, theta: Array, x: Array, moves: Array, *, of
         inputs = inputs + both
     else:
         thetas = thetas + both
-    found = gradient(thetas, inputs)
-    return np.asarray(found[:, :count] - found[:, count:])
+    gradients = gradient(thetas, inputs)
+    return np.asarray(gradients[:, :count] - gradients[:, count:])

@@ -80,12 +80,12 @@ class TouchedRun(MeasuredRun):
 
 def touch_run(problem: TouchProblem, run: int, common: Array) -> TouchedRun:
     """One ``run`` of touched balls, with the common unknowns held at ``common`` (c,)."""
-    place = int(np.flatnonzero(problem.runs == run)[0])
+    index = int(np.flatnonzero(problem.runs == run)[0])
     rows = problem.context.run == run
     single = replace(
         problem,
         context=rows_of(problem.context, np.flatnonzero(rows)),
         sigma=problem.sigma[rows],
-        distances=tuple(replace(d, length=d.length[[place]]) for d in problem.distances),
+        distances=tuple(replace(d, length=d.length[[index]]) for d in problem.distances),
     )
     return TouchedRun(single, common)

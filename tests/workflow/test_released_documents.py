@@ -1,4 +1,4 @@
-"""Documents that version 0.1.0 stored: the source of a covariance as a sentence alone. They certify in each language."""
+"""Documents that version 0.1.0 stored: a covariance's source as a sentence alone. They certify in each language."""
 
 from __future__ import annotations
 

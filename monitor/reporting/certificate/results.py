@@ -170,11 +170,11 @@ def result_set(
     _check_numbers(names, estimate, covariance)
     _check_factors(factors)
     limits = statements.tolerances
-    words = statements.descriptions
+    descriptions = statements.descriptions
     return ResultSet(
         state=statements.state,
         names=names,
-        descriptions=tuple(words.get(name, describe(name, texts)) for name in names),
+        descriptions=tuple(descriptions.get(name, describe(name, texts)) for name in names),
         units=tuple(joint.units[index].name for index in printed),
         estimate=estimate,
         covariance=covariance,

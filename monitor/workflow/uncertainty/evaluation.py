@@ -157,12 +157,14 @@ def _propagated(
     if request.linear_axes is not None:
         inputs, of_axes = with_linear_axes(run, inputs, at, names, request.linear_axes)
         propagated = replace(propagated, inputs=inputs, contributions=(*of_axes, *propagated.contributions))
-    known = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
+    method_knows = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
     stated = request.linear_axes is not None
     source = replace(
         source,
         linear_axes=stated,
-        taken_as_known=tuple(name for name in known if not (stated and name is TakenAsKnown.LINEAR_AXES)),
+        taken_as_known=tuple(
+            name for name in method_knows if not (stated and name is TakenAsKnown.LINEAR_AXES)
+        ),
     )
     return replace(propagated, source=source), causes
 

@@ -33,7 +33,7 @@ def covariance_source_of(sentence: str) -> CovarianceSource:
         kind, runs, dof = CovarianceKind.ALL_RUNS, int(match["runs"]), int(match["all"])
     elif match["stated"] is not None:
         kind, u_um = CovarianceKind.STATED_BY_PROBE, match["stated"]
-    known = (match["known"] or "").split(" and ")
+    names = (match["known"] or "").split(" and ")
     return CovarianceSource(
         kind=kind,
         runs=runs,
@@ -41,5 +41,5 @@ def covariance_source_of(sentence: str) -> CovarianceSource:
         u_um=None if u_um is None else float(u_um),
         selection=match["selection"],
         linear_axes=match["axes"] is not None,
-        taken_as_known=tuple(TakenAsKnown(name) for name in known if name),
+        taken_as_known=tuple(TakenAsKnown(name) for name in names if name),
     )

@@ -26,19 +26,19 @@ def geometric_errors(evaluated: StatedUncertainty, fit: Fit) -> tuple[GeometricE
     """
     problem, solution = fit.problem, fit.solution
     run = int(np.flatnonzero(problem.runs == evaluated.run)[0])
-    own, left_out = _of_run(evaluated, fit)
+    of_run, left_out = _of_run(evaluated, fit)
     shared, places, reasons = _shared(fit)
-    covariance = np.zeros((len(own.names) + len(shared.names),) * 2)
-    columns = [evaluated.names.index(name) for name in own.names]
+    covariance = np.zeros((len(of_run.names) + len(shared.names),) * 2)
+    columns = [evaluated.names.index(name) for name in of_run.names]
     covariance[: len(columns), : len(columns)] = evaluated.covariance[np.ix_(columns, columns)] * np.outer(
-        own.factors, own.factors
+        of_run.factors, of_run.factors
     )
-    local = [problem.base_names.index(name) for name in own.names]
+    local = [problem.base_names.index(name) for name in of_run.names]
     if len(solution.common):
         covariance += _of_shared(fit, run, local, places)
-    effects = [*own.effects, *shared.effects]
-    names = [*own.names, *shared.names]
-    estimate = [*own.estimate, *shared.estimate]
+    effects = [*of_run.effects, *shared.effects]
+    names = [*of_run.names, *shared.names]
+    estimate = [*of_run.estimate, *shared.estimate]
     for effect, name in problem.known_errors:
         # Measured by other means: its uncertainty is the stated one, and what the others share with it is first order.
         index = problem.local_names.index(name)
