@@ -130,6 +130,100 @@ def test_house_every_import_goes_down_or_to_the_ground() -> None:
     assert breaches(PACKAGE) == []
 
 
+def modules(package: Path) -> dict[str, Path]:
+    """Every module of the package by its dotted name; a folder has the name of its ``__init__``."""
+    names = {}
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package.parent).with_suffix("").parts
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return names
+
+
+def import_circles(package: Path) -> list[list[str]]:
+    """The groups of modules that import one another in a circle, by Tarjan's algorithm, each in the order of its names.
+
+    ``from folder import name`` imports the module ``folder.name`` where there is one, else the folder itself. That a
+    module inside a folder loads the folder's ``__init__`` first is no import of its own.
+    """
+    files = modules(package)
+    imports: dict[str, set[str]] = {}
+    for module, path in files.items():
+        imports[module] = set()
+        for _, name in imported(path, package):
+            target = name if name in files else name.rpartition(".")[0]
+            if target in files and target != module:
+                imports[module].add(target)
+    index: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    stack: list[str] = []
+    circles: list[list[str]] = []
+
+    def visit(module: str) -> None:
+        index[module] = lowest[module] = len(index)
+        stack.append(module)
+        for target in sorted(imports[module]):
+            if target not in index:
+                visit(target)
+                lowest[module] = min(lowest[module], lowest[target])
+            elif target in stack:
+                lowest[module] = min(lowest[module], index[target])
+        if lowest[module] == index[module]:
+            group = [stack.pop()]
+            while group[-1] != module:
+                group.append(stack.pop())
+            if len(group) > 1:
+                circles.append(sorted(group))
+
+    for module in imports:
+        if module not in index:
+            visit(module)
+    return sorted(circles)
+
+
+def test_house_no_module_is_imported_in_a_circle() -> None:
+    """Imports inside functions and under ``TYPE_CHECKING`` count: late imports are for speed, not to hide a circle."""
+    assert import_circles(PACKAGE) == []
+
+
+@pytest.mark.parametrize(
+    ("sources", "circles"),
+    [
+        ({"a.py": "from monitor import b", "b.py": "import numpy"}, []),
+        ({"a.py": "from monitor import b", "b.py": "import monitor.a"}, [["monitor.a", "monitor.b"]]),
+        (
+            {
+                "a.py": "from monitor.b import f",
+                "b.py": "def f():\n    from monitor.c import g",
+                "c.py": "import monitor.a",
+            },
+            [["monitor.a", "monitor.b", "monitor.c"]],
+        ),
+        (
+            {"a.py": "if TYPE_CHECKING:\n    from .b import T", "b.py": "from .a import f"},
+            [["monitor.a", "monitor.b"]],
+        ),
+        (
+            {
+                "room/__init__.py": "from .a import f",
+                "room/a.py": "from monitor.room import b",
+                "room/b.py": "",
+            },
+            [],
+        ),
+        (
+            {"room/__init__.py": "from .a import f", "room/a.py": "from monitor.room import f"},
+            [["monitor.room", "monitor.room.a"]],
+        ),
+    ],
+)
+def test_house_a_circle_is_found(tmp_path: Path, sources: dict[str, str], circles: list[list[str]]) -> None:
+    for file, source in {"__init__.py": "", **sources}.items():
+        path = tmp_path / "monitor" / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(source, encoding="utf-8")
+    assert import_circles(tmp_path / "monitor") == circles
+
+
 def test_house_every_room_starts_with_what_it_is_for() -> None:
     silent = [
         str(path.relative_to(PACKAGE))

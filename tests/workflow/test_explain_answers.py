@@ -31,7 +31,7 @@ KINDS = {
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     with Database(tmp_path_factory.mktemp("answers") / "x.duckdb") as db:
-        import_folders(db, [EXAMPLES / name for name in KINDS])
+        import_folders(db, ImportRequest([EXAMPLES / name for name in KINDS]))
         yield db
 
 

@@ -106,7 +106,8 @@ def _vectors(
     from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
     from monitor.workflow.identify.fitting import machine_problem
     from monitor.workflow.models import resolve
-    from monitor.workflow.volumetric.volumetric import POINTS, poses_of, ranges_of
+    from monitor.workflow.volumetric.error_map import poses_of, ranges_of
+    from monitor.workflow.volumetric.request import POINTS
 
     campaign = load_campaign(db, str(history.campaign[-1]))
     fitted = fit(machine_problem(campaign, resolve(db, model, campaign.method)))
