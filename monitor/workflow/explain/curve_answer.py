@@ -119,7 +119,7 @@ def curve_explain_answer(explanation: CurveExplanation, model: str) -> ExplainAn
     curve = explanation.first.problem.curve
     comparison = curve_comparison(compare_curve(explanation.first, lacks=bool(explanation.missing)), model)
     if explanation.suspect and not explanation.missing:
-        # An outlier is named as such: the verdict is the one without it.
+        # An outlier is reported as such: the verdict is that of the fit without it.
         verdict = compare_curve(explanation.final, lacks=False).verdict
         comparison = replace(comparison, verdict=verdict)
     missing = tuple(_curve_missing(curve, effect) for effect in explanation.missing)

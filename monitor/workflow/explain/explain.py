@@ -58,7 +58,7 @@ def explanation_of(campaign: Campaign, model: StoredModel, first: Fit, rate: flo
     rng = np.random.default_rng(SEED)
     explanation = search(campaign, first.problem, label(model), rate=rate, rng=rng, first=first)
     if is_hopeless(explanation):
-        # The effects that were found leave nearly all of the residual: none of them is an answer.
+        # The effects of the search leave nearly all of the residual: none of them is an answer.
         return replace(explanation, missing=(), suspect=(), moves=(), steps=())
     return explanation
 

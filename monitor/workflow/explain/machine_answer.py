@@ -39,7 +39,7 @@ def micrometres(length: float | None) -> float | None:
 
 
 def machine_comparison(comparison: ChainComparison, verdict: Verdict | None = None) -> MachineComparison:
-    """The comparison of a machine in micrometres, with another ``verdict`` where one is named."""
+    """The comparison of a machine in micrometres, with its own verdict, or another ``verdict``."""
     um = MICROMETRE.to_display
     return MachineComparison(
         campaign=comparison.campaign,
