@@ -22,7 +22,8 @@ from monitor.store import StoredIdentification, StoredModel
 from monitor.workflow.explain.explain import explanation_of
 from monitor.workflow.explain.explain_answer import ExplainAnswer
 from monitor.workflow.explain.machine_answer import explain_answer
-from monitor.workflow.explain.versions import CurveVersion, MachineVersion, error_steps
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.explain.versions import error_steps
 from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.documents import document
