@@ -114,7 +114,7 @@ def _curve_missing(curve: CurveCampaign, effect: Missing) -> CurveMissing:
     )
 
 
-def curve_explain_answer(explanation: CurveExplanation, model: str) -> ExplainAnswer:
+def curve_explanation(explanation: CurveExplanation, model: str) -> ExplainAnswer:
     """The explanation of a curve: what a comparison says, what the model lacks, and the rows that were left out."""
     curve = explanation.first.problem.curve
     comparison = curve_comparison(compare_curve(explanation.first, lacks=bool(explanation.missing)), model)
