@@ -97,7 +97,7 @@ class AngleCandidates(Protocol):
 
 
 @dataclass(frozen=True)
-class Words:
+class Nouns:
     """What a ``target`` and a ``row`` of a campaign are called, and ``tool_point`` where an effect is seen largest."""
 
     target: str
@@ -116,7 +116,7 @@ class Method:
     name: str
     title: str
     description: str
-    words: Words
+    nouns: Nouns
     statistics: Able | Unable
     coordinates: Able | Unable
     uncertainty: Able | Unable

@@ -62,7 +62,7 @@ def test_a_method_says_what_it_is(name: str) -> None:
     method = methods()[name]
     assert method_named(name) is method
     assert method.name == name == method.own_model.name
-    assert all([method.title, method.description, *vars(method.words).values()])
+    assert all([method.title, method.description, *vars(method.nouns).values()])
     assert not method.own_model.added
     abilities = [value for value in vars(method).values() if isinstance(value, Unable)]
     assert all(ability.why for ability in abilities)

@@ -194,7 +194,7 @@ def _column(axis: str, linear: bool) -> str:
 
 
 def _word(campaign: Campaign) -> str:
-    return campaign_method(campaign).words.target
+    return campaign_method(campaign).nouns.target
 
 
 def _exchange(

@@ -39,19 +39,19 @@ def _candidates(chain: Chain) -> list[tuple[Joint, int]]:
     """
     frame = (chain.work or chain.tool)[0]
     depth = {
-        joint.name: len(branch) - place
+        joint.name: len(branch) - position
         for branch in (chain.work, chain.tool)
-        for place, joint in enumerate(branch)
+        for position, joint in enumerate(branch)
     }
     spindle_first = sorted(chain.joints, key=lambda joint: (joint.kind != "spindle", depth[joint.name]))
-    found = []
+    candidates = []
     for joint in spindle_first:
         if joint is frame:
             continue
         shifts = [axis for axis in range(3) if joint.turns and axis != joint.main]
         turns = [3 + axis for axis in range(3) if axis != joint.main and joint.kind != "spindle"]
-        found += [(joint, component) for component in (*turns, *shifts)]
-    return found
+        candidates += [(joint, component) for component in (*turns, *shifts)]
+    return candidates
 
 
 def _generic_jacobian(chain: Chain) -> tuple[Array, Array]:
@@ -61,24 +61,24 @@ def _generic_jacobian(chain: Chain) -> tuple[Array, Array]:
     half = {"linear": 0.0, "rotary": np.pi / 2, "spindle": np.pi}
     spread = np.array([half[joint.kind] for joint in chain.joints])
     positions = np.repeat(rng.uniform(-spread, spread, (POSES, len(chain.joints))), TARGETS, axis=0)
-    places = rng.uniform(-150.0, 150.0, (TARGETS, 3))
-    target = np.tile(places, (POSES, 1))
+    points = rng.uniform(-150.0, 150.0, (TARGETS, 3))
+    target = np.tile(points, (POSES, 1))
     errors = np.zeros((count, len(chain.joints), 2, 6))
     tip = np.array(TIP)
     positions = touching_positions(chain, positions, errors, target, tip)
-    seen = evaluate(chain, positions, errors, target, tip, jacobian=True)
-    assert seen.by_error is not None
+    pose = evaluate(chain, positions, errors, target, tip, jacobian=True)
+    assert pose.by_error is not None
     nuisance = np.zeros((count, 3, 3 * TARGETS + 3))
     for number in range(TARGETS):
         nuisance[number::TARGETS, :, 3 * number : 3 * number + 3] = -np.eye(3)
-    nuisance[..., -3:] = seen.by_tip
+    nuisance[..., -3:] = pose.by_tip
     gains = [
-        seen.by_error[:, :, place, 1, joint.main] * positions[:, None, place]
-        for place, joint in enumerate(chain.joints)
+        pose.by_error[:, :, index, 1, joint.main] * positions[:, None, index]
+        for index, joint in enumerate(chain.joints)
         if joint.kind == "linear"
     ]
-    known = np.concatenate([nuisance, np.stack(gains, axis=-1)], axis=-1).reshape(3 * count, -1)
-    return seen.by_error.reshape(3 * count, len(chain.joints), 2, 6), known
+    explained = np.concatenate([nuisance, np.stack(gains, axis=-1)], axis=-1).reshape(3 * count, -1)
+    return pose.by_error.reshape(3 * count, len(chain.joints), 2, 6), explained
 
 
 def _candidates_outside(chain: Chain) -> list[tuple[Joint, int]]:
@@ -107,22 +107,22 @@ def _generic_jacobian_outside(chain: Chain) -> tuple[Array, Array]:
     only_tool = replace(chain, work=(), tool=chain.tool)
     first = len(chain.work)
     none = np.zeros((count, len(chain.tool), 2, 6))
-    seen = evaluate(only_tool, positions[:, first:], none, np.zeros(3), tip, jacobian=True)
-    assert seen.by_error is not None
+    pose = evaluate(only_tool, positions[:, first:], none, np.zeros(3), tip, jacobian=True)
+    assert pose.by_error is not None
     by_error = np.zeros((count, 3, len(chain.joints), 2, 6))
-    by_error[:, :, first:] = seen.by_error
+    by_error[:, :, first:] = pose.by_error
     nuisance = np.zeros((count, 3, 3 * TARGETS + 6))
     for number in range(TARGETS):
-        nuisance[number::TARGETS, :, 3 * number : 3 * number + 3] = seen.by_tip[number::TARGETS]
+        nuisance[number::TARGETS, :, 3 * number : 3 * number + 3] = pose.by_tip[number::TARGETS]
     nuisance[:, :, -6:-3] = np.eye(3)
-    nuisance[:, :, -3:] = np.swapaxes(np.cross(np.eye(3), seen.residual[:, None, :]), 1, 2)
+    nuisance[:, :, -3:] = np.swapaxes(np.cross(np.eye(3), pose.residual[:, None, :]), 1, 2)
     gains = [
-        by_error[:, :, place, 1, joint.main] * positions[:, None, place]
-        for place, joint in enumerate(chain.joints)
+        by_error[:, :, index, 1, joint.main] * positions[:, None, index]
+        for index, joint in enumerate(chain.joints)
         if joint.kind == "linear" and joint.branch == "tool"
     ]
-    known = np.concatenate([nuisance, *(gain[..., None] for gain in gains)], axis=-1)
-    return by_error.reshape(3 * count, len(chain.joints), 2, 6), known.reshape(3 * count, -1)
+    explained = np.concatenate([nuisance, *(gain[..., None] for gain in gains)], axis=-1)
+    return by_error.reshape(3 * count, len(chain.joints), 2, 6), explained.reshape(3 * count, -1)
 
 
 @cache
@@ -133,22 +133,22 @@ def base_effects(chain: Chain, outside: bool | None = None) -> tuple[str, ...]:
     """
     if outside is None:
         outside = len(chain.of_kind("linear")) < 3
-    by_error, known = (_generic_jacobian_outside if outside else _generic_jacobian)(chain)
-    basis = np.linalg.qr(known / np.linalg.norm(known, axis=0))[0]
-    chosen: set[tuple[str, int]] = set()
+    by_error, explained = (_generic_jacobian_outside if outside else _generic_jacobian)(chain)
+    basis = np.linalg.qr(explained / np.linalg.norm(explained, axis=0))[0]
+    selected: set[tuple[str, int]] = set()
     for joint, component in (_candidates_outside if outside else _candidates)(chain):
         column = by_error[:, chain.index(joint.name), 0, component]
-        left = column - basis @ (basis.T @ column)
-        left -= basis @ (basis.T @ left)
-        if np.linalg.norm(left) > RANK_TOLERANCE * np.linalg.norm(column):
-            basis = np.column_stack([basis, left / np.linalg.norm(left)])
-            chosen.add((joint.name, component))
+        remainder = column - basis @ (basis.T @ column)
+        remainder -= basis @ (basis.T @ remainder)
+        if np.linalg.norm(remainder) > RANK_TOLERANCE * np.linalg.norm(column):
+            basis = np.column_stack([basis, remainder / np.linalg.norm(remainder)])
+            selected.add((joint.name, component))
     ordered = sorted(chain.joints, key=lambda joint: joint.kind == "spindle")
     locations = [
         f"E{COMPONENTS[component]}0{joint.name}"
         for joint in ordered
         for component in range(6)
-        if (joint.name, component) in chosen
+        if (joint.name, component) in selected
     ]
     gains = [
         f"E{COMPONENTS[joint.main]}{joint.name}:poly1"

@@ -94,18 +94,20 @@ def eliminate(local: Array) -> _Elimination:
 
 def project_out(basis: Array, columns: Array) -> Array:
     """What is left of columns (R, N, k) once the span of ``basis`` (R, N, p) is taken out."""
-    left: Array = columns - basis @ (np.swapaxes(basis, -1, -2) @ columns)
-    return left
+    remainder: Array = columns - basis @ (np.swapaxes(basis, -1, -2) @ columns)
+    return remainder
 
 
-def _common_step(left: Array, whole: Array, residual: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+def _common_step(
+    remainder: Array, whole: Array, residual: Array
+) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Step, covariance and identifiability of the common unknowns."""
-    count = left.shape[-1]
+    count = remainder.shape[-1]
     if count == 0:
         return np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool)
     scale = np.linalg.norm(whole.reshape(-1, count), axis=0)
     scale[scale == 0] = 1.0
-    matrix = left.reshape(-1, count) / scale
+    matrix = remainder.reshape(-1, count) / scale
     u, s, vt = np.linalg.svd(matrix, full_matrices=False)
     keep = s > COMMON_RANK_TOLERANCE
     inverse_s = np.where(keep, 1.0 / np.where(keep, s, 1.0), 0.0)
@@ -125,20 +127,20 @@ def solve(
     Raises DataError if it does not converge in ``most`` steps, which means readings that contradict the machine file
     (a wrong sign, a wrong axis or a ball confused with another).
     """
-    now = linearise(local, common)
-    cost = float(np.sum(now.residual**2))
-    space, spanned = eliminate(now.local), now.local
+    current = linearise(local, common)
+    cost = float(np.sum(current.residual**2))
+    space, spanned = eliminate(current.local), current.local
     before = np.inf
     for iteration in range(1, most + 1):
-        if now.local is not spanned:
-            space, spanned = eliminate(now.local), now.local
-        whole = np.concatenate([now.common, now.residual[..., None]], axis=-1)
-        left = project_out(space.basis, whole)
-        step_common, covariance, free = _common_step(left[..., :-1], now.common, left[..., -1])
-        moved = now.residual + now.common @ step_common
+        if current.local is not spanned:
+            space, spanned = eliminate(current.local), current.local
+        whole = np.concatenate([current.common, current.residual[..., None]], axis=-1)
+        remainder = project_out(space.basis, whole)
+        step_common, covariance, free = _common_step(remainder[..., :-1], current.common, remainder[..., -1])
+        moved = current.residual + current.common @ step_common
         in_basis = -np.einsum("rnp,rn->rp", space.basis, moved)
         step_local = np.einsum("rkp,rp->rk", space.inverse, in_basis)
-        size = float(np.sqrt(np.sum(in_basis**2) + np.sum((left[..., :-1] @ step_common) ** 2)))
+        size = float(np.sqrt(np.sum(in_basis**2) + np.sum((remainder[..., :-1] @ step_common) ** 2)))
         factor = 1.0
         for _ in range(MOST_HALVINGS):
             trial = linearise(local + factor * step_local, common + factor * step_common)
@@ -147,9 +149,9 @@ def solve(
                 break
             factor /= 2.0
         local, common = local + factor * step_local, common + factor * step_common
-        now, cost = trial, trial_cost
+        current, cost = trial, trial_cost
         if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
-            return _solution(local, common, now, space, covariance, free, iteration)
+            return _solution(local, common, current, space, covariance, free, iteration)
         before = size
     raise DataError(
         f"the identification did not converge in {most} steps: the readings contradict the machine file; "
@@ -160,26 +162,26 @@ def solve(
 def _solution(
     local: Array,
     common: Array,
-    now: Linearisation,
+    last: Linearisation,
     space: _Elimination,
     covariance: Array,
     free: npt.NDArray[np.bool_],
     iterations: int,
 ) -> Solution:
     # The last step was a hundred-thousandth of a standard deviation or less: the space before it is that after it.
-    own = space.inverse @ np.swapaxes(space.inverse, -1, -2)
-    reaction = space.inverse @ (np.swapaxes(space.basis, -1, -2) @ now.common)
-    own = own + reaction @ covariance @ np.swapaxes(reaction, -1, -2)
+    local_covariance = space.inverse @ np.swapaxes(space.inverse, -1, -2)
+    reaction = space.inverse @ (np.swapaxes(space.basis, -1, -2) @ last.common)
+    local_covariance = local_covariance + reaction @ covariance @ np.swapaxes(reaction, -1, -2)
     share = np.abs(space.null_space).max(axis=1)
     return Solution(
         local=local,
         common=common,
-        local_covariance=own,
+        local_covariance=local_covariance,
         common_covariance=covariance,
         local_free=share < MEMBER_SHARE,
         common_free=free,
         null_space=space.null_space,
         rank=space.rank,
         iterations=iterations,
-        last=now,
+        last=last,
     )

@@ -18,7 +18,8 @@ from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.method import ChainMethod, Unable, Words
+from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
+from monitor.methods.method import ChainMethod, Nouns, Unable
 from monitor.methods.model import Model, chain_of
 from monitor.methods.tracker.problem import TrackingProblem, first_guess
 from monitor.records import Array, Campaign
@@ -50,7 +51,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProb
     """
     chain = tool_side(chain_of(campaign.machine))
     context = context_of(campaign, chain)
-    fixed = tuple(one.id for one in campaign.artefact.reflectors if one.fixed)
+    fixed = tuple(reflector.id for reflector in campaign.artefact.reflectors if reflector.fixed)
     points = measured_points(context)
     for run in np.unique(context.run):
         if not np.any((context.run == run) & ~np.isin(context.target, list(fixed))):
@@ -83,16 +84,10 @@ def _refuse_copies(campaign: Campaign, context: Context, points: Array) -> None:
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     """What the plan kept still and would have to move."""
-    rows = problem.context.run == run
-    still = [
-        joint.name
-        for place, joint in enumerate(problem.context.chain.joints)
-        if np.ptp(problem.context.positions[rows, place]) == 0
-    ]
+    still = [joint.name for joint in still_joints(problem, run)]
     if still:
         return f": {', '.join(still)} stood still throughout; move {'it' if len(still) == 1 else 'them'} too"
-    targets = [target for target in problem.targets if np.any(rows & (problem.context.target == target))]
-    if len(targets) == 1:
+    if len(np.unique(problem.context.target[problem.context.run == run])) == 1:
         return "; add reflectors away from the last axis, or poses that turn the wrist more"
     return "; add poses over the whole range of the joints"
 
@@ -100,11 +95,10 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:
     """DataError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
-        targets = problem.context.target[problem.context.run == run]
-        unknowns = len(problem.local_names) - 3 * (len(problem.targets) - len(np.unique(targets)))
-        if 3 * len(targets) < unknowns:
+        readings, unknowns = 3 * int(np.sum(problem.context.run == run)), unknowns_of_run(problem, run)
+        if readings < unknowns:
             raise DataError(
-                f"run {run} of campaign {campaign.name} has {3 * len(targets)} readings for {unknowns} unknowns; "
+                f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "measure more poses"
             )
 
@@ -113,7 +107,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="tracker",
     description="reflectors on a robot or any serial machine, seen by a laser tracker or camera",
-    words=Words(target="reflector", row="reading", tool_point="reflectors"),
+    nouns=Nouns(target="reflector", row="reading", tool_point="reflectors"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,

@@ -11,8 +11,9 @@ from monitor.discovery.machine.variants import variants_of
 from monitor.discovery.machine.visible import see
 from monitor.effects.catalogue import catalogue
 from monitor.machine import Chain
-from monitor.methods.chain.expected import planned_context
-from monitor.methods.chain.planning import Choice, best_plan
+from monitor.methods.planning.candidates import Choice
+from monitor.methods.planning.search import best_plan
+from monitor.methods.planning.touches import planned_context
 from monitor.records import Array
 from monitor.uncertainty.coverage import rectangle_factor
 from monitor.units import DEGREE, Unit

@@ -11,9 +11,9 @@ from monitor.discovery import fit
 from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods import campaign_method
-from monitor.methods.chain.expected import candidate_touches, planned_context
-from monitor.methods.chain.planning import Candidates, Choice, TimeModel, more_balls, pose_grid
 from monitor.methods.chain.touch import TouchProblem
+from monitor.methods.planning.candidates import Candidates, Choice, TimeModel, more_balls, pose_grid
+from monitor.methods.planning.touches import candidate_touches, planned_context
 from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.workflow.models import as_model

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from monitor.documents import to_document
 from monitor.methods import AnglePlan, campaign_method
-from monitor.methods.chain.planning import Choice, best_plan, quickest_plan
+from monitor.methods.planning.candidates import Choice
+from monitor.methods.planning.search import best_plan, quickest_plan
 from monitor.records import Campaign
 from monitor.store import Database, StoredModel, load_campaign, save_analysis
 from monitor.units import MICROMETRE

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from monitor.exceptions import InputError
-from monitor.methods.chain.planning import MOST_BALLS
+from monitor.methods.planning.search import MOST_BALLS
 
 
 @dataclass(frozen=True)
