@@ -21,7 +21,7 @@ from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
 from monitor.workflow.explain.explain import explanation_of
 from monitor.workflow.explain.explain_answer import ExplainAnswer
-from monitor.workflow.explain.machine_answer import explain_answer
+from monitor.workflow.explain.machine_answer import machine_explanation
 from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 from monitor.workflow.explain.versions import error_steps
 from monitor.workflow.identify.machine import identified
@@ -137,7 +137,7 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
         )
     if task.explanation:
         explanation = attempted(
-            lambda: explain_answer(explanation_of(task.past, task.model, fitted.fit)),
+            lambda: machine_explanation(explanation_of(task.past, task.model, fitted.fit)),
             "model and measurement could not be compared",
             remarks,
         )
