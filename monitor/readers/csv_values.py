@@ -21,7 +21,7 @@ LARGEST_WHOLE = 2**31 - 1
 # needs other characters, so a column that keeps to these can be handed to float() as it is.
 NUMBER_CHARACTERS = frozenset("0123456789+-.eE\n")
 DIGITS = frozenset("0123456789\n")
-# Dashes that word processors put in place of a minus.
+# Dashes that word processors put in row of a minus.
 TYPOGRAPHIC_MINUS = "\u2212\u2013\u2014\u2010\u2011\ufe63\uff0d"
 
 
@@ -66,16 +66,16 @@ def wholes(table: CsvTable, column: str, faults: Faults) -> Wholes:
     if cells and all(cells) and max(map(len, cells)) < 10 and set("\n".join(cells)) <= DIGITS:
         return Wholes(np.array(list(map(int, cells)), dtype=np.int64), np.ones(len(cells), dtype=np.bool_))
     values = np.full(len(cells), -1, dtype=np.int64)
-    for place, cell in enumerate(cells):
+    for row, cell in enumerate(cells):
         if re.fullmatch(r"[0-9]{1,20}", cell) and int(cell) <= LARGEST_WHOLE:
-            values[place] = int(cell)
+            values[row] = int(cell)
         else:
-            told = "the cell is empty" if not cell else f"{quoted(cell)} is not a whole number"
+            fault = "the cell is empty" if not cell else f"{quoted(cell)} is not a whole number"
             faults.add(
                 table.file,
-                table.lines[place],
+                table.lines[row],
                 column,
-                f"{told}; write digits only, from 0 to {LARGEST_WHOLE}",
+                f"{fault}; write digits only, from 0 to {LARGEST_WHOLE}",
             )
     return Wholes(values, values >= 0)
 
@@ -85,16 +85,16 @@ def _numbers_one_by_one(
 ) -> Numbers:
     values = np.full(len(cells), math.nan)
     good = np.zeros(len(cells), dtype=np.bool_)
-    for place, cell in enumerate(cells):
+    for row, cell in enumerate(cells):
         if not cell and may_be_empty:
-            good[place] = True
+            good[row] = True
             continue
         wrong = what_is_wrong(cell)
         if wrong is None:
-            values[place] = float(cell)
-            good[place] = True
+            values[row] = float(cell)
+            good[row] = True
         else:
-            faults.add(table.file, table.lines[place], column, wrong)
+            faults.add(table.file, table.lines[row], column, wrong)
     return Numbers(values, good)
 
 

@@ -76,12 +76,12 @@ def _what_is_wrong(cell: str) -> str | None:
 
 def refuse_enormous(table: CsvTable, name: str, values: Array, faults: Faults) -> None:
     """Note every number beyond LARGEST_NUMBER; NaN, a cell refused already, is passed over."""
-    for place in np.flatnonzero(np.abs(values) > LARGEST_NUMBER).tolist():
+    for row in np.flatnonzero(np.abs(values) > LARGEST_NUMBER).tolist():
         faults.add(
             table.file,
-            table.lines[place],
+            table.lines[row],
             name,
-            f"{quoted(table.columns[name][place])} is beyond {LARGEST_NUMBER:g}, which no measurement is; correct "
+            f"{quoted(table.columns[name][row])} is beyond {LARGEST_NUMBER:g}, which no measurement is; correct "
             "it, or write the column in a larger unit",
         )
 

@@ -15,23 +15,23 @@ class Faults:
     """Faults of one folder, collected so that all of them are told together."""
 
     def __init__(self, files: Iterable[str]) -> None:
-        self._order = {name: place for place, name in enumerate(files)}
-        self._found: list[Fault] = []
+        self._order = {name: index for index, name in enumerate(files)}
+        self._faults: list[Fault] = []
 
     def __len__(self) -> int:
-        return len(self._found)
+        return len(self._faults)
 
     def add(self, file: str, line: int | None, column: str | None, message: str) -> None:
         """Note one fault."""
-        self._found.append(Fault(file, line, column, message))
+        self._faults.append(Fault(file, line, column, message))
 
     def extend(self, faults: Iterable[Fault]) -> None:
         """Note several faults."""
-        self._found.extend(faults)
+        self._faults.extend(faults)
 
     def sorted(self) -> list[Fault]:
         """All faults, by file and line."""
-        return sorted(self._found, key=lambda f: (self._order.get(f.file, -1), f.line or 0))
+        return sorted(self._faults, key=lambda fault: (self._order.get(fault.file, -1), fault.line or 0))
 
 
 def quoted(value: object) -> str:
@@ -52,8 +52,8 @@ def one_of(names: Iterable[str]) -> str:
     return ", ".join(names) or "none"
 
 
-def near(name: str, known: Iterable[str]) -> str:
+def near(name: str, names: Iterable[str]) -> str:
     """A hint ("did you mean 'x_mm'? ") where a known name is close, else nothing."""
-    by_folded = {candidate.casefold(): candidate for candidate in known}
+    by_folded = {candidate.casefold(): candidate for candidate in names}
     close = difflib.get_close_matches(name[:100].casefold(), list(by_folded), n=1, cutoff=0.7)
     return f"did you mean '{by_folded[close[0]]}'? " if close else ""

@@ -25,12 +25,12 @@ def recorded_columns(
 
     ``suffixes`` are the units allowed, ``plain`` the columns without a unit that a method allows.
     """
-    kept = []
+    columns = []
     for column in table.columns:
         if column in taken:
             continue
         if has_unit(column, suffixes) or column in plain:
-            kept.append(column)
+            columns.append(column)
             continue
         ends = ", ".join(f"_{suffix}" for suffix in suffixes)
         hint = near(column, [*taken, *plain]) or near(column.rpartition("_")[2], suffixes)
@@ -40,4 +40,4 @@ def recorded_columns(
             column,
             f"the unit of {quoted(column)} is not known; {hint}end the name of a recorded column in {ends}",
         )
-    return kept
+    return columns

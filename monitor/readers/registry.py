@@ -45,13 +45,13 @@ def read_campaign(folder: Path) -> Campaign | CurveCampaign:
     except (ValueError, OSError):  # a NUL in the name, or a name longer than the system allows
         is_folder = False
     if not is_folder:
-        told = "there is no such folder; give a folder with campaign.toml, runs.csv and probings.csv"
+        message = "there is no such folder; give a folder with campaign.toml, runs.csv and probings.csv"
         if _exists(folder):
-            told = "this is a file; give the folder that holds campaign.toml, runs.csv and probings.csv"
-        raise CampaignError(str(folder), [Fault(str(folder), None, None, told)])
-    known = readers()
-    chosen = next((reader for reader in known if reader.recognises(folder)), known[-1])
-    return chosen.read(folder)
+            message = "this is a file; give the folder that holds campaign.toml, runs.csv and probings.csv"
+        raise CampaignError(str(folder), [Fault(str(folder), None, None, message)])
+    formats = readers()
+    reader = next((reader for reader in formats if reader.recognises(folder)), formats[-1])
+    return reader.read(folder)
 
 
 @cache
@@ -69,22 +69,22 @@ def method_rules() -> dict[str, MethodRules]:
 
 def _built_in(room: str, attribute: str, kind: type[T]) -> Iterator[T]:
     package = importlib.import_module(f"monitor.readers.{room}")
-    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda found: found.name):
-        found = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), attribute)
-        assert isinstance(found, kind), f"{module.name}.{attribute} must be a {kind.__name__}"
-        yield found
+    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda module: module.name):
+        entry = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), attribute)
+        assert isinstance(entry, kind), f"{module.name}.{attribute} must be a {kind.__name__}"
+        yield entry
 
 
 def _plugged_in(kind: type[T]) -> Iterator[T]:
     for point in entry_points(group=GROUP):
         try:
-            found = point.load()
+            entry = point.load()
         except Exception as error:
             raise InputError(f"the plug-in {point.name} ({point.value}) cannot be loaded: {error}") from error
-        if not isinstance(found, Reader | MethodRules):
+        if not isinstance(entry, Reader | MethodRules):
             raise InputError(f"the plug-in {point.name} ({point.value}) must be a Reader or a MethodRules")
-        if isinstance(found, kind):
-            yield found
+        if isinstance(entry, kind):
+            yield entry
 
 
 def _exists(path: Path) -> bool:

@@ -18,7 +18,7 @@ def lines_of_keys(text: str) -> dict[Path, int]:
     A path is the keys from the top; an element of an array of tables is its index from 0. Keys inside an
     inline table have no entry: ``line_of`` falls back to the table's own line.
     """
-    found: dict[Path, int] = {}
+    lines: dict[Path, int] = {}
     arrays: dict[Path, int] = {}
     table: Path = ()
     for number, line in enumerate(text.split("\n"), start=1):
@@ -31,13 +31,13 @@ def lines_of_keys(text: str) -> dict[Path, int]:
             if match[1] == "[[":
                 arrays[table] = arrays.get(table, -1) + 1
             table = _entered(table, arrays)
-            found.setdefault(table, number)
+            lines.setdefault(table, number)
         elif match := KEY.match(line):
             path = table
             for part in _parts(match[1]):
                 path = (*path, part)
-                found.setdefault(path, number)
-    return found
+                lines.setdefault(path, number)
+    return lines
 
 
 def line_of(path: Path, lines: dict[Path, int]) -> int | None:

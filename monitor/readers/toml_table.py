@@ -31,16 +31,20 @@ class Table:
         self.data = data
         self.path = path
         self._lines = lines
-        self._known: list[str] = []
+        self._asked_for: list[str] = []
 
     def fault(self, key: str | None, message: str) -> None:
         """Note a fault of a key, or of the table itself."""
         path = self.path if key is None else (*self.path, key)
         self.faults.add(self.file, line_of(path, self._lines), name_of(path) or None, message)
 
+    def section(self, key: str) -> Table:
+        """Return an empty table in the place of one that was read already: for faults of its keys."""
+        return Table(self.file, self.faults, {}, self._lines, (*self.path, key))
+
     def raw(self, key: str, *, required: bool, example: str) -> Any:
         """The value as TOML has it, or None."""
-        self._known.append(key)
+        self._asked_for.append(key)
         if key not in self.data and required:
             self.fault(key, f"this key is missing; write for example {key} = {example}")
         return self.data.get(key)
@@ -86,9 +90,9 @@ class Table:
         if not isinstance(value, list) or len(value) != count:
             self.fault(key, f"{quoted(value)} is not {count} numbers; write for example {key} = {example}")
             return None
-        found = [self._number(key, item, False, largest, unit, example) for item in value]
-        kept = tuple(item for item in found if item is not None)
-        return kept if len(kept) == count else None
+        parsed = [self._number(key, item, False, largest, unit, example) for item in value]
+        sound = tuple(number for number in parsed if number is not None)
+        return sound if len(sound) == count else None
 
     def sign(self, key: str) -> int | None:
         """+1 or -1, where the key is there."""
@@ -100,7 +104,7 @@ class Table:
 
     def table(self, key: str, *, required: bool = False) -> Table | None:
         """The table under a key."""
-        self._known.append(key)
+        self._asked_for.append(key)
         value = self.data.get(key)
         inner = (*self.path, key)
         if value is None:
@@ -114,23 +118,23 @@ class Table:
 
     def tables(self, key: str) -> list[Table]:
         """The tables of an array of tables; none where the key is absent."""
-        self._known.append(key)
+        self._asked_for.append(key)
         value = self.data.get(key, [])
         inner = (*self.path, key)
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             self.fault(key, f"this is not a list of tables; write [[{name_of(inner)}]] above each of them")
             return []
         return [
-            Table(self.file, self.faults, item, self._lines, (*inner, place))
-            for place, item in enumerate(value)
+            Table(self.file, self.faults, item, self._lines, (*inner, index))
+            for index, item in enumerate(value)
         ]
 
     def finish(self) -> None:
         """Refuse every key that was not asked for."""
         for key in self.data:
-            if key not in self._known:
-                hint = near(key, self._known)
-                self.fault(key, f"this key is not known; {hint}the keys here are {one_of(self._known)}")
+            if key not in self._asked_for:
+                hint = near(key, self._asked_for)
+                self.fault(key, f"this key is not known; {hint}the keys here are {one_of(self._asked_for)}")
 
     def _number(
         self, key: str, value: Any, positive: bool, largest: float | None, unit: str, example: str
@@ -163,10 +167,10 @@ def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
         message = str(error)
         match = PLACE.search(message)
         line = int(match[1]) if match and match[1] else text.count("\n") + 1 if match else None
-        told = message[: match.start()] if match else message
-        told = told if told.isprintable() else told.encode("ascii", "backslashreplace").decode()
+        reason = message[: match.start()] if match else message
+        reason = reason if reason.isprintable() else reason.encode("ascii", "backslashreplace").decode()
         where = f" at character {match[2]}" if match and match[2] else ""
-        faults.add(file, line, None, f"this is not TOML{where}: {told[:200]}")
+        faults.add(file, line, None, f"this is not TOML{where}: {reason[:200]}")
     else:
         return Table(file, faults, data, lines_of_keys(text))
     return None
