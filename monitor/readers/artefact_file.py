@@ -18,7 +18,7 @@ LARGEST_REFERENCE_DEGC = 200.0
 
 
 def read_probe(top: Table) -> Probe | None:
-    """The ``[probe]`` table."""
+    """Read the ``[probe]`` table."""
     table = top.table("probe", required=True)
     if table is None:
         return None
@@ -42,7 +42,7 @@ def read_probe(top: Table) -> Probe | None:
 
 
 def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:
-    """The ``[artefact]`` table and the ids of its balls; without one, an artefact of no balls.
+    """Read the ``[artefact]`` table and the ids of its balls; without one, an artefact of no balls.
 
     The artefact is None if anything in it is wrong, the ids are None if anything of a ball is.
     """

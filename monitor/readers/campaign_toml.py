@@ -1,4 +1,4 @@
-"""``campaign.toml`` from the records of a campaign."""
+"""Writes ``campaign.toml`` from the records of a campaign."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from monitor.units import MICROMETRE, MICRORADIAN
 
 
 def campaign_toml(campaign: Campaign) -> str:
-    """The text of the file; keys that the records leave open are left out."""
+    """Return the text of the file, without the keys that the records leave open."""
     lines = [
         "format = 1",
         f"campaign = {_text(campaign.name)}",

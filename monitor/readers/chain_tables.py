@@ -1,4 +1,4 @@
-"""Axes that ``campaign.toml`` names and places freely: ``[[machine.work_chain]]`` and ``[[machine.tool_chain]]``."""
+"""Axes that ``campaign.toml`` positions freely: ``[[machine.work_chain]]`` and ``[[machine.tool_chain]]``."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ UP = "write X, Y, Z or a unit vector such as [0.0, 0.7071, 0.7071]"
 
 
 def read_chain(machine: Table) -> tuple[ChainAxis, ...] | None:
-    """The axes of both branches, bed outwards, the work branch first; empty where there is no such table.
+    """Read the axes of both branches, bed outwards, the work branch first; empty where there is no such table.
 
     None if anything in them is wrong; the faults are noted.
     """
@@ -104,7 +104,7 @@ def _direction(table: Table, kind: Kind | None) -> Vector | None:
 
 
 def unit_vector(table: Table, key: str) -> Vector | None:
-    """The unit vector under a key, its length made 1 to the last bit where it was typed with a few decimals."""
+    """Read the unit vector under a key, its length made 1 to the last bit where it was typed with a few decimals."""
     if not isinstance(table.data.get(key), list) or len(table.data[key]) != 3:
         table.fault(key, f"{quoted(table.data.get(key))} is no direction; {UP}")
         return None

@@ -31,7 +31,7 @@ class CsvTable:
 
 
 def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
-    """RFC 4180 with one line a row. None where there is no header to go by; the faults are noted."""
+    """Parse RFC 4180 with one line a row. None where the header cannot be used; the faults are noted."""
     if text.count("\n") > MOST_LINES:
         faults.add(file, None, None, f"the file has more than {MOST_LINES} lines; split the campaign")
         return None
@@ -112,7 +112,7 @@ def _body(file: str, header: list[str], lines: list[str], faults: Faults) -> Csv
 
 
 def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:
-    """Every line after the header with its number. A quote has to close on its line."""
+    """Yield every line after the header with its number. A quote has to close on its line."""
     body = lines[1:]
     if not any('"' in line or "\r" in line[:-1] for line in body):
         yield from enumerate(csv.reader(body), start=2)

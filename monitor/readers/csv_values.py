@@ -42,7 +42,7 @@ class Wholes:
 
 
 def numbers(table: CsvTable, column: str, faults: Faults, *, may_be_empty: bool = False) -> Numbers:
-    """The column as finite numbers; empty cells are NaN where they are allowed."""
+    """Read the column as finite numbers; empty cells are NaN where they are allowed."""
     cells = table.columns[column]
     if set("\n".join(cells)) <= NUMBER_CHARACTERS:
         try:
@@ -61,7 +61,7 @@ def numbers(table: CsvTable, column: str, faults: Faults, *, may_be_empty: bool 
 
 
 def wholes(table: CsvTable, column: str, faults: Faults) -> Wholes:
-    """The column as whole numbers from 0."""
+    """Read the column as whole numbers from 0."""
     cells = table.columns[column]
     if cells and all(cells) and max(map(len, cells)) < 10 and set("\n".join(cells)) <= DIGITS:
         return Wholes(np.array(list(map(int, cells)), dtype=np.int64), np.ones(len(cells), dtype=np.bool_))
@@ -99,7 +99,7 @@ def _numbers_one_by_one(
 
 
 def what_is_wrong(cell: str) -> str | None:
-    """Why a cell is not a finite decimal number, and what to write; None if it is one."""
+    """Return why a cell is no finite decimal number, and what to write; None if it is one."""
     if not cell:
         return "the cell is empty; a number is needed"
     shown = quoted(cell)

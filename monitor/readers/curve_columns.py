@@ -140,14 +140,14 @@ def _refuse_empty(table: CsvTable, name: str, cells: Sequence[str], faults: Faul
 
 
 def _are_labels(cells: Sequence[str]) -> bool:
-    """Whether a column of whole numbers names things: few that come again and again."""
+    """Return whether a column of whole numbers names things: few different ones that repeat."""
     values = set(cells)
     whole = all(re.fullmatch(r"[0-9]+\.?", cell) for cell in values)
     return whole and 2 <= len(values) <= min(MOST_LABELS, len(cells) / ROWS_A_LABEL)
 
 
 def _are_words(cells: Sequence[str]) -> bool:
-    """Whether most cells are no numbers: one mistyped number does not make a column of words."""
+    """Return whether most cells are no numbers: one mistyped number does not make a column of words."""
     return sum(_is_number(cell) for cell in cells) < len(cells) / 2
 
 

@@ -15,7 +15,7 @@ LARGEST_URAD = 10_000.0
 
 
 def read_l_shape(artefact: Table) -> LShape | None:
-    """The table, or None where there is none or anything in it is wrong."""
+    """Read the table; None where there is none, or anything in it is wrong."""
     table = artefact.table("l_shape")
     if table is None:
         return None

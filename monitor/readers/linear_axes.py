@@ -1,4 +1,4 @@
-"""A file of what is left of the errors of a machine's linear axes, as standard uncertainties (TOML).
+"""Reads a file of the residual errors of a machine's linear axes, as standard uncertainties (TOML).
 
 For methods that take the linear axes as known: ``monitor uncertainty CAMPAIGN --linear-axes FILE``.
 """
@@ -22,7 +22,7 @@ PER_METRE = 1e-6
 
 
 def read_linear_axes(path: Path) -> LinearAxes:
-    """The file's standard uncertainties. Raises InputError with all its faults."""
+    """Read the standard uncertainties of a file. Raises InputError with all its faults."""
     faults = Faults([path.name])
     content = read_bytes(path.parent, path.name, LARGEST_TOML, faults)
     text = None if content is None else decode(path.name, content, faults)

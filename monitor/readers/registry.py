@@ -1,4 +1,4 @@
-"""The formats and the methods that are known, and the door to all of them.
+"""Registers the formats and the rules of the methods, and reads a campaign in any of the formats.
 
 Built-in formats and methods are the files of ``formats`` and ``methods``; a plug-in gives a ``Reader`` or a
 ``MethodRules`` through an entry point of the group ``monitor.readers``.
@@ -35,7 +35,7 @@ T = TypeVar("T", Reader, MethodRules)
 
 
 def read_campaign(folder: Path) -> Campaign | CurveCampaign:
-    """The campaign of a folder, in internal units.
+    """Read the campaign of a folder, in internal units.
 
     Raises CampaignError, with every fault of the folder, if anything in it is wrong.
     """
@@ -56,13 +56,13 @@ def read_campaign(folder: Path) -> Campaign | CurveCampaign:
 
 @cache
 def readers() -> tuple[Reader, ...]:
-    """All formats, plug-ins first, so that one can take a folder that the built-in would refuse."""
+    """Return all formats, plug-ins first, so that one can take a folder that the built-in would refuse."""
     return (*_plugged_in(Reader), *_built_in("formats", "READER", Reader))
 
 
 @cache
 def method_rules() -> dict[str, MethodRules]:
-    """The rules of every method, by its name."""
+    """Return the rules of every method, by its name."""
     rules = (*_built_in("methods", "RULES", MethodRules), *_plugged_in(MethodRules))
     return {rule.name: rule for rule in rules}
 

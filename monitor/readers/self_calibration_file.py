@@ -17,7 +17,7 @@ MOST_NODES = 99
 
 
 def read_self_calibration(artefact: Table) -> SelfCalibration | None:
-    """The table, or None where there is none or anything in it is wrong."""
+    """Read the table; None where there is none, or anything in it is wrong."""
     table = artefact.table("self_calibration")
     if table is None:
         return None

@@ -1,4 +1,4 @@
-"""Where a key of a TOML file stands: the standard parser tells no lines, and a message must name one."""
+"""Finds the line of a key of a TOML file, which the standard parser does not report."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KEY = re.compile(rf"[ \t]*({DOTTED})[ \t]*=")
 
 
 def lines_of_keys(text: str) -> dict[Path, int]:
-    """Line (from 1) of every table header and of every key that begins a line.
+    """Return the line (from 1) of every table header and of every key that begins a line.
 
     A path is the keys from the top; an element of an array of tables is its index from 0. Keys inside an
     inline table have no entry: ``line_of`` falls back to the table's own line.
@@ -41,7 +41,7 @@ def lines_of_keys(text: str) -> dict[Path, int]:
 
 
 def line_of(path: Path, lines: dict[Path, int]) -> int | None:
-    """Line of a key, or of the closest table around it; None at the top of the file."""
+    """Return the line of a key, or of the closest table around it; None at the top of the file."""
     while path:
         if path in lines:
             return lines[path]

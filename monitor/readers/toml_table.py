@@ -43,14 +43,14 @@ class Table:
         return Table(self.file, self.faults, {}, self._lines, (*self.path, key))
 
     def raw(self, key: str, *, required: bool, example: str) -> Any:
-        """The value as TOML has it, or None."""
+        """Return the value as TOML has it, or None."""
         self._asked_for.append(key)
         if key not in self.data and required:
             self.fault(key, f"this key is missing; write for example {key} = {example}")
         return self.data.get(key)
 
     def text(self, key: str, *, required: bool = False, example: str = '"..."') -> str | None:
-        """A text of one line."""
+        """Return a text of one line."""
         value = self.raw(key, required=required, example=example)
         if value is None:
             return None
@@ -76,14 +76,14 @@ class Table:
         unit: str,
         example: str,
     ) -> float | None:
-        """A finite number, positive and at most ``largest`` where that is asked for."""
+        """Return a finite number, positive and at most ``largest`` where that is asked for."""
         value = self.raw(key, required=required, example=example)
         return None if value is None else self._number(key, value, positive, largest, unit, example)
 
     def numbers(
         self, key: str, count: int, *, required: bool = False, largest: float, unit: str, example: str
     ) -> tuple[float, ...] | None:
-        """Exactly ``count`` finite numbers."""
+        """Return exactly ``count`` finite numbers."""
         value = self.raw(key, required=required, example=example)
         if value is None:
             return None
@@ -95,7 +95,7 @@ class Table:
         return sound if len(sound) == count else None
 
     def sign(self, key: str) -> int | None:
-        """+1 or -1, where the key is there."""
+        """Return +1 or -1; None where the key is absent."""
         value = self.raw(key, required=False, example="1")
         if value is not None and (type(value) is not int or value not in (1, -1)):
             self.fault(key, f"{quoted(value)} is not a sign; write {key} = 1 or {key} = -1")
@@ -103,7 +103,7 @@ class Table:
         return value
 
     def table(self, key: str, *, required: bool = False) -> Table | None:
-        """The table under a key."""
+        """Return the table under a key."""
         self._asked_for.append(key)
         value = self.data.get(key)
         inner = (*self.path, key)
@@ -117,7 +117,7 @@ class Table:
         return Table(self.file, self.faults, value, self._lines, inner)
 
     def tables(self, key: str) -> list[Table]:
-        """The tables of an array of tables; none where the key is absent."""
+        """Return the tables of an array of tables; none where the key is absent."""
         self._asked_for.append(key)
         value = self.data.get(key, [])
         inner = (*self.path, key)
@@ -158,7 +158,7 @@ class Table:
 
 
 def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
-    """The top table, or None with the syntax error noted."""
+    """Parse a file; None with the syntax error noted."""
     try:
         data = tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
@@ -177,7 +177,7 @@ def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
 
 
 def name_of(path: Iterable[str | int]) -> str:
-    """A path as it is written in a message; elements of an array of tables count from 1 as people do."""
+    """Return a path as a message has it; elements of an array of tables count from 1."""
     name = ""
     for part in path:
         if isinstance(part, int):

@@ -1,4 +1,4 @@
-"""A campaign as a folder of format 1, such that reading it gives the same numbers to the last bit."""
+"""Writes a campaign as a folder of format 1, so that reading it gives the same numbers to the last bit."""
 
 from __future__ import annotations
 
