@@ -11,7 +11,7 @@ _FILE = "campaign.toml"
 
 
 def names_in(folder: Path) -> tuple[str | None, str | None]:
-    """Return the names of campaign and machine in the folder's ``campaign.toml``; None where it cannot be read that far."""
+    """Return the names of campaign and machine in ``campaign.toml``; None where it cannot be read that far."""
     try:
         path = folder / _FILE
         if not path.is_file() or path.stat().st_size > LARGEST_TOML:
