@@ -13,7 +13,7 @@ from monitor.effects.curve import SEQUENCE
 from monitor.methods.curve.method import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.reporting.figures.curve import Residuals, residuals_figure
-from monitor.reporting.figures.models import error_falling
+from monitor.reporting.figures.models import ErrorSteps, error_falling
 from monitor.reporting.figures.style import save
 from monitor.workflow.figure_files import make_folder
 
@@ -85,12 +85,14 @@ def curve_history_figure(steps: list[Document], folder: Path) -> list[str]:
     make_folder(folder)
     floor = steps[-1]["stated_uncertainty"] or steps[-1]["repeatability"]
     figure = error_falling(
-        [one["model"] if one["added"] is None else f"+ {one['added']}" for one in steps],
-        [one["rms"] for one in steps],
-        [np.nan if one["heldout_rms"] is None else one["heldout_rms"] for one in steps],
-        noise_um=0.0 if floor is None else floor,
-        noise_name="no repeats" if floor is None else "stated uncertainty or repeatability",
-        unit="" if steps[0]["unit"] == "1" else steps[0]["unit"],
+        ErrorSteps(
+            [one["model"] if one["added"] is None else f"+ {one['added']}" for one in steps],
+            [one["rms"] for one in steps],
+            [np.nan if one["heldout_rms"] is None else one["heldout_rms"] for one in steps],
+            0.0 if floor is None else floor,
+            "no repeats" if floor is None else "stated uncertainty or repeatability",
+            "" if steps[0]["unit"] == "1" else steps[0]["unit"],
+        ),
         title=f"{steps[-1]['model']} on {steps[-1]['campaign']}: "
         f"the error falls from {steps[0]['rms']:.4g} to {steps[-1]['rms']:.4g}",
     )

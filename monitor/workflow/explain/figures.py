@@ -11,8 +11,12 @@ from monitor.discovery import Explanation, Fit
 from monitor.effects import ChainEffect
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.figures.drivers import predicted_against_measured, residual_against_driver
-from monitor.reporting.figures.models import error_falling, ranked_effects
+from monitor.reporting.figures.drivers import (
+    DrivenResiduals,
+    predicted_against_measured,
+    residual_against_driver,
+)
+from monitor.reporting.figures.models import ErrorSteps, RankedEffects, error_falling, ranked_effects
 from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import Figure
 from monitor.reporting.numbers import round_result
@@ -53,8 +57,7 @@ def comparison_figures(document: Document, fit: Fit, folder: Path) -> list[str]:
     files += _over_workspace(fit, *in_machine_frame(fit), folder)
     for name, driver, axis, residuals_um in drivers_followed(fit):
         figure = residual_against_driver(
-            driver,
-            residuals_um,
+            DrivenResiduals(driver, residuals_um),
             title=f"Residual along {axis} against {name}",
             driver_name=name,
             residual_name=f"residual along {axis} / µm",
@@ -99,7 +102,9 @@ def _ranked(document: Document) -> Figure:
         notes += [_size(missing["amplitude"], missing["u"], missing["unit"])]
         notes += ["not ruled out"] * len(rivals)
     return ranked_effects(
-        names, peaks, groups, title=document["answer"], value_name="peak displacement / µm", notes=notes
+        RankedEffects(names, peaks, groups, notes),
+        title=document["answer"],
+        value_name="peak displacement / µm",
     )
 
 
@@ -112,13 +117,10 @@ def _failing(explanation: Explanation, effect: str, folder: Path) -> list[str]:
     against = against_effect(explanation, effect)
     if against is not None:
         figure = residual_against_driver(
-            against.at,
-            against.before,
+            DrivenResiduals(against.at, against.before, against.groups, after_um=against.after),
             title=f"{effect} is missing: the residual along {against.along} follows it",
             driver_name=against.driver,
             residual_name=f"residual along {against.along} / µm",
-            group=against.groups,
-            after_um=against.after,
         )
         files += save_figure(figure, folder, "missing-effect-before-after")
     return files
@@ -140,14 +142,14 @@ def _falling(document: Document) -> Figure:
     missing = document["missing"]
     rms = [missing[0]["rms_before_um"], *(effect["rms_after_um"] for effect in missing)]
     held_out = [missing[0]["heldout_before_um"], *(effect["heldout_after_um"] for effect in missing)]
-    return error_falling(
+    steps = ErrorSteps(
         ["as it is", *(f"+ {effect['effect']}" for effect in missing)],
         rms,
         _not_a_number_for_none(held_out),
-        noise_um=document["stated_uncertainty_um"],
-        noise_name=NOISE_NAME,
-        title=f"The error falls from {rms[0]:.2f} to {rms[-1]:.2f} µm",
+        document["stated_uncertainty_um"],
+        NOISE_NAME,
     )
+    return error_falling(steps, title=f"The error falls from {rms[0]:.2f} to {rms[-1]:.2f} µm")
 
 
 def _predicted(explanation: Explanation, text: str) -> tuple[Array, Array] | None:
@@ -171,11 +173,13 @@ def history_figure(steps: list[Document], folder: Path) -> list[str]:
     make_folder(folder)
     first, last = steps[0], steps[-1]
     figure = error_falling(
-        [step["model"] if step["added"] is None else f"+ {step['added']}" for step in steps],
-        [step["rms_um"] for step in steps],
-        _not_a_number_for_none([step["heldout_rms_um"] for step in steps]),
-        noise_um=last["stated_uncertainty_um"],
-        noise_name=NOISE_NAME,
+        ErrorSteps(
+            [step["model"] if step["added"] is None else f"+ {step['added']}" for step in steps],
+            [step["rms_um"] for step in steps],
+            _not_a_number_for_none([step["heldout_rms_um"] for step in steps]),
+            last["stated_uncertainty_um"],
+            NOISE_NAME,
+        ),
         title=f"{last['model']} on {last['campaign']}: the error falls from {first['rms_um']:.2f} to "
         f"{last['rms_um']:.2f} µm",
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from monitor.reporting.figures.parameters import parameters_by_run
+from monitor.reporting.figures.parameters import ParametersOfRuns, parameters_by_run
 from monitor.store import StoredIdentification
 from monitor.workflow.figure_files import make_folder, save_figure
 
@@ -30,12 +30,14 @@ def statistics_figure(
     moved = [name for name in names if q[name] is not None and q[name] < RATE]
     finding = f"differ between days: {', '.join(moved)}" if moved else "no parameter differs between days"
     figure = parameters_by_run(
-        [run.run for run in identification.runs],
-        [days[run.run] for run in identification.runs],
-        names,
-        [identification.units[index].name for index in indices],
-        estimate,
-        2.0 * u,
+        ParametersOfRuns(
+            [run.run for run in identification.runs],
+            [days[run.run] for run in identification.runs],
+            names,
+            [identification.units[index].name for index in indices],
+            estimate,
+            2.0 * u,
+        ),
         title=f"{document['campaign']}: {finding}",
         interval="± 2 standard uncertainties of the run",
         highlight=moved,
