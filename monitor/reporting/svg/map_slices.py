@@ -97,7 +97,7 @@ def _nodes(values: Array) -> Nodes:
 
 
 def map_drawing(slices: Sequence[Slice], *, title: str, scale_words: str, sign: str = ".") -> Drawing:
-    """Draw the slices side by side with the scale of their greys, named ``scale_words``; ``title`` names the picture."""
+    """Draw the slices side by side with the scale of their greys, which ``scale_words`` names."""
     frames = [_frame(part, 104.0 + index * (_SIDE + 112.0)) for index, part in enumerate(slices)]
     most = max(frame.high for frame in frames)
     on = Drawing(PAGE_WIDTH_MM, (_TOP + most + _BELOW) / SCALE, title)
