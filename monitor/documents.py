@@ -4,7 +4,8 @@ Every field is written under its name. A date is written in ISO 8601, an array a
 and a number that is not finite as null, because JSON has none. ``from_document`` reads the types of the fields, so that
 the same record is restored to the last bit of every number. Three marks of a field change how it is written: ``named``
 gives it a key that is no Python name, ``OMITTED`` leaves it out where it is None, and ``INLINED`` writes the fields of
-a record into the document of its owner.
+a record into the document of its owner. Of several kinds of record that may be inlined, the first is restored whose
+keys the document has: name the one with most keys first.
 """
 
 from __future__ import annotations
@@ -28,8 +29,10 @@ Record = TypeVar("Record")
 
 #: Metadata of a field that is left out of the document where it is None: ``field(default=None, metadata=OMITTED)``.
 OMITTED: Mapping[str, Any] = {"omitted": True}
-#: Metadata of a field whose record is written field by field into the document of its owner.
+#: Metadata of a field whose record, or mapping, is written key by key into the document of its owner.
 INLINED: Mapping[str, Any] = {"inlined": True}
+#: Metadata of a field whose datetime is in UTC without its zone, as the store has it: it is written with Z.
+IN_UTC: Mapping[str, Any] = {"utc": True}
 
 
 def named(key: str) -> Mapping[str, Any]:
@@ -84,7 +87,9 @@ def _plain_record(record: Any) -> dict[str, Any]:
         if value is None and (field.metadata.get("omitted") or field.metadata.get("inlined")):
             continue
         if field.metadata.get("inlined"):
-            document |= _plain_record(value)
+            document |= _plain(value)
+        elif field.metadata.get("utc") and value is not None:
+            document[_key(field)] = f"{value.isoformat()}Z"
         else:
             document[_key(field)] = _plain(value)
     return document
@@ -158,9 +163,13 @@ def _keys(kind: Any) -> tuple[set[str], set[str]]:
     allowed: set[str] = set()
     for field in dataclasses.fields(kind):
         if field.metadata.get("inlined"):
-            more_required, more_allowed = _keys(_record_kind(hints[field.name]))
-            allowed |= more_allowed
-            required |= more_required if field.default is dataclasses.MISSING else set()
+            members = [kind for kind in _record_kinds(hints[field.name]) if dataclasses.is_dataclass(kind)]
+            if not members:
+                continue
+            inlined = [_keys(member) for member in members]
+            allowed |= set().union(*(keys for _, keys in inlined))
+            if field.default is dataclasses.MISSING:
+                required |= set.intersection(*(keys for keys, _ in inlined))
             continue
         allowed.add(_key(field))
         if not field.metadata.get("omitted"):
@@ -168,9 +177,9 @@ def _keys(kind: Any) -> tuple[set[str], set[str]]:
     return required, allowed
 
 
-def _record_kind(hint: Any) -> Any:
-    """Return the dataclass of a hint that may also allow None."""
-    return next((member for member in typing.get_args(hint) if dataclasses.is_dataclass(member)), hint)
+def _record_kinds(hint: Any) -> list[Any]:
+    """Return the dataclasses of a hint, which may also allow None."""
+    return [member for member in typing.get_args(hint) if dataclasses.is_dataclass(member)] or [hint]
 
 
 def _fitting(kinds: list[Any], value: Mapping[str, Any], path: str) -> Any:
@@ -191,11 +200,18 @@ def _record(kind: Any, value: Mapping[str, Any], path: str) -> Any:
     missing = []
     for field in dataclasses.fields(kind):
         if field.metadata.get("inlined"):
-            inner = _record_kind(hints[field.name])
-            if field.default is dataclasses.MISSING or _keys(inner)[0] <= set(value):
-                arguments[field.name] = _record(inner, value, path)
+            if typing.get_origin(hints[field.name]) in (dict, Mapping):
+                rest = {key: element for key, element in value.items() if key not in _keys(kind)[1]}
+                arguments[field.name] = _typed(hints[field.name], rest, path)
+                continue
+            kinds = _record_kinds(hints[field.name])
+            inlined = next((member for member in kinds if _keys(member)[0] <= set(value)), None)
+            if inlined is not None or field.default is dataclasses.MISSING:
+                arguments[field.name] = _record(inlined or kinds[0], value, path)
         elif _key(field) in value:
-            arguments[field.name] = _typed(hints[field.name], value[_key(field)], f"{path}.{field.name}")
+            element = _typed(hints[field.name], value[_key(field)], f"{path}.{field.name}")
+            zoned = field.metadata.get("utc") and element is not None
+            arguments[field.name] = element.replace(tzinfo=None) if zoned else element
         elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
             missing.append(_key(field))
     if missing:

@@ -25,17 +25,20 @@ if "by_path" not in sys.modules:
     _spec.loader.exec_module(sys.modules["by_path"])
 
 
-def pytest_xdist_auto_num_workers() -> int:
-    """Return the number of workers of ``-n auto``: the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
+def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     parser.addoption(
         "--all-seeds",
         action="store_true",
         help="run only the tests of rates, over all their seeds (make trials)",
     )
+    pluginmanager.register(
+        sys.modules["by_path"].load("processor_time", Path(__file__).with_name("processor_time.py"))
+    )
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Return the number of workers of ``-n auto``: the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

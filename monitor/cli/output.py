@@ -11,6 +11,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import is_dataclass
 from typing import Any
 
 from rich.cells import cell_len
@@ -28,6 +29,8 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
+from monitor.documents import to_document
+
 # A table that goes to a file or a pipe is as wide as it needs: one line a row, whatever the window.
 PIPE_WIDTH = 10_000
 # Words longer than this may be broken over lines in a narrow window; numbers and names never are.
@@ -35,35 +38,45 @@ LONGEST_UNBROKEN = 24
 _MOMENT = re.compile(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d:\d\d)(?:\.\d+)?(Z?)")
 
 
-def document(found: Any) -> None:
-    """One JSON document on standard output, written only when all of it could be made."""
+def document(answer: object) -> None:
+    """Write an answer, or a sequence of answers, as one JSON document on standard output, complete or not at all."""
     unicode = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
-    sys.stdout.write(json.dumps(found, ensure_ascii=not unicode, allow_nan=False, indent=2) + "\n")
+    text = json.dumps(_plain(answer), ensure_ascii=not unicode, allow_nan=False, indent=2)
+    sys.stdout.write(text + "\n")
+
+
+def _plain(answer: object) -> Any:
+    """Return an answer as JSON has it."""
+    if isinstance(answer, (list, tuple)):
+        return [_plain(element) for element in answer]
+    return to_document(answer) if is_dataclass(answer) else answer
 
 
 def say(text: str = "") -> None:
-    """A sentence, on one line: the terminal breaks it, and a path in it can be copied."""
+    """Print a sentence on one line: the terminal breaks it, and a path in it can be copied."""
     print(text)
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, left: int = 1) -> None:
-    """A table; the first ``left`` columns hold words, the others numbers. Colour only on a terminal."""
+def table(
+    title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, text_columns: int = 1
+) -> None:
+    """Print a table; the first ``text_columns`` columns hold text, the others numbers. Colour only on a terminal."""
     if title:
         say(title)
-    made = Table(box=None, pad_edge=False, header_style="bold")
-    for place, name in enumerate(columns):
-        longest = max(cell_len(text) for text in (name, *(row[place] for row in rows)))
-        words = place < left
-        whole = not words or longest <= LONGEST_UNBROKEN
-        made.add_column(
+    rich_table = Table(box=None, pad_edge=False, header_style="bold")
+    for index, name in enumerate(columns):
+        longest = max(cell_len(text) for text in (name, *(row[index] for row in rows)))
+        is_text = index < text_columns
+        whole = not is_text or longest <= LONGEST_UNBROKEN
+        rich_table.add_column(
             Text(name),
-            justify="left" if words else "right",
+            justify="left" if is_text else "right",
             overflow="fold",
             no_wrap=whole,
             min_width=longest if whole else None,
         )
     for row in rows:
-        made.add_row(*(Text(cell) for cell in row))
+        rich_table.add_row(*(Text(cell) for cell in row))
     terminal = sys.stdout.isatty()
     drawn = io.StringIO()
     console = Console(
@@ -75,13 +88,13 @@ def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], *, 
     )
     # Where the window is too narrow for the numbers the terminal breaks the lines; no digit is dropped.
     unbounded = console.options.update(width=PIPE_WIDTH)
-    console.width = max(console.width, Measurement.get(console, unbounded, made).minimum)
-    console.print(made)
+    console.width = max(console.width, Measurement.get(console, unbounded, rich_table).minimum)
+    console.print(rich_table)
     sys.stdout.write("".join(f"{line.rstrip()}\n" for line in drawn.getvalue().splitlines()))
 
 
 def rounded(value: float | None, u: float | None) -> str:
-    """A value to the place of the second digit of its uncertainty (GUM 7.2.6)."""
+    """Round a value to the place of the second digit of its uncertainty (GUM 7.2.6)."""
     if value is None:
         return "-"
     if u is None or not math.isfinite(u) or u <= 0.0:
@@ -90,35 +103,35 @@ def rounded(value: float | None, u: float | None) -> str:
 
 
 def places(u: float) -> int:
-    """Decimal places that show two digits of an uncertainty."""
+    """Return the decimal places that show two digits of an uncertainty."""
     return max(0, 1 - math.floor(math.log10(float(f"{u:.1e}"))))
 
 
 def two_digits(u: float | None) -> str:
-    """An uncertainty with two significant digits, 2.0 and 0.70 too (GUM 7.2.6)."""
+    """Write an uncertainty with two significant digits, 2.0 and 0.70 too (GUM 7.2.6)."""
     return rounded(u, u)
 
 
 def probability(p: float | None) -> str:
-    """A p-value as people read it."""
+    """Write a p-value as people read it."""
     if p is None:
         return "-"
     return "< 0.0001" if p < 1e-4 else f"{p:.4f}"
 
 
 def stated(symbol: str, p: float | None) -> str:
-    """A p-value in a sentence: ``p = 0.0312``, ``p < 0.0001``."""
-    found = probability(p)
-    return f"{symbol} {found}" if found.startswith("<") else f"{symbol} = {found}"
+    """Write a p-value in a sentence: ``p = 0.0312``, ``p < 0.0001``."""
+    text = probability(p)
+    return f"{symbol} {text}" if text.startswith("<") else f"{symbol} = {text}"
 
 
 def micrometres(value: float | None) -> str:
-    """A length in µm with two decimals."""
+    """Write a length in µm with two decimals."""
     return "-" if value is None else f"{value:.2f}"
 
 
 def flat(value: Any) -> str:
-    """A cell of a listing; moments to the second."""
+    """Write a cell of a listing; moments to the second."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -132,18 +145,19 @@ def flat(value: Any) -> str:
     return _MOMENT.sub(r"\1 \2\3", str(value))
 
 
-def listing(rows: Sequence[Mapping[str, Any]], empty: str, columns: Sequence[str] | None = None) -> None:
-    """Records as a table: all their columns, or those named."""
-    if not rows:
+def listing(records: Sequence[object], empty: str, columns: Sequence[str] | None = None) -> None:
+    """Print records as a table: all their columns, or those named; ``empty`` where there is no record."""
+    if not records:
         say(empty)
         return
+    rows = _plain(records)
     names = list(rows[0]) if columns is None else list(columns)
-    table("", names, [[flat(row[name]) for name in names] for row in rows], left=len(names))
+    table("", names, [[flat(row[name]) for name in names] for row in rows], text_columns=len(names))
 
 
 @contextmanager
-def working(words: str) -> Iterator[None]:
-    """A sign of life on a terminal for what takes longer than a second; nothing elsewhere."""
+def working(activity: str) -> Iterator[None]:
+    """Show a sign of life on a terminal for what takes longer than a second; nothing elsewhere."""
     if not sys.stderr.isatty():
         yield
         return
@@ -151,20 +165,22 @@ def working(words: str) -> Iterator[None]:
         SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(),
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
-        progress.add_task(words)
+        progress.add_task(activity)
         yield
 
 
 @contextmanager
-def stepping(words: str, total: int) -> Iterator[Callable[[str], None]]:
-    """A bar on a terminal for work of ``total`` pieces; call what it gives with a piece's name before each."""
+def stepping(activity: str, total: int) -> Iterator[Callable[[str], None]]:
+    """Show a bar on a terminal for work of ``total`` pieces; call what it yields with a piece's name before each."""
     if not sys.stderr.isatty():
         yield lambda name: None
         return
-    begun = itertools.count()
+    started = itertools.count()
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
-        task = progress.add_task(words, total=total)
-        yield lambda name: progress.update(task, description=f"{words} {escape(name)}", completed=next(begun))
+        task = progress.add_task(activity, total=total)
+        yield lambda name: progress.update(
+            task, description=f"{activity} {escape(name)}", completed=next(started)
+        )

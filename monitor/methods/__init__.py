@@ -1,28 +1,34 @@
-"""Calibration methods, one file each, and the least-squares solver that they share.
+"""Calibration methods, one folder each, what each of them can do, and the least-squares solver that they share.
 
-A method is a module with ``NAME``, ``problem_of(campaign, model)``, ``identify(campaign, model, solve)``, where
-``solve`` gives the problem's solution, and ``advice``, what to do about parameters that a plan cannot separate; another
-one is another file, listed here.
+``methods()`` has all of them, ``campaign_method(campaign)`` is the one that a campaign was measured by. What several
+methods share is in ``chain`` (any machine); a new method is a new folder, found by looking through this package.
 """
 
-from __future__ import annotations
+from monitor.methods.method import (
+    Able,
+    AnglePlan,
+    ChainMethod,
+    CurveMethod,
+    Method,
+    Rehearsal,
+    Stepwise,
+    TouchPlan,
+    Unable,
+)
+from monitor.methods.registry import campaign_method, method_named, methods, require
 
-from types import ModuleType
-
-from monitor.exceptions import DataError
-from monitor.methods.free_form import method as free_form
-from monitor.methods.l_shape import method as l_shape
-from monitor.methods.rotary_probing import method as rotary_probing
-from monitor.methods.samba import method as samba
-from monitor.methods.tracker import method as tracker
-
-METHODS: dict[str, ModuleType] = {
-    module.NAME: module for module in (samba, rotary_probing, free_form, tracker, l_shape)
-}
-
-
-def method_named(name: str) -> ModuleType:
-    """The method of a campaign; DataError lists those that can be identified."""
-    if name not in METHODS:
-        raise DataError(f"method '{name}' cannot be identified yet; these can: {', '.join(METHODS)}")
-    return METHODS[name]
+__all__ = [
+    "Able",
+    "AnglePlan",
+    "ChainMethod",
+    "CurveMethod",
+    "Method",
+    "Rehearsal",
+    "Stepwise",
+    "TouchPlan",
+    "Unable",
+    "campaign_method",
+    "method_named",
+    "methods",
+    "require",
+]

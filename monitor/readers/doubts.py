@@ -7,11 +7,12 @@ have, and the angles at which people index. What a fit has to see is told by `id
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
 
+from monitor.readers.registry import method_rules
 from monitor.records import Array, Campaign
 from monitor.units import DEGREE, MICROMETRE
 
@@ -45,8 +46,8 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
     """Sentences on what to look at, each with the numbers that it rests on; empty for most campaigns."""
     return tuple(
         sentence
-        for found in (_short_runs, _travel, _angles, _places, _statements)
-        for sentence in found(campaign)
+        for check in (_short_runs, _travel, _angles, _places, _statements)
+        for sentence in check(campaign)
     )
 
 
@@ -118,10 +119,11 @@ def _angles(campaign: Campaign) -> Iterator[str]:
 
 def _places(campaign: Campaign) -> Iterator[str]:
     """Distances between balls, or modules, at one pose against the declared ones: no rotary axis has a part in them."""
-    what, place = _declared(campaign)
-    if not place or not all(axis in campaign.probings.readings for axis in "XYZ"):
+    rules = method_rules().get(campaign.method)
+    declared = None if rules is None else rules.declared(campaign.artefact)
+    if declared is None or not all(axis in campaign.probings.readings for axis in "XYZ"):
         return
-    steps, nominal = _pairs(campaign, place)
+    steps, nominal = _pairs(campaign, declared.places)
     if not len(nominal):
         return
     off = _share_off(steps, nominal, np.ones(3))
@@ -129,7 +131,7 @@ def _places(campaign: Campaign) -> Iterator[str]:
         return
     ratio = float(np.median(np.linalg.norm(steps, axis=1) / nominal))
     head = (
-        f"the distances between {what} that were probed are {ratio:.3g} times the declared ones (median of "
+        f"the distances between {declared.noun} that were probed are {ratio:.3g} times the declared ones (median of "
         f"{len(nominal)})"
     )
     for factor, unit in FACTORS:
@@ -148,17 +150,7 @@ def _places(campaign: Campaign) -> Iterator[str]:
     )
 
 
-def _declared(campaign: Campaign) -> tuple[str, dict[str, Array]]:
-    """What stands at declared places, and where (3,) mm, up to a rigid motion; nothing for other methods."""
-    if campaign.method == "samba":
-        return "balls", {ball.id: np.array(ball.nominal) for ball in campaign.artefact.balls}
-    piece = campaign.artefact.l_shape
-    if campaign.method == "l-shape" and piece is not None:
-        return "modules", {module.id: np.array([*module.centre, 0.0]) for module in piece.modules}
-    return "", {}
-
-
-def _pairs(campaign: Campaign, place: dict[str, Array]) -> tuple[Array, Array]:
+def _pairs(campaign: Campaign, declared: Mapping[str, Array]) -> tuple[Array, Array]:
     """Steps (n, 3) of X, Y, Z between targets probed at one pose of one run, and their declared distances (n,)."""
     probings = campaign.probings
     rows = np.flatnonzero(probings.run == probings.run[0])
@@ -170,12 +162,12 @@ def _pairs(campaign: Campaign, place: dict[str, Array]) -> tuple[Array, Array]:
     if fixed:
         _, pose = np.unique(np.column_stack(fixed), axis=0, return_inverse=True)
     pose = pose.reshape(-1)
-    known = np.array([name in place for name in probings.target[rows].tolist()])
+    has_place = np.array([name in declared for name in probings.target[rows].tolist()])
     read = np.column_stack([probings.readings[axis][rows] for axis in "XYZ"])
-    at = np.array([place.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
+    at = np.array([declared.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
     first, second = np.triu_indices(len(rows), 1)
-    kept = known[first] & known[second] & (pose[first] == pose[second])
-    first, second = first[kept], second[kept]
+    at_one_pose = has_place[first] & has_place[second] & (pose[first] == pose[second])
+    first, second = first[at_one_pose], second[at_one_pose]
     nominal = np.linalg.norm(at[first] - at[second], axis=1)
     apart = nominal > 0.0
     return (read[first] - read[second])[apart], nominal[apart]
@@ -206,8 +198,8 @@ def _statements(campaign: Campaign) -> Iterator[str]:
             f"length of {bar.length:g} mm: are both in mm?"
         )
     if all(name in balls for name in bar.balls):
-        one, other = (np.array(balls[name].nominal) for name in bar.balls)
-        apart = float(np.linalg.norm(one - other))
+        first, second = (np.array(balls[name].nominal) for name in bar.balls)
+        apart = float(np.linalg.norm(first - second))
         if abs(apart - bar.length) > DISTANCE_TOLERANCE * bar.length:
             yield (
                 f"the scale bar is {bar.length:g} mm long, but its balls {' and '.join(bar.balls)} are declared "

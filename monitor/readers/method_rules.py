@@ -6,14 +6,14 @@ entry point of the group ``monitor.readers``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import Fault
-from monitor.records import Artefact, Probings
+from monitor.records import Array, Artefact, Probings
 from monitor.units import COLUMN_UNITS, CONDITION_SUFFIXES
 
 
@@ -33,6 +33,20 @@ class Plan:
     artefact: Artefact
 
 
+@dataclass(frozen=True)
+class DeclaredPlaces:
+    """Where the targets stand by their declaration, up to a rigid motion: ``noun`` in the plural is what they are,
+    ``places`` (3,) mm by name."""
+
+    noun: str
+    places: Mapping[str, Array]
+
+
+def nothing_declared(artefact: Artefact) -> DeclaredPlaces | None:
+    """No target has a declared place."""
+    return None
+
+
 def no_check(plan: Plan) -> Iterable[Fault]:
     """Nothing to ask of the plan."""
     return ()
@@ -45,7 +59,7 @@ class MethodRules:
     ``needs_...`` and ``targets_are_balls`` say what the artefact must hold, ``targets_are_reflectors`` that targets
     are the listed reflectors where any is listed; ``suffixes`` are the units that a recorded column may end in,
     ``plain_columns`` columns that are allowed besides, ``measured_columns`` those that must be there with a number in
-    every row; ``check`` judges the plan.
+    every row; ``check`` judges the plan; ``declared`` says where the targets stand by their declaration.
     """
 
     name: str
@@ -58,6 +72,7 @@ class MethodRules:
     plain_columns: tuple[str, ...] = ()
     measured_columns: tuple[str, ...] = ()
     check: Callable[[Plan], Iterable[Fault]] = no_check
+    declared: Callable[[Artefact], DeclaredPlaces | None] = nothing_declared
 
 
 #: Units of the channels of a method that measures nothing but positions.

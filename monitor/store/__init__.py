@@ -7,6 +7,7 @@ its unit. Only this room imports duckdb.
 
 from monitor.store.analyses import (
     StoredAnalysis,
+    analysis_text,
     check_analysis,
     latest_documents,
     list_analyses,
@@ -34,7 +35,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.events import NOTE, list_events, machine_events, record_event
+from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
@@ -46,7 +47,25 @@ from monitor.store.identifications import (
     save_identification,
 )
 from monitor.store.import_notes import campaign_notes, run_fingerprints
-from monitor.store.models import StoredModel, list_models, load_model, model_history, save_model
+from monitor.store.machine_runs import (
+    MachineDescription,
+    RecordedRun,
+    campaign_machines,
+    campaign_tolerances,
+    check_campaigns,
+    identified_runs,
+    machine_descriptions,
+    machine_runs,
+    probing_counts,
+)
+from monitor.store.models import (
+    StoredModel,
+    last_used_campaign,
+    list_models,
+    load_model,
+    model_history,
+    save_model,
+)
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
@@ -59,9 +78,13 @@ __all__ = [
     "Database",
     "FleetSums",
     "Imported",
+    "MachineDescription",
+    "MachineEvent",
     "MachineHistory",
+    "RecordedRun",
     "StoredAnalysis",
     "StoredCertificate",
+    "StoredEvent",
     "StoredIdentification",
     "StoredModel",
     "StoredRefusal",
@@ -69,9 +92,13 @@ __all__ = [
     "StoredSelection",
     "Verification",
     "Withdrawal",
+    "analysis_text",
+    "campaign_machines",
     "campaign_notes",
+    "campaign_tolerances",
     "certificate_numbers",
     "check_analysis",
+    "check_campaigns",
     "clear_refusals",
     "curve_names",
     "described_machines",
@@ -80,9 +107,11 @@ __all__ = [
     "find_selection",
     "fleet_sums",
     "identification_by_number",
+    "identified_runs",
     "import_campaign",
     "import_curve",
     "is_curve",
+    "last_used_campaign",
     "latest_documents",
     "latest_tolerances",
     "list_analyses",
@@ -103,10 +132,13 @@ __all__ = [
     "load_curve",
     "load_identification",
     "load_model",
+    "machine_descriptions",
     "machine_events",
     "machine_history",
+    "machine_runs",
     "mark_certificate",
     "model_history",
+    "probing_counts",
     "record_event",
     "record_refusal",
     "refusals",

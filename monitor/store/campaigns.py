@@ -17,7 +17,7 @@ from monitor.store import audit, probings, record_json
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.curves import METHOD as CURVE
-from monitor.store.curves import curve_by_number, curve_content, insert_curve, is_curve
+from monitor.store.curves import curve_by_number, curve_content, insert_curve, is_curve, is_curve_number
 from monitor.store.import_notes import keep_fingerprints, keep_notes, run_fingerprints
 
 
@@ -125,8 +125,7 @@ def load_campaign(db: Database, name: str) -> Campaign:
 
 def stored_content(db: Database, campaign_id: int) -> str:
     """The content hash of a campaign, withdrawn or not, computed anew from everything that is stored of it."""
-    ((method,),) = db.rows("SELECT method FROM imported_campaign WHERE campaign_id = ?", [campaign_id])
-    if method == CURVE:
+    if is_curve_number(db, campaign_id):
         return curve_content(curve_by_number(db, campaign_id))
     return _content(*_load(db, campaign_id))
 

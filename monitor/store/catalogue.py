@@ -81,9 +81,13 @@ def campaigns_of_machine(db: Database, machine: str) -> dict[int, tuple[str, str
 
 def check_machine(db: Database, machine: str) -> None:
     """Raise NotFoundError, listing what is there, for a machine that is not."""
-    # The campaigns first: nearly every machine has one, and an index finds them.
-    found = db.rows("SELECT campaign_id FROM imported_campaign WHERE machine = ?", [machine])
-    if not _counting(db, [number for (number,) in found]) and not _has_event(db, machine):
+    # The first campaign that counts suffices: looking for all of them reads the machine of every campaign of the fleet.
+    counts = db.rows(
+        "SELECT 1 FROM imported_campaign "
+        "WHERE machine = ? AND campaign_id NOT IN (SELECT campaign_id FROM withdrawn_campaign) LIMIT 1",
+        [machine],
+    )
+    if not counts and not _has_event(db, machine):
         raise _no_machine(db, machine)
 
 

@@ -10,24 +10,20 @@ is therefore computed with ``threads=1`` (or in numpy, in a fixed order).
 from __future__ import annotations
 
 import re
-import sys
 import threading
 import time
-import types
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
 import duckdb
+import pandas as pd
 
 from monitor.exceptions import StoreError
 from monitor.store import migrations
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Parameters = Sequence[Any] | Mapping[str, Any]
 
@@ -82,12 +78,12 @@ class Database:
 
     def execute(self, sql: str, parameters: Parameters = ()) -> None:
         """Run a statement. Values are always bound, never written into the text."""
-        with self._lock, _stopped_by_ctrl_c(), _bound_without_pandas():
+        with self._lock, _stopped_by_ctrl_c():
             self._connection.execute(sql, parameters)
 
     def rows(self, sql: str, parameters: Parameters = ()) -> list[tuple[Any, ...]]:
         """The rows of a query as tuples."""
-        with self._lock, _stopped_by_ctrl_c(), _bound_without_pandas():
+        with self._lock, _stopped_by_ctrl_c():
             return self._connection.execute(sql, parameters).fetchall()
 
     def frame(self, sql: str, parameters: Parameters = ()) -> pd.DataFrame:
@@ -97,7 +93,7 @@ class Database:
 
     def arrays(self, sql: str, parameters: Parameters = ()) -> dict[str, Any]:
         """The columns of a query as numpy arrays, masked where NULL."""
-        with self._lock, _stopped_by_ctrl_c(), _bound_without_pandas():
+        with self._lock, _stopped_by_ctrl_c():
             columns: dict[str, Any] = self._connection.execute(sql, parameters).fetchnumpy()
             return columns
 
@@ -106,9 +102,6 @@ class Database:
     ) -> None:
         """Run an INSERT that selects from ``incoming``, columns by name: 50 times as quick as row by row."""
         with self._lock, _stopped_by_ctrl_c():
-            # Takes a fifth of a second to load: what only reads does not wait for it.
-            import pandas as pd
-
             self._connection.register("incoming", pd.DataFrame(incoming))
             try:
                 self._connection.execute(sql, parameters)
@@ -201,23 +194,6 @@ def _stopped_by_ctrl_c() -> Iterator[None]:
         if str(fault) == "Query interrupted":
             raise KeyboardInterrupt from fault
         raise
-
-
-@contextmanager
-def _bound_without_pandas() -> Iterator[None]:
-    """DuckDB 1.5 asks pandas whether a bound value is one of its missing values, and loads it to ask.
-
-    Where it is not loaded there are no such values, and it can be done without. Only for the main thread: what another
-    one imports meanwhile would miss it.
-    """
-    if "pandas" in sys.modules or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    sys.modules["pandas"] = cast(types.ModuleType, None)
-    try:
-        yield
-    finally:
-        del sys.modules["pandas"]
 
 
 #: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:

@@ -19,8 +19,12 @@ METHOD = "curve"
 
 def is_curve(db: Database, name: str) -> bool:
     """Whether a campaign is a curve. Raises NotFoundError listing what is there."""
-    found = db.rows("SELECT method FROM campaign WHERE campaign_id = ?", [campaign_number(db, name)])
-    return bool(found[0][0] == METHOD)
+    return is_curve_number(db, campaign_number(db, name))
+
+
+def is_curve_number(db: Database, campaign_id: int) -> bool:
+    """Whether the campaign of that number in the tables, withdrawn or not, is a curve."""
+    return bool(db.rows("SELECT 1 FROM curve WHERE campaign_id = ?", [campaign_id]))
 
 
 def curve_names(db: Database) -> tuple[str, ...]:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta, timezone
+from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import cached_property
 from typing import Any
 
@@ -19,18 +19,18 @@ from monitor.records import Array
 from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
 from monitor.store.identified_values import IdentifiedValues, values_of
+from monitor.store.machine_runs import RecordedRun, runs_of_campaigns
 
-# The numbers of a machine's campaigns are read once and are constants of what follows, for which there are indices: a
-# joined table of numbers would be held against every row of the fleet.
+# The heads of identifications are long: first the numbers are chosen, then a key finds the heads of those.
 _IDENTIFICATIONS = """
-SELECT campaign_id, run_count, identification_id, parameters, units, display_factors
-FROM identification
-WHERE campaign_id IN ({marks}) AND (model = ? OR CAST(? AS VARCHAR) IS NULL AND model = method)
-  AND (CAST(? AS INTEGER) IS NULL OR model_version = ?)
+SELECT campaign_id, run_count, identification_id
+FROM identification JOIN (SELECT unnest(CAST($campaigns AS INTEGER[])) AS campaign_id) USING (campaign_id)
+WHERE (model = $model OR CAST($model AS VARCHAR) IS NULL AND model = method)
+  AND (CAST($version AS INTEGER) IS NULL OR model_version = $version)
 """
 
-_RUNS = """
-SELECT campaign_id, run, started_at, utc_offset_s, day, warm_up, conditions FROM run WHERE campaign_id IN ({marks})
+_HEADS = """
+SELECT identification_id, parameters, units, display_factors FROM identification WHERE identification_id IN ({marks})
 """
 
 _LATEST = """
@@ -59,13 +59,13 @@ GROUP BY ALL ORDER BY ALL
 
 @dataclass(frozen=True)
 class _Identified:
-    """The head of an identification."""
+    """The head of an identification: its number, of how many runs it is, and its parameters."""
 
     runs: int
     number: int
-    parameters: list[str]
-    units: list[str]
-    factors: list[float]
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    factors: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,23 @@ class MachineHistory:
         """Start of each run in seconds since 1970 (n,)."""
         return np.array([at.timestamp() for at in self.started_at])
 
+    def part(self, mask: npt.NDArray[np.bool_]) -> MachineHistory:
+        """The runs of a mask (n,), with all parameters, tolerances and campaigns."""
+        if mask.all():
+            return self
+        return replace(
+            self,
+            campaign=self.campaign[mask],
+            method=self.method[mask],
+            run=self.run[mask],
+            started_at=tuple(at for at, selected in zip(self.started_at, mask, strict=True) if selected),
+            day=self.day[mask],
+            warm_up=self.warm_up[mask],
+            values=self.values[mask],
+            u=self.u[mask],
+            conditions={name: values[mask] for name, values in self.conditions.items()},
+        )
+
 
 def machine_history(
     db: Database,
@@ -114,138 +131,122 @@ def machine_history(
 
     May hold no run. Raises NotFoundError for a machine that is not there.
     """
-    start = None if since is None else since.astimezone(UTC).replace(tzinfo=None)
     campaigns = campaigns_of_machine(db, machine)
-    chosen = _chosen(db, list(campaigns), model, version)
-    every = _of(db, _RUNS, list(campaigns))
-    counts = Counter(row[0] for row in every)
-    rows = _ordered(every, chosen, start)
-    place = {(row[0], row[2]): i for i, row in enumerate(rows)}
-    names, units, values, u = _values(db, chosen.values(), place, parameter)
-    run = np.array([row[2] for row in rows], dtype=np.int64)
-    latest = max(every, key=lambda row: (row[2], row[0]))[0] if every else max(campaigns, default=0)
+    identified = _identified(db, list(campaigns), model, version)
+    recorded = runs_of_campaigns(db, campaigns)
+    counts = Counter(run.campaign_id for run in recorded)
+    runs = [
+        run
+        for run in recorded
+        if run.campaign_id in identified and (since is None or run.started_at >= since)
+    ]
+    rows = {(identified[run.campaign_id].number, run.run): row for row, run in enumerate(runs)}
+    names, units, values, u = _values(db, identified.values(), rows, parameter)
+    latest = max(recorded, key=lambda run: (run.started_at, run.campaign_id), default=None)
     return MachineHistory(
         machine=machine,
         campaigns={number: name for number, (name, _) in campaigns.items()},
-        campaign=np.array([campaigns[row[1]][0] for row in rows], dtype=np.str_),
-        method=np.array([campaigns[row[1]][1] for row in rows], dtype=np.str_),
-        run=run,
-        started_at=tuple(
-            row[3].replace(tzinfo=UTC).astimezone(timezone(timedelta(seconds=row[4]))) for row in rows
-        ),
-        day=np.array([row[5] for row in rows], dtype=np.int64),
-        warm_up=np.array([row[6] for row in rows], dtype=np.bool_),
+        campaign=np.array([run.campaign for run in runs], dtype=np.str_),
+        method=np.array([run.method for run in runs], dtype=np.str_),
+        run=np.array([run.run for run in runs], dtype=np.int64),
+        started_at=tuple(run.started_at for run in runs),
+        day=np.array([run.day for run in runs], dtype=np.int64),
+        warm_up=np.array([run.warm_up for run in runs], dtype=np.bool_),
         parameters=names,
         units=units,
         values=values,
         u=u,
-        conditions=_conditions(
-            db, [row[7] for row in rows], {(row[1], row[2]): i for i, row in enumerate(rows)}
-        ),
-        tolerances={name: limit for (_, name), limit in _tolerances(db, "?", [latest]).items()},
+        conditions=_conditions(db, runs),
+        tolerances=_tolerances_of(db, max(campaigns, default=0) if latest is None else latest.campaign_id),
         unidentified=tuple(
             name
             for number, (name, _) in campaigns.items()
-            if counts[number] > (chosen[number].runs if number in chosen else 0)
+            if counts[number] > (identified[number].runs if number in identified else 0)
         ),
     )
 
 
-def _of(db: Database, sql: str, numbers: list[int]) -> list[tuple[Any, ...]]:
-    """The rows of a query with ``numbers`` among its marks."""
-    return db.rows(sql.format(marks=", ".join("?" * len(numbers))), numbers) if numbers else []
-
-
-def _chosen(
+def _identified(
     db: Database, campaigns: list[int], model: str | None, version: int | None
 ) -> dict[int, _Identified]:
     """Of each campaign the identification with the most runs, the later of two: what load_identification takes."""
     if not campaigns:
         return {}
-    sql = _IDENTIFICATIONS.format(marks=", ".join("?" * len(campaigns)))
-    found: dict[int, _Identified] = {}
-    for campaign, *row in db.rows(sql, [*campaigns, model, model, version, version]):
-        one = _Identified(*row)
-        if campaign not in found or (one.runs, one.number) > (found[campaign].runs, found[campaign].number):
-            found[campaign] = one
-    return found
+    selected: dict[int, tuple[int, int]] = {}
+    rows = db.rows(_IDENTIFICATIONS, {"campaigns": campaigns, "model": model, "version": version})
+    for campaign, run_count, number in rows:
+        selected[campaign] = max((run_count, number), selected.get(campaign, (0, 0)))
+    numbers = [number for _, number in selected.values()]
+    heads = {number: tuple(map(tuple, head)) for number, *head in _with_marks(db, _HEADS, numbers)}
+    return {
+        campaign: _Identified(run_count, number, *heads[number])
+        for campaign, (run_count, number) in selected.items()
+    }
 
 
-def _ordered(
-    every: list[tuple[Any, ...]], chosen: dict[int, _Identified], since: datetime | None
-) -> list[tuple[Any, ...]]:
-    """The runs with an identification, its number before them, in the order of time."""
-    rows = [
-        (chosen[row[0]].number, *row)
-        for row in every
-        if row[0] in chosen and (since is None or row[2] >= since)
-    ]
-    return sorted(rows, key=lambda row: (row[3], row[0], row[2]))
+def _with_marks(db: Database, sql: str, numbers: list[int]) -> list[tuple[Any, ...]]:
+    """The rows of a query with ``numbers`` among its marks: constants, for which a key is looked up."""
+    return db.rows(sql.format(marks=", ".join("?" * len(numbers))), numbers) if numbers else []
 
 
 def _values(
-    db: Database, chosen: Iterable[_Identified], place: dict[tuple[int, int], int], parameter: str | None
+    db: Database, identified: Iterable[_Identified], rows: dict[tuple[int, int], int], parameter: str | None
 ) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
-    """Names, units, values and u (n, p) of the parameters that any of the runs in ``place`` has."""
-    wanted = {number for number, _ in place}
-    heads = sorted((one for one in chosen if one.number in wanted), key=lambda one: one.number)
-    found = values_of(db, [one.number for one in heads]) if heads else {}
+    """Names, units, values and u (n, p) of the parameters that any run has; ``rows`` by identification and run."""
+    numbers = {number for number, _ in rows}
+    heads = sorted((head for head in identified if head.number in numbers), key=lambda head: head.number)
+    stored = values_of(db, [head.number for head in heads]) if heads else {}
     # Identifications under one version of a model have the same parameters: they are taken together.
     alike: dict[tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]], list[IdentifiedValues]] = {}
-    for one in heads:
-        head = (tuple(one.parameters), tuple(one.units), tuple(one.factors))
-        alike.setdefault(head, []).append(found[one.number])
-    units: dict[str, str] = {}
-    stacked = []
-    for head, parts in alike.items():
-        value = np.concatenate([part.value for part in parts]) / np.array(head[2])
-        own_u = np.concatenate([part.u for part in parts]) / np.array(head[2])
-        # A run before `since` has values, but no place.
-        rows = np.array(
-            [place.get((part.number, run), -1) for part in parts for run in part.runs.tolist()],
-            dtype=np.int64,
-        )
+    for head in heads:
+        alike.setdefault((head.parameters, head.units, head.factors), []).append(stored[head.number])
+    unit_of: dict[str, str] = {}
+    blocks = []
+    for (names, units, factors), parts in alike.items():
+        value = np.concatenate([part.value for part in parts]) / np.array(factors)
+        u = np.concatenate([part.u for part in parts]) / np.array(factors)
+        # A run before `since` has values, but no row.
+        row = np.array([rows.get((part.number, run), -1) for part in parts for run in part.runs.tolist()])
         # A parameter that was refused everywhere is none of the history.
-        known = np.isfinite(value).any(axis=0)
-        here = [i for i, name in enumerate(head[0]) if known[i] and parameter in (None, name)]
-        for i in here:
-            units.setdefault(head[0][i], head[1][i])
-        stacked.append((rows, [head[0][i] for i in here], value[:, here], own_u[:, here]))
-    names = tuple(sorted(units))
-    values = np.full((len(place), len(names)), np.nan)
-    u = np.full_like(values, np.nan)
-    for rows, own, value, own_u in stacked:
-        kept = rows >= 0
-        columns = np.array([names.index(name) for name in own], dtype=np.int64)
-        where = np.ix_(rows[kept], columns)
-        values[where] = value[kept]
-        u[where] = np.where(np.isnan(value[kept]), np.nan, own_u[kept])
-    return names, tuple(units[name] for name in names), values, u
+        estimated = np.isfinite(value).any(axis=0)
+        columns = [j for j, name in enumerate(names) if estimated[j] and parameter in (None, name)]
+        for j in columns:
+            unit_of.setdefault(names[j], units[j])
+        blocks.append((row, [names[j] for j in columns], value[:, columns], u[:, columns]))
+    every = tuple(sorted(unit_of))
+    values = np.full((len(rows), len(every)), np.nan)
+    uncertainties = np.full_like(values, np.nan)
+    for row, names_of_block, value, u in blocks:
+        recorded = row >= 0
+        target = np.ix_(
+            row[recorded], np.array([every.index(name) for name in names_of_block], dtype=np.int64)
+        )
+        values[target] = value[recorded]
+        uncertainties[target] = np.where(np.isnan(value[recorded]), np.nan, u[recorded])
+    return every, tuple(unit_of[name] for name in every), values, uncertainties
 
 
-def _conditions(
-    db: Database, recorded: list[dict[str, float]], place: dict[tuple[int, int], int]
-) -> dict[str, Array]:
-    """Conditions of the runs and means of their channels; ``place`` is where the run of a campaign is."""
-    found: dict[str, Array] = {}
-    for i, conditions in enumerate(recorded):
-        for name, value in conditions.items():
-            found.setdefault(name, np.full(len(place), np.nan))[i] = value
-    numbers = sorted({number for number, _ in place})
-    for campaign, run, channel, value in _of(db, _CHANNELS, numbers):
-        row = place.get((campaign, run))
-        if row is not None:
-            found.setdefault(channel, np.full(len(place), np.nan))[row] = value
-    return found
+def _conditions(db: Database, runs: list[RecordedRun]) -> dict[str, Array]:
+    """Conditions of the runs and means of their channels, each (n,)."""
+    conditions: dict[str, Array] = {}
+    for row, run in enumerate(runs):
+        for name, value in run.conditions.items():
+            conditions.setdefault(name, np.full(len(runs), np.nan))[row] = value
+    rows = {(run.campaign_id, run.run): row for row, run in enumerate(runs)}
+    for campaign, number, channel, value in _with_marks(
+        db, _CHANNELS, sorted({run.campaign_id for run in runs})
+    ):
+        if (campaign, number) in rows:
+            conditions.setdefault(channel, np.full(len(runs), np.nan))[rows[campaign, number]] = value
+    return conditions
 
 
 def latest_tolerances(db: Database) -> dict[tuple[str, str], float]:
     """Limits of the absolute value by machine and parameter, in display units, as each latest campaign states them."""
-    return _tolerances(db, f"SELECT campaign_id FROM ({_LATEST})", [])
+    rows = db.rows(_TOLERANCES.format(latest=f"SELECT campaign_id FROM ({_LATEST})"))
+    return {(machine, parameter): float(limit) for machine, parameter, limit in rows}
 
 
-def _tolerances(db: Database, latest: str, numbers: list[int]) -> dict[tuple[str, str], float]:
-    return {
-        (name, parameter): float(limit)
-        for name, parameter, limit in db.rows(_TOLERANCES.format(latest=latest), numbers)
-    }
+def _tolerances_of(db: Database, campaign: int) -> dict[str, float]:
+    rows = db.rows(_TOLERANCES.format(latest="?"), [campaign])
+    return {parameter: float(limit) for _, parameter, limit in rows}

@@ -111,6 +111,18 @@ def model_history(db: Database, name: str, version: int | None = None) -> tuple[
     return tuple(reversed(line))
 
 
+def last_used_campaign(db: Database, model: StoredModel) -> str | None:
+    """The campaign on which a version or an ancestor of it was last used; None where none was."""
+    line = {(version.name, version.version) for version in model_history(db, model.name, model.version)}
+    rows = db.rows(
+        "SELECT campaign, model, model_version FROM ("
+        "SELECT campaign, model, model_version, computed_at FROM v_analyses WHERE campaign IS NOT NULL "
+        "UNION ALL SELECT campaign, model, model_version, computed_at FROM v_identifications"
+        ") ORDER BY computed_at DESC"
+    )
+    return next((str(campaign) for campaign, name, version in rows if (name, version) in line), None)
+
+
 def list_models(db: Database) -> pd.DataFrame:
     """All models and versions: the table ``model``."""
     return db.frame("SELECT * FROM model ORDER BY model, version")

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
-from monitor.discovery.curve.candidates import catalogue as curve_catalogue
+from monitor.discovery.curve.catalogue import catalogue as curve_catalogue
 from monitor.documents import OMITTED
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
@@ -16,9 +16,9 @@ from monitor.effects.description import Description
 from monitor.effects.words import describe
 from monitor.exceptions import InputError
 from monitor.machine import parse_topology
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.curve.method import fit
+from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import CurveProblem, grid
 from monitor.methods.curve.problem import problem_of as curve_problem_of
 from monitor.readers import read_campaign
@@ -120,7 +120,7 @@ def _of_campaign(campaign: Campaign | CurveCampaign) -> EffectsAnswer:
     """
     if isinstance(campaign, CurveCampaign):
         return _of_curve(campaign)
-    problem = method_named(campaign.method).problem_of(campaign)
+    problem = campaign_method(campaign).problem_of(campaign)
     chain, drivers = problem.context.chain, drivers_of(problem.context)
     pitches = {
         name: axis.scale_pitch for name, axis in campaign.machine.axes.items() if axis.scale_pitch is not None

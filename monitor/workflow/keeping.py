@@ -1,18 +1,14 @@
-"""Keeping a database for years: events, audit, verification, backup, restore, export."""
+"""Keeping a database for years: audit, verification, backup, restore, export."""
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Literal
 
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError
 from monitor.store import (
     Database,
     export_tables,
-    list_events,
-    list_machines,
-    record_event,
     restore,
     take_backup,
     verify_audit,
@@ -20,25 +16,6 @@ from monitor.store import (
 from monitor.workflow.intake.campaigns import records
 
 Document = dict[str, Any]
-
-
-def record(db: Database, machine: str, at: datetime, kind: str, text: str) -> int:
-    """Record what happened to a machine. Raises InputError without words, NotFoundError."""
-    if not text.strip():
-        raise InputError("say in words what happened, for example 'B axis encoder changed'")
-    if at > datetime.now(UTC) + timedelta(hours=1):
-        raise InputError(
-            f"{at.isoformat()} lies in the future, and an event cannot be undone; give the time it had"
-        )
-    return record_event(db, machine, at, kind, text)
-
-
-def events(db: Database, machine: str | None = None) -> Document:
-    """What was recorded of a machine, or of all. Raises NotFoundError for an unknown machine."""
-    known = [str(name) for name in list_machines(db)["machine"]]
-    if machine is not None and machine not in known:
-        raise NotFoundError(f"there is no machine {machine!r}; there are {', '.join(known) or 'none yet'}")
-    return {"events": records(list_events(db, machine))}
 
 
 def verify(db: Database) -> Document:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 from monitor.store import (
@@ -89,7 +89,7 @@ def selected_readings(
     loaded = load_campaign(db, owner)
     own = problem
     if owner != campaign:
-        own = method_named(loaded.method).problem_of(loaded, as_model(model))
+        own = campaign_method(loaded).problem_of(loaded, as_model(model))
         if not _same_plan(own, problem):
             raise DataError(
                 f"--select {name}: its campaign {owner} followed another plan than {campaign}; a covariance of the "

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from monitor.methods import METHODS
-from monitor.methods.free_form import method as free_form
+from monitor.methods import methods
+from monitor.methods.free_form.method import METHOD as free_form
 from monitor.methods.model import Model
-from monitor.methods.rotary_probing import method as rotary_probing
-from monitor.methods.samba import method as samba
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
+from monitor.methods.samba.method import METHOD as samba
 from monitor.readers import read_campaign
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -30,7 +30,7 @@ def _examples() -> list[Path]:
 def test_every_example(benchmark: Any, folder: Path) -> None:
     """Every method is asked for less than a second a run."""
     campaign = read_campaign(folder)
-    found = benchmark(METHODS[campaign.method].identify, campaign)
+    found = benchmark(methods()[campaign.method].identify, campaign)
     assert len(found.runs) == len(campaign.runs)
 
 

@@ -27,9 +27,9 @@ from simulator import rotary_probing as touches
 from simulator.chain import read_topology
 
 from monitor.discovery import Explanation, explain
-from monitor.methods.free_form import method as free_form
-from monitor.methods.l_shape import method as l_shape
-from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.free_form.method import METHOD as free_form
+from monitor.methods.l_shape.method import METHOD as l_shape
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 
@@ -145,7 +145,7 @@ def arms(rng: np.random.Generator, runs: int) -> Campaign:
 
 def explained(campaign: Campaign) -> Explanation:
     """What the search says of a campaign under the method's base model."""
-    method = {one.NAME: one for one in (rotary_probing, free_form, l_shape)}[campaign.method]
+    method = {method.name: method for method in (rotary_probing, free_form, l_shape)}[campaign.method]
     return explain(campaign, method.problem_of(campaign), campaign.method, rng=np.random.default_rng(1))
 
 

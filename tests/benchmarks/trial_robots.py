@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from simulator import robot_campaign as robots
 
 from monitor.discovery import explain
-from monitor.methods.tracker import method as tracker
+from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
 
 OWN = dict(zip(("J1", "J2", "J3", "J4", "J5", "J6"), "CBBABA", strict=True))

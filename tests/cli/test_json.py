@@ -235,6 +235,8 @@ def test_trend(typed: Any, db: Path) -> None:
     "verb", [["plan", "five-days"], ["map", "five-days"], ["fleet"], ["select"], ["report"]], ids="-".join
 )
 def test_the_other_verbs_print_one_document(typed: Any, db: Path, verb: list[str]) -> None:
+    # The fleet is made of what was identified.
+    assert typed("identify", "five-days", db=db).status == 0
     answer = typed(*verb, "--json", db=db)
     assert (answer.status, answer.err) == (0, "")
     assert isinstance(answer.document, dict)

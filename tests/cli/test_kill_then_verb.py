@@ -29,10 +29,11 @@ import os, signal, sys
 from pathlib import Path
 from monitor.store import Database
 from monitor.workflow.intake.campaigns import import_folders
-from monitor.workflow.identify.identification import identify
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 db = Database(sys.argv[1])
 import_folders(db, [Path(sys.argv[2])])
-identify(db, Path(sys.argv[2]).name, None, None)
+identify(db, IdentifyRequest(Path(sys.argv[2]).name))
 os.kill(os.getpid(), signal.SIGKILL)
 """
 

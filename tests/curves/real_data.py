@@ -20,13 +20,20 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from nist import Series, series, write
 
+from monitor.discovery.curve.explain import explain_curve
+from monitor.documents import to_document
 from monitor.reporting.figures.style import png
 from monitor.statistics.means import anova
-from monitor.store import Database
-from monitor.workflow import models
-from monitor.workflow.explain import comparison, curves
+from monitor.store import Database, load_curve
+from monitor.workflow.explain.curve_answer import curve_explain_answer
 from monitor.workflow.explain.curve_figures import residual_figure
+from monitor.workflow.explain.request import HistoryRequest
+from monitor.workflow.explain.versions import history
+from monitor.workflow.identify.fitting import curve_problem
 from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.model.change import version_with
+from monitor.workflow.model.request import AddEffectRequest
+from monitor.workflow.models import label, resolve
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGE = DOCS / "real-data.md"
@@ -53,14 +60,15 @@ def tell(names: tuple[str, ...] | None = None) -> dict[str, Told]:
             if names is not None and name not in names:
                 continue
             import_folders(db, [write(one, Path(made) / name)])
-            explained, explanation = curves.explain(db, name)
             model = "curve"
-            for step, missing in enumerate(explained["missing"], start=1):
-                added = models.add(db, missing["effect"], model, f"{name}-{step}", campaign=name)
-                model = models.label(added)
-            history = comparison.history(db, model, name)
+            explanation = explain_curve(curve_problem(load_curve(db, name), resolve(db, model)))
+            answer = curve_explain_answer(explanation, model)
+            for step, missing in enumerate(answer.missing, start=1):
+                request = AddEffectRequest(missing.effect, model, f"{name}-{step}", campaign=name)
+                model = label(version_with(db, request))
+            versions = [to_document(version) for version in history(db, HistoryRequest(model, name)).steps]
             figure = residual_figure(explanation.first, explanation) if name in DRAWN else None
-            found[name] = Told(one, explained, history, figure)
+            found[name] = Told(one, to_document(answer), versions, figure)
     return found
 
 

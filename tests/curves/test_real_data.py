@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from monitor.methods.curve.method import fit
+from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import problem_of
 from monitor.methods.model import Model
 from monitor.readers import read_campaign

@@ -176,20 +176,22 @@ def test_an_added_effect_that_follows_a_driver_is_missing_no_more(virtual_campai
     assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
-def test_rates_over_forty_small_campaigns(virtual_campaigns, explained):
-    """Nothing hidden, four runs: at 2 % a campaign, five or more alarms in 40 are a chance of 1e-3."""
+def test_rates_over_forty_small_campaigns(virtual_campaigns, explained, seeds):
+    """Nothing hidden, four runs: at 2 % a campaign, five or more alarms in 40, three in ten are a chance of 1e-3."""
+    campaigns = seeds(40, 10)
     alarms = sum(
         bool(explained(virtual_campaigns.virtual(900 + seed, days=2, runs_per_day=2)[0]).missing)
-        for seed in range(40)
+        for seed in campaigns
     )
-    assert alarms <= 4
+    assert alarms <= {40: 4, 10: 2}[len(campaigns)]
 
 
-def test_the_amplitude_lies_in_its_interval_as_often_as_stated(virtual_campaigns, explained):
-    """40 campaigns of four runs: fewer than 33 inside their 95 % interval are a chance of 1e-3."""
+def test_the_amplitude_lies_in_its_interval_as_often_as_stated(virtual_campaigns, explained, seeds):
+    """40 campaigns of four runs: fewer than 33, of ten fewer than 7 inside their 95 % interval are a chance of 1e-3."""
     sim = simulator()
     inside = 0
-    for seed in range(40):
+    campaigns = seeds(40, 10)
+    for seed in campaigns:
         hidden = sim.Effect("EAX:poly1", peak_um=6.0)
         campaign, told = virtual_campaigns.virtual(700 + seed, [hidden], days=2, runs_per_day=2)
         found = explained(campaign).missing[0]
@@ -197,7 +199,7 @@ def test_the_amplitude_lies_in_its_interval_as_often_as_stated(virtual_campaigns
         inside += (
             abs(found.amplitude - float(np.atleast_1d(told["effects"][-1].coefficients)[0])) < 1.96 * found.u
         )
-    assert inside >= 33
+    assert inside >= {40: 33, 10: 7}[len(campaigns)]
 
 
 def test_every_effect_of_the_catalogue_has_words(virtual_campaigns):

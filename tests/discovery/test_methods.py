@@ -16,7 +16,7 @@ from by_path import load
 
 from monitor.discovery import Verdict
 from monitor.methods.chain.problem import solve_problem
-from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 
 TESTS = Path(__file__).resolve().parents[1]
 

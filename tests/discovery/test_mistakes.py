@@ -10,17 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.discovery import find_mistakes, fit, is_gross
+from monitor.discovery import Verdict, find_mistakes, fit, is_gross
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.variants import cycles_of_unknown_pitch, resolvable
 from monitor.exceptions import DataError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.readers import read_campaign
 from monitor.records import Campaign, Probings
 from monitor.store import Database, import_campaign
 from monitor.workflow.campaign_parts import only_run
-from monitor.workflow.explain.comparison import explain_campaign
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.request import ExplainRequest
 from monitor.workflow.models import as_model, resolve
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -36,7 +37,7 @@ def one_run(example: str) -> Campaign:
 def maker(campaign: Campaign) -> Callable[[Campaign], ChainProblem]:
     with Database(":memory:") as db:
         model = as_model(resolve(db, None, campaign.method))
-    return lambda one: method_named(campaign.method).problem_of(one, model)
+    return lambda one: campaign_method(campaign).problem_of(one, model)
 
 
 def recorded(example: str, change: Callable[[Probings], Probings]) -> Campaign:
@@ -51,7 +52,7 @@ def told(campaign: Campaign) -> list[str]:
         found = fit(problem_of(campaign))
     except DataError:
         found = None
-    assert found is None or is_gross(found)
+    assert found is None or is_gross(campaign, found)
     mistakes = find_mistakes(campaign, problem_of, found)
     for one in mistakes:
         assert one.rms_undone < 0.5 * one.rms_as_recorded
@@ -84,7 +85,7 @@ def exchanged(one: str, other: str, rows: slice) -> Callable[[Probings], Probing
 @pytest.mark.parametrize("example", ["five-days", "tracked-robot", "hidden-reversal-x", "tilting-table"])
 def test_no_example_is_gross(example: str) -> None:
     campaign = one_run(example)
-    assert not is_gross(fit(maker(campaign)(campaign)))
+    assert not is_gross(campaign, fit(maker(campaign)(campaign)))
 
 
 def test_exchanged_linear_columns_of_balls() -> None:
@@ -123,13 +124,14 @@ def test_explain_says_it_first_and_tells_nothing_else() -> None:
     campaign = recorded("tracked-robot", exchanged("F1", "F2", slice(0, 2)))
     with Database(":memory:") as db:
         import_campaign(db, campaign)
-        document, _ = explain_campaign(db, campaign.name)
-    assert document["answer"].startswith("It looks as if reflectors F1 and F2 were exchanged in 2 probings")
-    assert "mm as recorded" in document["answer"]
-    assert document["missing"] == document["suspect_data"] == document["changes"] == []
-    assert document["verdict"] == "something is missing"
-    (one,) = document["likely_mistakes"]
-    assert one["rms_undone_um"] < 100.0 < 2000.0 < one["rms_as_recorded_um"]
+        answer = explain(db, ExplainRequest(campaign.name))
+    assert answer.answer.startswith("It looks as if reflectors F1 and F2 were exchanged in 2 probings")
+    assert "mm as recorded" in answer.answer
+    assert answer.missing == answer.suspect_data == answer.changes == ()
+    assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING
+    assert answer.machine is not None
+    (mistake,) = answer.machine.likely_mistakes
+    assert mistake.rms_undone_um < 100.0 < 2000.0 < mistake.rms_as_recorded_um
 
 
 def test_explain_names_it_where_no_machine_fits() -> None:
@@ -137,7 +139,7 @@ def test_explain_names_it_where_no_machine_fits() -> None:
     with Database(":memory:") as db:
         import_campaign(db, campaign)
         with pytest.raises(DataError, match="It looks as if the columns x_mm and y_mm were exchanged"):
-            explain_campaign(db, campaign.name)
+            explain(db, ExplainRequest(campaign.name))
 
 
 def test_a_pitch_that_a_grid_of_places_cannot_tell_is_no_candidate() -> None:

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import DataError
-from monitor.methods.free_form import method as free_form
+from monitor.methods.free_form.method import METHOD as free_form
 
 
 def with_conditions(campaign, conditions):

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from monitor.methods.free_form import method as free_form
+from monitor.methods.free_form.method import METHOD as free_form
 from monitor.methods.free_form.plan import candidates_of
 
 K = 2.0  # the figures state k = 2
@@ -22,7 +22,7 @@ def expected(sim, made):
 
     def of(layout, *plans):
         _, campaign = made(layout, sim.CASE_1_ANGLES)
-        there = candidates_of(campaign, free_form.DEFAULT_MODEL, (15,))
+        there = candidates_of(campaign, free_form.own_model, (15,))
         return [there.expected(plan) for plan in plans]
 
     return of
@@ -90,7 +90,7 @@ def test_table_2_errors_of_the_table(sim, expected):
 
 def test_what_a_plan_promises_is_what_it_gives(sim, made):
     _, campaign = made(sim.cross_pocket(), sim.CASE_1_ANGLES)
-    (plan,) = [candidates_of(campaign, free_form.DEFAULT_MODEL, (15,)).expected(sim.CASE_1_ANGLES)]
+    (plan,) = [candidates_of(campaign, free_form.own_model, (15,)).expected(sim.CASE_1_ANGLES)]
     found = free_form.identify(campaign)
     u = dict(zip(found.parameters, np.sqrt(np.diag(found.runs[0].covariance)), strict=True))
     assert plan.nullity == 0
@@ -126,7 +126,7 @@ def test_monte_carlo_of_whole_identifications_agrees(sim, made):
 def test_the_best_next_angle_beats_all_others(sim, made):
     """The proposed angle against every other of the candidates, each as a plan of its own."""
     _, campaign = made(sim.cross_pocket(), sim.CASE_1_ANGLES)
-    there = candidates_of(campaign, free_form.DEFAULT_MODEL, range(0, 360, 30))
+    there = candidates_of(campaign, free_form.own_model, range(0, 360, 30))
     single, chosen = there.next_angles(1)
     means = {plan.angles[-1]: np.mean(plan.shape**2) for plan in single}
     assert chosen[0] == min(means, key=means.get)
@@ -136,7 +136,7 @@ def test_the_best_next_angle_beats_all_others(sim, made):
 
 def test_quarter_turns_leave_dimensions_unseen_and_the_next_angle_closes_them(sim, made):
     _, campaign = made(sim.cross_pocket(), (0.0, 90.0, 180.0, 270.0))
-    there = candidates_of(campaign, free_form.DEFAULT_MODEL, range(0, 360, 15))
+    there = candidates_of(campaign, free_form.own_model, range(0, 360, 15))
     assert there.expected(there.present).nullity > 0
     single, chosen = there.next_angles(1)
     assert single[0].nullity == 0

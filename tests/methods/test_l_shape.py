@@ -10,7 +10,8 @@ from scipy import stats
 
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import solve_problem
-from monitor.methods.l_shape.method import base_of, identify, problem_of
+from monitor.methods.l_shape.base import l_shape_base
+from monitor.methods.l_shape.method import METHOD, problem_of
 from monitor.methods.l_shape.stepwise import squareness, stepwise
 from monitor.methods.model import chain_of
 from monitor.readers import read_campaign
@@ -52,7 +53,7 @@ def test_eq_1_all_21_errors_are_recovered_exactly_without_noise(sim, campaign_of
     rng = np.random.default_rng(1)
     machine, piece, setups = sim.random_machine(rng), sim.straight_arms(), sim.random_setups(rng)
     campaign = campaign_of(machine, piece, setups, rng, noise_um=0.0)
-    found = identify(campaign)
+    found = METHOD.identify(campaign)
     (run,) = found.runs
     assert len(found.parameters) == 51
     assert run.refused == ()
@@ -77,7 +78,7 @@ def test_the_21_errors_lie_within_their_covariance_over_many_runs(sim, campaign_
     squares = []
     for _ in range(12):
         piece = sim.calibrated(sim.straight_arms(), rng, 0.1, 0.2)
-        found = identify(campaign_of(machine, piece, setups, rng, runs=2))
+        found = METHOD.identify(campaign_of(machine, piece, setups, rng, runs=2))
         for run in found.runs:
             off = run.estimate - _truth(machine, found.parameters)
             u = np.sqrt(np.diag(run.covariance))
@@ -152,7 +153,7 @@ def _between_straight_lines(machine, tip=(0.0, 0.0, -50.0)):
 
 def test_one_plane_alone_refuses_what_it_does_not_show_and_says_what_to_do(sim, campaign_of):
     rng = np.random.default_rng(4)
-    found = identify(
+    found = METHOD.identify(
         campaign_of(sim.paper_machine(), sim.straight_arms(), sim.random_setups(rng, ("XY",)), rng)
     )
     refused = {name for refusal in found.runs[0].refused for name in refusal.parameters}
@@ -207,7 +208,7 @@ def test_what_cannot_be_identified_is_refused_in_words(sim, campaign_of):
         problem_of(replace(campaign, machine=Machine("M", "w B b X Y Z t")))
     other = replace(campaign, machine=Machine("M", "w X b Y Z t"))
     problem = problem_of(other)
-    assert base_of(chain_of(other.machine))[:3] == ("EC0Y", "EA0Z", "EB0Z")
+    assert l_shape_base(chain_of(other.machine))[:3] == ("EC0Y", "EA0Z", "EB0Z")
     with pytest.raises(DataError, match="written for a machine 'w b X Y Z t'; use the fit of all at once"):
         stepwise(problem, solution, 1)
 
@@ -215,7 +216,7 @@ def test_what_cannot_be_identified_is_refused_in_words(sim, campaign_of):
 def test_too_few_modules_for_a_cubic_are_named(sim, campaign_of):
     rng = np.random.default_rng(7)
     campaign = campaign_of(sim.paper_machine(), sim.straight_arms(count=2), sim.random_setups(rng), rng)
-    found = identify(campaign)
+    found = METHOD.identify(campaign)
     refused = {name for refusal in found.runs[0].refused for name in refusal.parameters}
     assert "EAY:poly3" in refused
     assert any("scan 4 or more modules along every arm" in one.why for one in found.runs[0].refused)

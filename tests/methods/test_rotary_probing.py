@@ -17,11 +17,13 @@ from monitor.exceptions import DataError
 from monitor.machine import parse_topology
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.model import Model
-from monitor.methods.rotary_probing import method as rotary_probing
 from monitor.methods.rotary_probing.base import rotary_base
-from monitor.methods.rotary_probing.patterns import PARAMETERS, SYMBOLS, Touches, closed_forms
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 
 campaigns = load("rotary_campaigns", Path(__file__).with_name("rotary_campaigns.py"))
+reference = load("closed_forms", Path(__file__).with_name("closed_forms.py"))
+PARAMETERS, SYMBOLS, Touches = reference.PARAMETERS, reference.SYMBOLS, reference.Touches
+closed_forms = reference.closed_forms
 PAPER, TRUTH, location, touched = campaigns.PAPER, campaigns.TRUTH, campaigns.location, campaigns.touched
 
 
@@ -50,7 +52,7 @@ def as_touches(plan, seen) -> Touches:
     )
 
 
-def estimates(campaign, model=rotary_probing.DEFAULT_MODEL):
+def estimates(campaign, model=rotary_probing.own_model):
     found = rotary_probing.identify(campaign, model)
     return dict(zip(found.parameters, found.runs[0].estimate, strict=True)), found
 
@@ -129,7 +131,7 @@ def test_eqs_11_and_12_hold_away_from_x_0_only_with_their_terms_in_x(rp, chain_o
 def test_closed_forms_need_the_seven_poses(rp, chain_of, rng):
     plan = [(one, at) for one, at in rp.paper_plan() if at != {"A": -90.0, "C": 180.0}]
     seen = rp.touch(chain_of(PAPER), plan, {}, rng)
-    with pytest.raises(DataError, match=r"no touch at A = -90°, C = 180°: the closed forms need"):
+    with pytest.raises(ValueError, match=r"no touch at A = -90°, C = 180°: the closed forms need"):
         closed_forms(as_touches(plan, seen))
 
 

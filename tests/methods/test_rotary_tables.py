@@ -20,8 +20,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_path import load
 
-from monitor.methods.rotary_probing.patterns import PARAMETERS, SYMBOLS, Touches, closed_forms
+reference = load("closed_forms", Path(__file__).with_name("closed_forms.py"))
+PARAMETERS, SYMBOLS, Touches = reference.PARAMETERS, reference.SYMBOLS, reference.Touches
+closed_forms = reference.closed_forms
 
 TABLES = json.loads((Path(__file__).parents[1] / "references/papers/ibaraki2012.json").read_text())
 MDEG = np.pi / 180e3

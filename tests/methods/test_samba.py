@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from monitor.methods.samba import method as samba
+from monitor.methods.samba.method import METHOD as samba
 from monitor.readers import read_campaign
 from monitor.records import Array
 

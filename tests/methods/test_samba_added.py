@@ -12,7 +12,7 @@ from scipy import stats
 
 from monitor.exceptions import EffectError
 from monitor.methods.model import Model
-from monitor.methods.samba import method as samba
+from monitor.methods.samba.method import METHOD as samba
 from monitor.records import Array
 
 Distance = Callable[[Array, Array], float]

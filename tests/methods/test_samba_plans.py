@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.methods.samba import method as samba
+from monitor.methods.samba.method import METHOD as samba
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ from scipy import stats
 
 from monitor.machine import parse_topology
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.samba import method as samba
+from monitor.methods.samba.method import METHOD as samba
+from monitor.methods.samba.method import bar_length
 from monitor.records import Array, Campaign
 
 Distance = Callable[[Array, Array], float]
@@ -148,7 +149,7 @@ def test_the_bar_follows_its_temperature(simulated: Callable[..., Any]) -> None:
     warm = replace(bar, expansion_coefficient=10e-6, reference_temperature=20.0)
     campaign = replace(campaign, artefact=replace(campaign.artefact, scale_bar=warm))
     expected = [bar.length * (1 + 10e-6 * (run.conditions["ambient_degC"] - 20.0)) for run in campaign.runs]
-    np.testing.assert_allclose(samba.bar_length(campaign), expected, rtol=1e-15)
+    np.testing.assert_allclose(bar_length(campaign), expected, rtol=1e-15)
 
 
 @pytest.mark.parametrize("topology", ["w C A Y X b Z (C1) t", "w C A b X Y Z (C1) t", "w X b Y Z C B (C1) t"])

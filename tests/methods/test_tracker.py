@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.model import chain_of
-from monitor.methods.tracker import method as tracker
+from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 
@@ -151,7 +151,7 @@ def test_a_chain_without_axes_on_the_tool_side_is_refused(tracked: Tracks) -> No
 def test_the_analytic_jacobian_agrees_with_differences(tracked: Tracks) -> None:
     _, campaign = tracked(14, poses=12, fixed_every=4)
     problem = tracker.problem_of(
-        campaign, dataclasses.replace(tracker.DEFAULT_MODEL, added=("tracker:turn@run_time",))
+        campaign, dataclasses.replace(tracker.own_model, added=("tracker:turn@run_time",))
     )
     rng = np.random.default_rng(1)
     local = problem.start + rng.normal(0.0, 1e-3, problem.start.shape)
@@ -180,5 +180,5 @@ def test_the_analytic_jacobian_agrees_with_differences(tracked: Tracks) -> None:
 
 def test_it_is_a_method_with_the_chain_of_the_file(tracked: Tracks) -> None:
     _, campaign = tracked(15, poses=10)
-    assert method_named(campaign.method) is tracker
+    assert campaign_method(campaign) is tracker
     assert [joint.name for joint in chain_of(campaign.machine).tool] == ["J1", "J2", "J3", "J4", "J5", "J6"]

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from monitor.methods.model import chain_of
-from monitor.methods.tracker import method as tracker
+from monitor.methods.tracker.method import METHOD as tracker
 from monitor.records import Artefact, Campaign, ChainAxis, Machine, Probe, Probings, Run
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

@@ -12,7 +12,7 @@ import pytest
 from by_path import load
 
 from monitor.exceptions import InputError
-from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 from monitor.records import LinearAxes, LinearAxisErrors
 from monitor.uncertainty import run_problem, sensitivity_of
 from monitor.uncertainty.linear_axes import row_covariances

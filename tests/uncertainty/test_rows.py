@@ -13,7 +13,7 @@ import pytest
 from by_path import load
 
 from monitor.exceptions import DataError
-from monitor.methods.rotary_probing import method as rotary_probing
+from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 from monitor.uncertainty import (
     RowProblem,
     gum_framework,

@@ -13,8 +13,10 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.certificate.issue import issue
-from monitor.workflow.explain.comparison import compare
-from monitor.workflow.models import add
+from monitor.workflow.explain.compare import compare
+from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.model.change import add_effect, version_with
+from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.uncertainty.evaluation import evaluate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -37,7 +39,7 @@ def test_swapped_columns_are_refused_by_every_step_and_get_no_certificate(tmp_pa
         with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
             evaluate(db, "five-days", 1, method="guf")
         with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
-            compare(db, "five-days")
+            compare(db, CompareRequest("five-days"))
         with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
             issue(db, "five-days", 1, LABORATORY, out=tmp_path)
     assert list(tmp_path.glob("*.pdf")) == []
@@ -48,7 +50,7 @@ def test_a_single_run_with_a_hidden_effect_counts_it_in_the_uncertainty(tmp_path
         import_campaign(db, first_runs("hidden-reversal-x", 1))
         plain = evaluate(db, "hidden-reversal-x", 1, method="guf", model_uncertainty=False)
         counted = evaluate(db, "hidden-reversal-x", 1, method="guf")
-        add(db, "EXX:reversal", "samba", "with-reversal")
+        add_effect(db, AddEffectRequest("EXX:reversal", "samba", "with-reversal"))
         right = evaluate(db, "hidden-reversal-x", 1, method="guf", model="with-reversal")
     assert "lack of fit of the model" in {line.source for line in counted.framework.budget}
     apart = np.abs(counted.framework.estimate - right.framework.estimate)
@@ -74,7 +76,8 @@ def _pages(path: Path) -> list[object]:
 def test_a_name_in_use_is_no_name_for_a_model_with_another_parent(tmp_path: Path) -> None:
     with Database(tmp_path / "x.duckdb") as db:
         import_campaign(db, first_runs("five-days", 1))
-        add(db, "EXX:reversal", "samba", "mine")
+        version_with(db, AddEffectRequest("EXX:reversal", "samba", "mine"))
         with pytest.raises(InputError, match="there is a model mine already: add to it with --to mine"):
-            add(db, "EYY:reversal", "samba", "mine")
-        assert add(db, "EYY:reversal", "mine").effects == ("EXX:reversal", "EYY:reversal")
+            version_with(db, AddEffectRequest("EYY:reversal", "samba", "mine"))
+        version = version_with(db, AddEffectRequest("EYY:reversal", "mine"))
+        assert version.effects == ("EXX:reversal", "EYY:reversal")

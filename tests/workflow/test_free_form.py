@@ -8,13 +8,17 @@ import pytest
 
 from monitor.discovery import fit
 from monitor.exceptions import InputError
-from monitor.methods.free_form import method as free_form
+from monitor.methods.free_form.method import METHOD as free_form
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign, load_campaign
-from monitor.workflow import models
 from monitor.workflow.explain.shape import shape_figure
-from monitor.workflow.identify.identification import identify
-from monitor.workflow.plan.planning import plan
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.model.request import ShowModelRequest
+from monitor.workflow.model.show import show_model
+from monitor.workflow.plan.answer import AnglePlanAnswer
+from monitor.workflow.plan.plan import plan
+from monitor.workflow.plan.request import PlanRequest
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.volumetric.volumetric import volumetric_map
 
@@ -36,16 +40,15 @@ def test_what_was_imported_comes_back(db):
 
 def test_identification_and_framework_state_the_same_uncertainty(db):
     """The stated 1.38 µm exceeds the repeatability of four runs or not: the framework takes the larger."""
-    found = identify(db, "free-form-pocket")
-    run = next(one for one in found["runs"] if one["run"] == 2)
-    assert run["refused"] == []
-    assert len(run["parameters"]) == 149
+    run = next(run for run in identify(db, IdentifyRequest("free-form-pocket")).runs if run.run == 2)
+    assert run.refused == ()
+    assert len(run.parameters) == 149
     framework = uncertainty(db, "free-form-pocket", 2, method="guf")["guf"]
-    ratios = {framework["u"][name] / one["u"] for name, one in run["parameters"].items()}
+    ratios = {framework["u"][name] / estimate.u for name, estimate in run.parameters.items()}
     assert min(ratios) > 0.99
     assert max(ratios) < 1.1
-    for name, one in run["parameters"].items():
-        assert framework["estimate"][name] == pytest.approx(one["value"], abs=1e-6)
+    for name, estimate in run.parameters.items():
+        assert framework["estimate"][name] == pytest.approx(estimate.value, abs=1e-6)
 
 
 def test_monte_carlo_agrees_with_the_framework(db):
@@ -67,15 +70,17 @@ def test_the_map_knows_the_known_length(db):
 
 
 def test_plan_proposes_angles(db):
-    found = plan(db, "free-form-pocket", poses=2)
-    assert found["present"]["angles_deg"] == [0.0, 75.0, 130.0, 210.0]
-    assert found["present"]["probings"] == 368
-    assert len(found["next_angles_deg"]) == 2
-    assert found["proposed"]["median_expanded_shape_um"] < found["present"]["median_expanded_shape_um"]
+    answer = plan(db, PlanRequest("free-form-pocket", poses=2))
+    assert isinstance(answer, AnglePlanAnswer)
+    present, proposed = answer.present, answer.proposed
+    assert present.angles_deg == (0.0, 75.0, 130.0, 210.0)
+    assert present.probings == 368
+    assert len(answer.next_angles_deg) == 2
+    assert proposed.shape.median_expanded_shape_um < present.shape.median_expanded_shape_um
     with pytest.raises(InputError, match="a plan of the method free-form is its angles of the table"):
-        plan(db, "free-form-pocket", balls=4)
+        plan(db, PlanRequest("free-form-pocket", balls=4))
     with pytest.raises(InputError, match="choose 1 to 12 more angles"):
-        plan(db, "free-form-pocket", poses=13)
+        plan(db, PlanRequest("free-form-pocket", poses=13))
 
 
 def test_fig_9_raw_beside_identified(db, tmp_path):
@@ -86,7 +91,7 @@ def test_fig_9_raw_beside_identified(db, tmp_path):
 
 
 def test_model_says_what_is_free(db):
-    assert models.show(db, "free-form")["base"]["V300-T"] == [
+    assert show_model(db, ShowModelRequest("free-form")).base["V300-T"] == (
         "EXX:table", "EYX:table", "EXY:table", "EYY:table", "ECY:table", "EX0C:table", "EY0C:table", "ECC:table",
         "EC0X", "shape",
-    ]  # fmt: skip
+    )  # fmt: skip

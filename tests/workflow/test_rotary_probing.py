@@ -12,18 +12,22 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from by_path import load
 
-from monitor.methods.rotary_probing.patterns import SYMBOLS
+from monitor.discovery import Verdict
 from monitor.store import Database
-from monitor.workflow import keeping
-from monitor.workflow.explain.comparison import compare
-from monitor.workflow.identify.identification import identify
+from monitor.workflow.events import EventRequest, event
+from monitor.workflow.explain.compare import compare
+from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake import campaigns
 from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.trend.trends import trends
 from monitor.workflow.uncertainty.evaluation import uncertainty
 
 ROOT = Path(__file__).resolve().parents[2]
+SYMBOLS = load("closed_forms", ROOT / "tests" / "methods" / "closed_forms.py").SYMBOLS
 TABLE_4 = json.loads((ROOT / "tests/references/papers/ibaraki2012.json").read_text(encoding="utf-8"))[
     "table_4"
 ]
@@ -39,12 +43,12 @@ def db(tmp_path_factory):
 
 
 def test_table_4_four_repeats_are_four_runs(db):
-    found = identify(db, "tilting-table")
+    answer = identify(db, IdentifyRequest("tilting-table"))
     for symbol, row in TABLE_4.items():
-        for run, printed in zip(found["runs"], row["tests"], strict=True):
-            one = run["parameters"][SYMBOLS[symbol]]
+        for run, printed in zip(answer.runs, row["tests"], strict=True):
+            estimate = run.parameters[SYMBOLS[symbol]]
             factor = 1.0 if row["unit"] == "um" else np.pi / 180e3 * 1e6
-            assert one["value"] == pytest.approx(printed * factor, abs=0.1)
+            assert estimate.value == pytest.approx(printed * factor, abs=0.1)
 
 
 def test_table_4_only_the_z_offset_drifts(db):
@@ -53,7 +57,7 @@ def test_table_4_only_the_z_offset_drifts(db):
 
 def test_table_4_compensation_moves_what_was_compensated(db):
     noon = datetime(2012, 3, 5, 12, 0, tzinfo=timezone(timedelta(hours=9)))
-    keeping.record(db, "TILT-500", noon, "compensation", "dx, dy, dz and the zero of A")
+    event(db, EventRequest("TILT-500", "dx, dy, dz and the zero of A", noon, "compensation"))
     (pair,) = trends(db, "TILT-500").document["agreement"]
     assert pair["kind"] == "event"
     assert pair["campaigns"] == ["tilting-table", "tilting-table-compensated"]
@@ -62,7 +66,7 @@ def test_table_4_compensation_moves_what_was_compensated(db):
 
 
 def test_the_block_is_explained(db):
-    assert compare(db, "tilting-table")[0]["verdict"] == "explained"
+    assert compare(db, CompareRequest("tilting-table")).comparison.verdict is Verdict.EXPLAINED
 
 
 def test_uncertainty_by_both_routes(db):

@@ -16,7 +16,8 @@ from monitor.cli import main
 from monitor.store import Database
 from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
-from monitor.workflow.identify.identification import identify
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake.campaigns import import_folders
 from monitor.workflow.trend.trends import Choice, trends
 from monitor.workflow.uncertainty.documents import document
@@ -38,7 +39,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rng = np.random.default_rng(3)
     with Database(place) as db:
         import_folders(db, [EXAMPLES / "cold-cold"])
-        identify(db, "cold-cold")
+        identify(db, IdentifyRequest("cold-cold"))
         ((machine, topology_of, start),) = db.rows(
             "SELECT machine, machine_description, min(started_at) FROM campaign JOIN run USING (campaign_id) "
             "GROUP BY ALL"

@@ -8,8 +8,9 @@ from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
 from monitor.methods.samba.virtual import virtual_campaign
 from monitor.store import Database
-from monitor.workflow import models
 from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.model.change import add_effect
+from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.simulation import SimulateRequest, simulate
 from monitor.workflow.volumetric.known_errors import _of_shared
 from monitor.workflow.volumetric.volumetric import at_zero, volumetric_map
@@ -58,7 +59,7 @@ def database(tmp_path_factory):
     simulate(SimulateRequest(folder / "hidden", "EBB:harmonic2", 8.0, 1.0, 3))
     with Database(folder / "map.duckdb") as db:
         import_folders(db, [folder / "hidden"])
-        models.add(db, "EBB:harmonic2", "samba", "with-b")
+        add_effect(db, AddEffectRequest("EBB:harmonic2", "samba", "with-b"))
         yield db
 
 

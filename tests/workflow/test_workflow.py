@@ -9,13 +9,19 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import InputError, NotFoundError
-from monitor.methods import METHODS
+from monitor.methods import ChainMethod, methods
 from monitor.store import Database, load_campaign, load_identification
-from monitor.workflow import keeping, models
-from monitor.workflow.explain import comparison
-from monitor.workflow.explain.figures import comparison_figures, explanation_figures
-from monitor.workflow.identify.identification import identify
+from monitor.workflow import keeping
+from monitor.workflow.explain.compare import compare
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
+from monitor.workflow.explain.versions import latest_campaign
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake import campaigns
+from monitor.workflow.model.change import add_effect, version_with
+from monitor.workflow.model.request import AddEffectRequest
+from monitor.workflow.model.show import list_all_models
 from monitor.workflow.run_statistics.columns import run_columns
 from monitor.workflow.run_statistics.statistics import coordinates, stats
 from monitor.workflow.uncertainty.evaluation import evaluate
@@ -24,22 +30,22 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 def test_what_is_shown_is_what_is_stored(db: Database) -> None:
-    shown = identify(db, "five-days")
+    shown = identify(db, IdentifyRequest("five-days"))
     stored = load_identification(db, "five-days", "samba", 1)
     factors = np.array([unit.factor for unit in stored.units])
-    for run, kept in zip(shown["runs"], stored.runs, strict=True):
-        values = [one["value"] for one in run["parameters"].values()]
+    for run, kept in zip(shown.runs, stored.runs, strict=True):
+        values = [estimate.value for estimate in run.parameters.values()]
         assert values == pytest.approx(list(kept.estimate / factors), rel=1e-12)
-        u = [one["u"] for one in run["parameters"].values()]
+        u = [estimate.u for estimate in run.parameters.values()]
         assert u == pytest.approx(list(np.sqrt(np.diag(kept.covariance)) / factors), rel=1e-12)
 
 
 def test_one_run_alone_has_the_numbers_it_has_among_all(db: Database) -> None:
-    together = identify(db, "cold-cold")["runs"][6]
-    (alone,) = identify(db, "cold-cold", run=7)["runs"]
-    assert alone["run"] == together["run"] == 7
-    for name, one in together["parameters"].items():
-        assert alone["parameters"][name]["value"] == pytest.approx(one["value"], abs=1e-6 * one["u"])
+    together = identify(db, IdentifyRequest("cold-cold")).runs[6]
+    (alone,) = identify(db, IdentifyRequest("cold-cold", run=7)).runs
+    assert alone.run == together.run == 7
+    for name, estimate in together.parameters.items():
+        assert alone.parameters[name].value == pytest.approx(estimate.value, abs=1e-6 * estimate.u)
 
 
 def test_statistics_from_sums_by_hand(db: Database) -> None:
@@ -89,18 +95,20 @@ def test_no_campaign_yet(tmp_path: Path) -> None:
 
 def test_a_base_effect_is_not_added(db: Database) -> None:
     with pytest.raises(InputError, match="EXX:poly1 is free in every run already, whatever the model"):
-        models.add(db, "EXX:poly1", "samba")
-    assert [one["model"] for one in models.list_(db)["models"]] == sorted(METHODS)
+        add_effect(db, AddEffectRequest("EXX:poly1", "samba"))
+    assert [version.model for version in list_all_models(db).models] == [
+        name for name, method in methods().items() if isinstance(method, ChainMethod)
+    ]
 
 
 def test_history_is_that_of_the_campaign_last_looked_at(db: Database) -> None:
-    made = models.add(db, "EXX:reversal", "samba", "m")
+    model = version_with(db, AddEffectRequest("EXX:reversal", "samba", "m"))
     with pytest.raises(NotFoundError, match="model m has not been compared with a campaign yet"):
-        comparison.latest_campaign(db, made)
-    identify(db, "cold-cold")
-    assert comparison.latest_campaign(db, made) == "cold-cold"
-    comparison.compare(db, "hidden-reversal-x")
-    assert comparison.latest_campaign(db, made) == "hidden-reversal-x"
+        latest_campaign(db, model)
+    identify(db, IdentifyRequest("cold-cold"))
+    assert latest_campaign(db, model) == "cold-cold"
+    compare(db, CompareRequest("hidden-reversal-x"))
+    assert latest_campaign(db, model) == "hidden-reversal-x"
 
 
 @pytest.mark.parametrize("seed", [-1, 2**63])
@@ -128,12 +136,14 @@ def test_events_need_words_and_a_machine(db: Database) -> None:
 
 
 def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: Path) -> None:
-    document, fitted = comparison.compare(db, "hidden-reversal-x")
-    files = comparison_figures(document, fitted, tmp_path / "figures ü")
+    folder = tmp_path / "figures ü"
+    files = compare(db, CompareRequest("hidden-reversal-x", figures=folder)).figures
+    assert files is not None
     names = {Path(file).name for file in files}
     assert {"where-it-fails.svg", "where-it-fails.png", "residual-vectors.png"} <= names
-    found, explanation = comparison.explain_campaign(db, "hidden-reversal-x")
-    files += explanation_figures(found, explanation, tmp_path / "figures ü")
+    answer = explain(db, ExplainRequest("hidden-reversal-x", figures=folder))
+    assert answer.figures is not None
+    files += answer.figures
     # Where the model fails, what is missing, how far the error falls.
     names = {Path(file).name for file in files}
     assert names >= {
@@ -141,8 +151,8 @@ def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: P
     }  # fmt: skip
     for file in files:
         assert Path(file).stat().st_size > 1000
-    one = found["missing"][0]
+    first = answer.missing[0]
     # Beside the bar stands the size, short enough to be whole; the words are in the title.
     text = (tmp_path / "figures ü" / "missing-effects.svg").read_text(encoding="utf-8")
-    assert one["effect"] in text
-    assert f"± {one['u']:.2g}" in text
+    assert first.effect in text
+    assert f"± {first.u:.2g}" in text

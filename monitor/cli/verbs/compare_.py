@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from monitor.cli import curve_output, output
+from monitor.cli import output, residual_output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.store import is_curve
-from monitor.workflow.explain.comparison import compare
+from monitor.workflow.explain.compare import compare
+from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachinePart
+from monitor.workflow.explain.request import CompareRequest
 
 # The calibrated bar leaves its balls, touched once a run, a residual of some nanometres.
 NOTHING_CHECKS_UM = 0.005
 # A robot has a thousand indexations; more than these are no table to read.
 MOST_PARTS = 20
+#: The breakdowns of a machine that are shown, and those that are cut to the worst parts.
+SHOWN, CUT = ("axis", "target", "indexation", "run"), ("target", "indexation")
 EXAMPLE = "monitor compare hidden-reversal-x --figures figures"
 
 
@@ -27,54 +30,50 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
+    request = CompareRequest(options.campaign, options.model, options.figures)
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options) as db, output.working("comparing"), db.transaction():
-        if is_curve(db, options.campaign):
-            return curve_output.compare(db, options)
-        found, fitted = compare(db, options.campaign, options.model)
-        if options.figures is not None:
-            from monitor.workflow.explain.figures import comparison_figures
-
-            found["figures"] = comparison_figures(found, fitted, options.figures)
+        answer = compare(db, request)
     if options.json:
-        output.document(found)
+        output.document(answer)
         return 0
-    summary(found)
-    for kind in ("axis", "target", "indexation", "run"):
-        parts = found["by"].get(kind, {})
-        rows = [
-            [name, *(_checked(part[which]) for which in ("rms_um", "largest_um")), str(part["n"])]
-            for name, part in parts.items()
-        ]
-        left_out = (
-            len(rows) - MOST_PARTS if len(rows) > MOST_PARTS and kind in ("target", "indexation") else 0
-        )
-        if left_out:
-            worst = sorted(parts, key=lambda name: -float(parts[name]["rms_um"]))[:MOST_PARTS]
-            rows = [row for row in rows if row[0] in worst]
-        what = "touches" if found["target_word"] == "ball" else "readings"
-        if rows:
-            output.table("", [f"by {kind}", "RMS / µm", "largest / µm", what], rows)
-        if left_out:
-            output.say(f"the worst {MOST_PARTS} of {len(parts)}; --json has all")
-    for file in found.get("figures", []):
-        output.say(file)
+    residual_output.summary(answer.comparison)
+    _breakdown(answer)
+    residual_output.files(answer.figures)
     return 0
+
+
+def _breakdown(answer: CompareAnswer) -> None:
+    comparison = answer.comparison
+    if isinstance(comparison, CurveComparison):
+        number = residual_output.four_digits
+        for column, parts in comparison.by.items():
+            rows = [
+                [name, number(part.rms), number(part.largest), str(part.n)] for name, part in parts.items()
+            ]
+            output.table("", [f"by {column}", f"RMS / {comparison.unit}", "largest", "rows"], rows)
+        return
+    for kind in SHOWN:
+        if comparison.by.get(kind):
+            _machine_parts(kind, comparison.by[kind], answer.target_word)
+
+
+def _machine_parts(kind: str, parts: Mapping[str, MachinePart], target_word: str | None) -> None:
+    names = list(parts)
+    cut = kind in CUT and len(names) > MOST_PARTS
+    if cut:
+        worst = sorted(names, key=lambda name: -parts[name].rms_um)[:MOST_PARTS]
+        names = [name for name in names if name in worst]
+    readings = "touches" if target_word == "ball" else "readings"
+    rows = [
+        [name, _checked(parts[name].rms_um), _checked(parts[name].largest_um), str(parts[name].n)]
+        for name in names
+    ]
+    output.table("", [f"by {kind}", "RMS / µm", "largest / µm", readings], rows)
+    if cut:
+        output.say(f"the worst {MOST_PARTS} of {len(parts)}; --json has all")
 
 
 def _checked(length: float) -> str:
     """A residual; a dash where the touches have nothing to check them (a ball touched once is followed exactly)."""
     return "-" if length < NOTHING_CHECKS_UM else output.micrometres(length)
-
-
-def summary(found: dict[str, Any]) -> None:
-    """The comparison in three sentences."""
-    test = found["lack_of_fit"]
-    output.say(
-        f"{found['campaign']}, model {found['model']}: RMS {output.micrometres(found['rms_um'])} µm, expected "
-        f"{output.micrometres(found['expected_rms_um'])} µm from the probe's stated uncertainty; "
-        f"repeatability {output.micrometres(found['repeatability_um'])} µm"
-    )
-    if test["f"] is not None:
-        output.say(f"lack of fit over repeatability: F = {test['f']:.2f}, {output.stated('p', test['p'])}")
-    output.say(f"verdict: {found['verdict']}")

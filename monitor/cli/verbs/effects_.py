@@ -63,6 +63,6 @@ def run(options: Namespace) -> int:
         f"{len(rows)} effects of {answer.campaign or answer.topology}",
         ["effect", "unit", "what it is", "usual cause"],
         rows,
-        left=4,
+        text_columns=4,
     )
     return 0

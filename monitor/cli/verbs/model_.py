@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from pathlib import Path
 
-from monitor.cli import curve_output, output
+from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common, told
-from monitor.exceptions import NotFoundError
-from monitor.workflow import models
-from monitor.workflow.explain import comparison
+from monitor.cli.residual_output import files, four_digits
+from monitor.workflow.explain.request import HistoryRequest
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.explain.versions import history
+from monitor.workflow.model.answer import ChangeModelAnswer
+from monitor.workflow.model.change import add_effect, remove_effect
+from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest, ShowModelRequest
+from monitor.workflow.model.show import list_all_models, show_model
 
 EXAMPLE = 'monitor model add "EXX:reversal" --to samba --as with-reversal --campaign hidden-reversal-x'
 
@@ -45,137 +51,114 @@ def options(parser: ArgumentParser) -> None:
     past.add_argument("--campaign", metavar="CAMPAIGN", help="default: where it was last compared")
     past.add_argument("--figures", type=Path, metavar="DIR")
     past.set_defaults(run=_history)
-    for one in (listed, shown, added, removed, past):
-        common(one)
+    for verb in (listed, shown, added, removed, past):
+        common(verb)
 
 
 def _list(options: Namespace) -> int:
     with opened(options) as db:
-        found = models.list_(db)
+        answer = list_all_models(db)
     if options.json:
-        output.document(found)
+        output.document(answer)
         return 0
     rows = [
         [
-            one["model"],
-            one["parent"] or "",
-            ", ".join(one["effects"]) or "the method's base effects alone",
-            one["note"],
+            model.model,
+            model.parent or "",
+            ", ".join(model.effects) or "the method's base effects alone",
+            model.note,
         ]
-        for one in found["models"]
+        for model in answer.models
     ]
-    output.table("", ["model", "parent", "effects added to the base", "note"], rows, left=4)
+    output.table("", ["model", "parent", "effects added to the base", "note"], rows, text_columns=4)
     return 0
 
 
 def _show(options: Namespace) -> int:
     with opened(options) as db:
-        found = models.show(db, options.name)
+        answer = show_model(db, ShowModelRequest(options.name))
     if options.json:
-        output.document(found)
+        output.document(answer)
         return 0
-    output.say(f"{found['model']}" + (f", from {found['parent']}" if found["parent"] else ""))
-    for machine, effects in found["base"].items():
-        told = "base of" if "~" in effects[0] else "free in every run of"
-        output.say(f"  {told} {machine}: {' '.join(effects)}")
-    for effect in found["effects"]:
-        output.say(
-            f"  shared by all runs: {effect}: {found['meaning'].get(effect, 'no machine here has it')}"
-        )
+    version = answer.version
+    output.say(version.model + (f", from {version.parent}" if version.parent else ""))
+    for machine, effects in answer.base.items():
+        subject = "base of" if "~" in effects[0] else "free in every run of"
+        output.say(f"  {subject} {machine}: {' '.join(effects)}")
+    for effect in version.effects:
+        output.say(f"  shared by all runs: {effect}: {answer.meaning.get(effect, 'no machine here has it')}")
     return 0
 
 
 def _add(options: Namespace) -> int:
+    request = AddEffectRequest(options.effect, options.to, options.as_, options.note, options.campaign)
     # One transaction: a campaign that is not there leaves no model behind.
     with opened(options) as db, output.working("fitting"), db.transaction():
-        made = models.add(db, options.effect, options.to, options.as_, options.note, options.campaign)
-        document = models.show(db, f"{made.name}@{made.version}")
-        try:
-            document["history"] = comparison.history(db, f"{made.name}@{made.version}", options.campaign)
-        except NotFoundError:
-            if options.campaign is not None:
-                raise
-            document["history"] = []
-    return _told(_with_default(document, options.as_), options.json)
-
-
-def _with_default(document: models.Document, as_: str | None) -> models.Document:
-    """Without --as the name itself has another meaning from now on: said, since others use it too."""
-    name, version = document["name"], document["version"]
-    changed = version > 1 and as_ in (None, name)
-    document["note_on_name"] = (
-        f"'{name}' without a version means {document['model']} from now on, for everybody and every campaign; "
-        f"{name}@{version - 1} is what it was (--as NAME leaves {name} alone)"
-        if changed
-        else None
-    )
-    return document
+        answer = add_effect(db, request)
+    return _changed(answer, options.json)
 
 
 def _remove(options: Namespace) -> int:
     with opened(options) as db:
-        made = models.remove(db, options.effect, options.from_, options.as_)
-        document = models.show(db, f"{made.name}@{made.version}")
-    document["history"] = []
-    return _told(_with_default(document, options.as_), options.json)
+        answer = remove_effect(db, RemoveEffectRequest(options.effect, options.from_, options.as_))
+    return _changed(answer, options.json)
 
 
-def _told(document: models.Document, as_json: bool) -> int:
+def _changed(answer: ChangeModelAnswer, as_json: bool) -> int:
     if as_json:
-        output.document(document)
+        output.document(answer)
         return 0
-    output.say(
-        f"model {document['model']} now has: {', '.join(document['effects']) or 'the base effects alone'}"
-    )
-    if document["note_on_name"]:
-        output.say(document["note_on_name"])
-    if document["history"]:
-        _steps(document["history"][-2:])
-        for one in document["history"][-1]["no_number"]:
-            output.say(f"no number: {', '.join(one['parameters'])}: {one['why']}")
+    version = answer.model.version
+    output.say(f"model {version.model} now has: {', '.join(version.effects) or 'the base effects alone'}")
+    if answer.note_on_name:
+        output.say(answer.note_on_name)
+    if answer.history:
+        _steps(answer.history[-2:])
+        for refusal in answer.history[-1].no_number:
+            output.say(f"no number: {', '.join(refusal.parameters)}: {refusal.why}")
     return 0
 
 
 def _history(options: Namespace) -> int:
     with opened(options) as db, output.working("fitting every version"):
-        steps = comparison.history(db, options.name, options.campaign)
-    files = []
-    if options.figures is not None:
-        if steps[0].get("method") == "curve":
-            from monitor.workflow.explain.curve_figures import curve_history_figure
-
-            files = curve_history_figure(steps, options.figures)
-        else:
-            from monitor.workflow.explain.figures import history_figure
-
-            files = history_figure(steps, options.figures)
+        answer = history(db, HistoryRequest(options.name, options.campaign, options.figures))
     if options.json:
-        output.document(steps)
+        output.document(answer.steps)
         return 0
-    _steps(steps)
-    for file in files:
-        output.say(file)
+    _steps(answer.steps)
+    files(answer.figures)
     return 0
 
 
-def _steps(steps: list[comparison.Document]) -> None:
-    if steps[0].get("method") == "curve":
-        curve_output.steps(steps)
-        return
-    rows = [
-        [
-            one["model"],
-            one["added"] or (f"without {one['removed']}" if one["removed"] else "base"),
-            output.micrometres(one["rms_um"]),
-            output.micrometres(one["heldout_rms_um"]),
-            output.micrometres(one["repeatability_um"]),
-            output.probability(one["lack_of_fit_p"]),
-        ]
-        for one in steps
+def _steps(steps: Sequence[MachineVersion | CurveVersion]) -> None:
+    """The error of every version, and of a curve its Bayesian information criterion."""
+    unit = steps[0].unit
+    curve = isinstance(steps[0], CurveVersion)
+    columns = [
+        "model",
+        "added",
+        f"RMS / {unit}",
+        f"held-out / {unit}",
+        f"repeatability / {unit}",
+        "lack of fit p",
     ]
     output.table(
-        f"on campaign {steps[0]['campaign']}",
-        ["model", "added", "RMS / µm", "held-out / µm", "repeatability / µm", "lack of fit p"],
-        rows,
-        left=2,
+        f"on campaign {steps[0].campaign}",
+        [*columns, "BIC"] if curve else columns,
+        [_step(step) for step in steps],
+        text_columns=2,
     )
+
+
+def _step(step: MachineVersion | CurveVersion) -> list[str]:
+    curve = step if isinstance(step, CurveVersion) else None
+    number = output.micrometres if curve is None else four_digits
+    return [
+        step.model,
+        step.added or (f"without {step.removed}" if step.removed else "base"),
+        number(step.rms),
+        number(step.heldout_rms),
+        number(step.repeatability),
+        output.probability(step.lack_of_fit_p),
+        *([] if curve is None else [f"{curve.bic:.1f}"]),
+    ]

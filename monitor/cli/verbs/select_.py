@@ -78,7 +78,7 @@ def _comparison(found: dict[str, Any]) -> None:
     ]  # fmt: skip
     output.table(
         f"expanded uncertainty U = k_q u of a calibration, all parameters together with p = {found['p']:g}",
-        ["parameter", "unit", *(f"{name} ({one['runs']} runs)" for name, one in parts.items())], rows, left=2,
+        ["parameter", "unit", *(f"{name} ({one['runs']} runs)" for name, one in parts.items())], rows, text_columns=2,
     )  # fmt: skip
     for file in found.get("figures", []):
         output.say(file)

@@ -69,7 +69,7 @@ def run(options: Namespace) -> int:
         f"{found['campaign']}, runs by {found['by']} ({groups})",
         ["parameter", "unit", "mean", "u all", "u pooled", "Bartlett p", "ANOVA p", "ANOVA q", "normal p"],
         rows,
-        left=2,
+        text_columns=2,
     )
     moved = [
         name

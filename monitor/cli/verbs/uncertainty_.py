@@ -69,7 +69,9 @@ def run(options: Namespace) -> int:
             [name, found["units"][name], output.rounded(guf["estimate"][name], expanded), output.two_digits(u), *more,
              output.rounded(expanded, expanded)]
         )  # fmt: skip
-    output.table(f"{found['campaign']}, run {found['run']}, model {found['model']}", columns, rows, left=2)
+    output.table(
+        f"{found['campaign']}, run {found['run']}, model {found['model']}", columns, rows, text_columns=2
+    )
     count, p = len(found["parameters"]), found["p"]
     output.say(f"readings: {found['input_covariance']}")
     output.say(

@@ -1,9 +1,11 @@
-"""What an identification found: the geometric errors of every run, and what the plan cannot separate."""
+"""The result of an identification: the geometric errors of every run, and what the plan cannot separate."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 from monitor.records import Array
 from monitor.units import Unit
@@ -11,7 +13,7 @@ from monitor.units import Unit
 
 @dataclass(frozen=True)
 class Refusal:
-    """Parameters that the plan cannot tell apart, and why; none of them gets a number."""
+    """Parameters that the plan cannot separate, and why; none of them gets a number."""
 
     parameters: tuple[str, ...]
     why: str
@@ -57,3 +59,29 @@ class Identification:
     added_covariance: Array
     added_refused: tuple[Refusal, ...]
     iterations: int
+
+
+@dataclass(frozen=True)
+class StepwiseCoefficient:
+    """A coefficient identified step by step and at once, in internal units; ``unit`` is that for people.
+
+    ``stepwise`` and ``at_once`` with their standard uncertainties; ``by_method`` is the part of the difference that
+    remains without noise (the method's own), ``u_noise`` the standard uncertainty of the rest. ``at_once`` is NaN for
+    what that fit does not have or refused; ``why`` names the reason of the difference.
+    """
+
+    parameter: str
+    unit: Unit
+    stepwise: float
+    u_stepwise: float
+    at_once: float
+    u_at_once: float
+    by_method: float
+    u_noise: float
+    why: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether what the method does not explain lies within twice its standard uncertainty."""
+        unexplained = self.stepwise - self.at_once - self.by_method
+        return not np.isfinite(unexplained) or abs(unexplained) <= 2.0 * self.u_noise

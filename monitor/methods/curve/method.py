@@ -1,133 +1,16 @@
-"""The method ``curve``: one response over its inputs, a base model in one line, and the effects added to it.
-
-Everything linear is solved for exactly at every step; periods, constants and places that are to be found from the
-data are refined by Gauss-Newton on all unknowns together (variable projection gives the start: Golub and
-Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). Where neighbouring rows resemble each other the standard
-uncertainties allow for it; the estimates stay those of ordinary least squares.
-"""
+"""The method ``curve``: one response over its inputs, a base model in one line, and the effects added to it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from monitor.methods.curve.fit import fit
+from monitor.methods.curve.problem import NAME, problem_of
+from monitor.methods.method import CurveMethod, Nouns
 
-import numpy as np
-
-from monitor.effects.curve import CurveEffect
-from monitor.exceptions import DataError
-from monitor.methods.chain.identification import Refusal
-from monitor.methods.curve.problem import CurveProblem
-from monitor.methods.curve.solver import inverse_normal, refined, searched, slope, solve
-from monitor.records import Array
-
-#: Share of a null vector from which on a coefficient counts as part of it.
-MEMBER_SHARE = 1e-5
-#: A residual below this share of the response's range is what sixteen digits and a period's search leave.
-EXACT = 1e-9
-
-
-@dataclass(frozen=True)
-class CurveFit:
-    """A problem at its least-squares point.
-
-    ``estimate`` (k,) and ``covariance`` (k, k) belong to ``names`` in ``units``, NaN where refused; ``values`` are
-    the effects with their searched values at their best and ``u_values`` the standard uncertainties of these
-    (NaN for a place). ``design`` (n, k + v) are the columns and the derivatives by the searched values,
-    ``residual`` (n,) is measured less modelled, rows left out included. The covariance takes the scatter of the
-    residual as the noise, rows independent.
-    """
-
-    problem: CurveProblem
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    estimate: Array
-    covariance: Array
-    effects: tuple[CurveEffect, ...]
-    u_values: tuple[float, ...]
-    design: Array
-    residual: Array
-    rank: int
-    degrees_of_freedom: int
-    refused: tuple[Refusal, ...]
-    iterations: int
-
-    @property
-    def sum_of_squares(self) -> float:
-        """Of the residual of the rows that have weight."""
-        return float(np.sum(self.residual[~self.problem.left_out] ** 2))
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the residual."""
-        return float(np.sqrt(self.sum_of_squares / np.sum(~self.problem.left_out)))
-
-    @property
-    def deviation(self) -> float:
-        """Residual standard deviation: per degree of freedom."""
-        return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
-
-    @property
-    def exact(self) -> bool:
-        """Whether what is left is the rounding of numbers and no noise that says anything."""
-        return self.rms < EXACT * float(np.ptp(self.problem.curve.measured[~self.problem.left_out]))
-
-    @property
-    def settled(self) -> CurveProblem:
-        """The problem with every searched value at its best."""
-        base = len(self.problem.base)
-        return replace(self.problem, base=self.effects[:base], added=self.effects[base:])
-
-
-def fit(problem: CurveProblem) -> CurveFit:
-    """The least-squares point of a problem.
-
-    Raises DataError where there are no more rows than unknowns, EffectError where a value cannot be searched.
-    """
-    kept = ~problem.left_out
-    y = problem.curve.measured
-    effects = list(problem.effects)
-    for place, effect in enumerate(effects):
-        if effect.free and effect.value is None:
-            effects[place] = searched(problem, effects, place)
-    for place, effect in enumerate(effects):
-        if effect.free and effect.shape == "step":
-            effects[place] = searched(problem, effects, place)
-    free = [place for place, effect in enumerate(effects) if effect.free and effect.shape != "step"]
-    iterations = 1
-    if free:
-        effects, iterations = refined(problem, effects, free)
-    names, units, columns = problem.columns(effects)
-    estimate, rank, null = solve(columns[kept], y[kept])
-    slopes = [slope(problem, names, estimate, effects[place]) for place in free]
-    design = np.column_stack([columns, *slopes]) if slopes else columns
-    freedom = int(kept.sum()) - rank - sum(effect.free for effect in effects)
-    if freedom < 1:
-        raise DataError(
-            f"campaign {problem.curve.name} has {int(kept.sum())} rows for {len(names) + len(free)} unknowns; "
-            "measure more, or leave an effect out"
-        )
-    residual = y - columns @ estimate
-    variance = float(np.sum(residual[kept] ** 2)) / freedom
-    inverse = inverse_normal(design[kept])
-    covariance = variance * inverse
-    u_values = []
-    for effect in effects:
-        if effect.free and effect.shape != "step":
-            place = len(names) + free.index(effects.index(effect))
-            u_values.append(float(np.sqrt(covariance[place, place])) * float(effect.value or 0.0) ** 2)
-        else:
-            u_values.append(float("nan"))
-    member = np.abs(null).max(axis=0, initial=0.0) > MEMBER_SHARE
-    refused: tuple[Refusal, ...] = ()
-    if member.any():
-        group = tuple(name for name, one in zip(names, member, strict=True) if one)
-        refused = (
-            Refusal(
-                group, f"with these rows {' and '.join(group)} cannot be told apart; vary them separately"
-            ),
-        )
-    size = len(names)
-    return CurveFit(
-        problem, names, units, np.where(member, np.nan, estimate),
-        np.where(member[:, None] | member, np.nan, covariance[:size, :size]),
-        tuple(effects), tuple(u_values), design, residual, rank, freedom, refused, iterations,
-    )  # fmt: skip
+METHOD = CurveMethod(
+    name=NAME,
+    title="curve",
+    description="one response over its inputs: no machine at all",
+    nouns=Nouns(target="row", row="row", tool_point="response"),
+    problem_of=problem_of,
+    fit=fit,
+)

@@ -1,306 +1,25 @@
-"""L-shape: the 21 geometric errors of a three-axis machine from an angle sensor that scans an L-shaped standard piece.
-
-The piece carries modules along two arms, each with a plane face and a paraboloid of rotation. An autocollimating
-sensor on the tool side sees two spots on its detector at every module: from the plane the two tilts of the sensor,
-from the paraboloid these and the two displacements. The piece lies in the XY, the XZ and the YZ plane in turn, so
-that every axis shows its two transverse angles, its positioning and its straightness, twice over where two planes
-share an axis. Here all placements of a run are fitted at once on the chain; ``l_shape_stepwise`` follows the paper.
-
-Source: X. Li et al., Rapid measurement and identification method for the geometric errors of CNC machine tools,
-Appl. Sci. 9 (2019) 2701. Departures: Eq. (10) takes the sign that Eqs. (8) and (9) require (tilt = -S/2f), and Eq.
-(18) accordingly; Eqs. (5) and (32) are those of the expanded Eq. (1), which the chain has by itself. Neglected:
-tangent for angle, 1e-7 of a tilt of 0.5 mrad; products of errors, as in Eqs. (4) to (6).
-"""
+"""The method ``l-shape``: the 21 geometric errors of three axes from an L-shaped standard piece."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-
 import numpy as np
-import numpy.typing as npt
 
-from monitor.effects import ArtefactEffect, ChainEffect, context_of, parse_effect
+from monitor.effects import context_of, parse_effect
 from monitor.exceptions import DataError
-from monitor.machine import Chain, Evaluation, evaluate
-from monitor.methods.chain.identification import Identification
-from monitor.methods.chain.least_squares import Linearisation
-from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
-from monitor.methods.chain.results import identification
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.l_shape.base import ORDERS, l_shape_base
+from monitor.methods.l_shape.problem import LShapeProblem
+from monitor.methods.l_shape.stepwise import stepwise
+from monitor.methods.method import ChainMethod, Nouns, Stepwise
 from monitor.methods.model import Model, chain_of
-from monitor.records import Array, Campaign, LShape
+from monitor.records import Campaign
 from monitor.units import MICROMETRE
 
 NAME = "l-shape"
+DEFAULT_MODEL = Model(NAME)
 #: The four columns of a row: where the spots of plane and paraboloid lie on the detector.
 COLUMNS = ("plane_u_um", "plane_v_um", "paraboloid_u_um", "paraboloid_v_um")
 PLACEMENT = "placement"
-# Error motions are cubic polynomials that vanish where the axis reads zero, as in Eqs. (25) to (36) of the source.
-ORDERS = (1, 2, 3)
-# A placement leaves open where the piece lies in its plane (two lengths, one angle) and how sensor and piece are
-# tilted against each other.
-SETUP = ("shift u", "shift v", "turn", "tilt u", "tilt v")
-_CALIBRATION = ("place u", "place v", "tilt u", "tilt v")
-DEFAULT_MODEL = Model(NAME)
-
-
-def base_of(chain: Chain) -> tuple[str, ...]:
-    """The errors of a three-axis machine: squareness, and of every axis six cubics.
-
-    The straightness has no linear term: that is the direction of the axis, and squareness already.
-    """
-    frame, second, third = sorted(chain.joints, key=lambda joint: joint is not (chain.work or chain.tool)[0])
-    # The second axis may turn in the plane that the first one spans with it, the third about both of them.
-    across = [joint.direction.index(1.0) for joint in (frame, second, third)]
-    found = [f"E{'ABC'[across[2]]}0{second.name}"]
-    found += [f"E{'ABC'[one]}0{third.name}" for one in sorted(across[:2])]
-    for joint in chain.joints:
-        for component in "XYZABC":
-            along = component in "XYZ" and joint.direction["XYZ".index(component)] == 1.0
-            straight = component in "XYZ" and not along
-            found += [
-                f"E{component}{joint.name}:poly{order}" for order in ORDERS if order > 1 or not straight
-            ]
-    return tuple(found)
-
-
-@dataclass(frozen=True)
-class LShapeProblem(ChainProblem):
-    """Spots on the detector as a least-squares problem; the four numbers of a row are lengths on the detector in mm.
-
-    ``spots`` (n, 4) mm as measured, ``placement`` (n,) which placement of ``piece``. The modules' calibrated places and
-    tilts are known to their stated uncertainty, and are unknowns of every run with that much freedom.
-    """
-
-    spots: Array
-    placement: npt.NDArray[np.int64]
-    piece: LShape
-    tip: tuple[float, float, float]
-
-    @cached_property
-    def module(self) -> npt.NDArray[np.int64]:
-        """Place of every row's module in the piece (n,)."""
-        places = {module.id: place for place, module in enumerate(self.piece.modules)}
-        return np.array([places[str(target)] for target in self.context.target])
-
-    @cached_property
-    def _frames(self) -> Array:
-        """Unit vectors (P, 3, 3) u, v, w of every placement: along the arms, and out of the faces."""
-        arms = np.array(
-            [[np.eye(3)["XYZ".index(axis)] for axis in one.plane] for one in self.piece.placements]
-        )
-        return np.stack([arms[:, 0], arms[:, 1], np.cross(arms[:, 0], arms[:, 1])], axis=1)
-
-    @cached_property
-    def frames(self) -> Array:
-        """Unit vectors (n, 3, 3) u, v, w of every row."""
-        return np.asarray(self._frames[self.placement])
-
-    @cached_property
-    def _used(self) -> tuple[int, ...]:
-        """Places of the placements that were measured."""
-        return tuple(int(place) for place in np.unique(self.placement))
-
-    @cached_property
-    def calibrated(self) -> tuple[int, ...]:
-        """Places of the modules whose calibration matters: all that were scanned but the reference."""
-        return tuple(int(one) for one in np.unique(self.module) if one != self.piece.reference)
-
-    @cached_property
-    def own_names(self) -> tuple[str, ...]:
-        setup = [f"{self.piece.placements[one].plane} {what}" for one in self._used for what in SETUP]
-        modules = [self.piece.modules[one].id for one in self.calibrated]
-        return (*setup, *(f"module {one} {what}" for one in modules for what in _CALIBRATION))
-
-    def all_orders(self) -> tuple[ChainEffect | ArtefactEffect, ...]:
-        """The base effects and the first orders of the straightness, which the stepwise way has besides."""
-        chain = self.context.chain
-        texts = [
-            f"E{component}{joint.name}:poly1"
-            for joint in chain.joints
-            for component in "XYZ"
-            if joint.direction["XYZ".index(component)] != 1.0
-        ]
-        own = tuple(effect for effect in self.base if isinstance(effect, (ChainEffect, ArtefactEffect)))
-        return (*own, *(parse_effect(text, chain) for text in texts))
-
-    @cached_property
-    def own_start(self) -> Array:
-        return np.zeros((len(self.runs), len(self.own_names)))
-
-    @property
-    def gross_times(self) -> float:
-        """Spots move by micrometres whatever is exchanged; noise and module errors leave no more than this."""
-        return 2.5
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        return ("plane u", "plane v", "paraboloid u", "paraboloid v")
-
-    @property
-    def extra_names(self) -> tuple[str, ...]:
-        return tuple(name for name in self.own_names if name.startswith("module "))
-
-    def _parts(self, own: Array) -> tuple[Array, Array]:
-        """Setup (n, 5) of every row's placement and deviations (n, 4) of its module, in mm and rad."""
-        count = len(SETUP) * len(self._used)
-        setup = own[:, :count].reshape(len(own), len(self._used), len(SETUP))
-        which = np.searchsorted(np.array(self._used), self.placement)
-        modules = np.zeros((len(own), len(self.piece.modules), 4))
-        modules[:, list(self.calibrated)] = own[:, count:].reshape(len(own), len(self.calibrated), 4)
-        return setup[self._run, which], modules[self._run, self.module]
-
-    @cached_property
-    def in_plane(self) -> Array:
-        """Calibrated places (n, 2) mm of the modules in the piece's plane, less the reference's."""
-        centres = np.array([module.centre for module in self.piece.modules])
-        places: Array = (centres - centres[self.piece.reference])[self.module]
-        return places
-
-    def ends(self, own: Array) -> tuple[Array, Array]:
-        """The middle of the module's paraboloid and the sensor's reference point."""
-        setup, deviation = self._parts(own)
-        flat = self.in_plane + deviation[:, :2]
-        cos, sin = np.cos(setup[:, 2]), np.sin(setup[:, 2])
-        turned = np.column_stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1]])
-        corners = np.array([one.corner for one in self.piece.placements])[self.placement] + np.array(self.tip)
-        target = corners + np.einsum("nk,nki->ni", turned + setup[:, :2], self.frames[:, :2])
-        return target, np.tile(np.array(self.tip), (len(target), 1))
-
-    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> Evaluation:
-        """Residuals (n, 6): displacement in mm from the module to the sensor, then how much further a point 1 mm
-        along the faces' normal is displaced, in mm/mm, both less what the spots say."""
-        errors, target, tip = self.state(local, common)
-        chain, positions = self.context.chain, self.context.positions
-        normal, arms = self.frames[:, 2], self.frames[:, :2]
-        first = evaluate(chain, positions, errors, target, tip, jacobian=jacobian)
-        setup, deviation = self._parts(self.own_of(local))
-        module = np.array([one.tilt for one in self.piece.modules])[self.module]
-        tilts = -self.spots[:, :2] / (2.0 * self.piece.focal_length)
-        lengths = -self.piece.paraboloid * (self.spots[:, 2:] / (2.0 * self.piece.focal_length) + tilts)
-        turned = np.einsum("nij,nj->ni", first.by_tip, normal) - normal
-        given = tilts + setup[:, 3:] + deviation[:, 2:] + module
-        residual = np.concatenate(
-            [
-                first.residual - np.einsum("nk,nki->ni", lengths, arms),
-                turned - np.einsum("nk,nki->ni", given, arms),
-            ],
-            axis=1,
-        )
-        by_error = None
-        if first.by_error is not None:
-            second = evaluate(chain, positions, errors, target + normal, tip + normal, jacobian=True)
-            assert second.by_error is not None
-            by_error = np.concatenate([first.by_error, second.by_error - first.by_error], axis=1)
-        return Evaluation(residual, first.by_tip, first.work_rotation, by_error)
-
-    def by_own(self, own: Array, seen: Evaluation) -> Array:
-        """Derivatives (n, 6, q) by setup and modules."""
-        found = np.zeros((len(self.context), 6, own.shape[1]))
-        setup, deviation = self._parts(own)
-        u, v = self.frames[:, 0], self.frames[:, 1]
-        flat = self.in_plane + deviation[:, :2]
-        cos, sin = np.cos(setup[:, 2, None]), np.sin(setup[:, 2, None])
-        along, across = cos * u + sin * v, cos * v - sin * u
-        rows = np.arange(len(found))
-        first = len(SETUP) * np.searchsorted(np.array(self._used), self.placement)
-        found[rows, :3, first] = -u
-        found[rows, :3, first + 1] = -v
-        found[rows, :3, first + 2] = -(flat[:, :1] * across - flat[:, 1:] * along)
-        found[rows, 3:, first + 3] = -u
-        found[rows, 3:, first + 4] = -v
-        start = len(SETUP) * len(self._used)
-        for place, module in enumerate(self.calibrated):
-            own_rows = np.flatnonzero(self.module == module)
-            column = start + 4 * place
-            found[own_rows, :3, column] = -along[own_rows]
-            found[own_rows, :3, column + 1] = -across[own_rows]
-            found[own_rows, 3:, column + 2] = -u[own_rows]
-            found[own_rows, 3:, column + 3] = -v[own_rows]
-        return found
-
-    @cached_property
-    def _perfect(self) -> Evaluation:
-        """A machine without errors and a piece laid down exactly: what the spots say of it, and the derivatives."""
-        return self.evaluated(self.start, np.zeros(len(self.added_names)), jacobian=True)
-
-    @cached_property
-    def _rows(self) -> Array:
-        """Derivatives (n, 4, p) of a row by the unknowns of its run."""
-        seen = self._perfect
-        assert seen.by_error is not None
-        parts = [effect.basis(self.context).displacement(seen.by_error) for effect in self.base]
-        return self.observe(np.concatenate([*parts, self.by_own(self.own_start, seen)], axis=-1))
-
-    def vectors(self, local: Array, common: Array) -> Array:
-        """Residuals (n, 4) in mm on the detector, to first order in all errors, as Eqs. (4) to (6) have them."""
-        seen, place = self._perfect, 0
-        assert seen.by_error is not None
-        found: Array = self.observe(seen.residual) + np.einsum("nip,np->ni", self._rows, local[self._run])
-        for added in self.shared:
-            unknowns = common[place : place + added.unknowns]
-            found += self.observe(added.basis(unknowns).displacement(seen.by_error) @ unknowns[: added.size])
-            place += added.unknowns
-        return found
-
-    def linearise(self, local: Array, common: Array) -> Linearisation:
-        """Whitened residuals and derivatives.
-
-        To first order, as the source has it: what the placements cannot tell apart is then exactly so, where products
-        of errors (3e-4 of a derivative) would seem to tell it. Neglected: a tenth of a micrometre for a piece of 200
-        mm that lies 1 mrad askew, 4 nm at 0.2 mrad.
-        """
-        seen, place = self._perfect, 0
-        assert seen.by_error is not None
-        parts = [np.zeros((len(self.context), 4, 0))]
-        for added in self.shared:
-            unknowns = common[place : place + added.unknowns]
-            parts.append(self.observe(added.displacement(unknowns, seen.by_error)))
-            place += added.unknowns
-        extra, by_extra = self.extras(self.own_of(local))
-        before = ((0, 0), (0, 0), (len(self.base_names), 0))
-        sigma = self.sigma[..., None]
-        return Linearisation(
-            np.concatenate([self.padded(self.vectors(local, common) / self.sigma), extra], axis=1),
-            np.concatenate([self.padded(self._rows / sigma), np.pad(by_extra, before)], axis=1),
-            np.concatenate(
-                [
-                    self.padded(np.concatenate(parts, axis=-1) / sigma),
-                    np.zeros((*extra.shape, len(common))),
-                ],
-                axis=1,
-            ),
-        )
-
-    def observe(self, rows: Array) -> Array:
-        """Spots (n, 4, ...) on the detector of displacements and tilts (n, 6, ...); a shift alone (n, 3, ...) tilts
-        nothing."""
-        moved = np.einsum("nki,ni...->nk...", self.frames[:, :2], rows[:, :3])
-        tilted = np.zeros_like(moved)
-        if rows.shape[1] == 6:
-            tilted = np.einsum("nki,ni...->nk...", self.frames[:, :2], rows[:, 3:])
-        twice = -2.0 * self.piece.focal_length
-        return np.concatenate([twice * tilted, twice * (moved / self.piece.paraboloid + tilted)], axis=1)
-
-    def for_search(self) -> LShapeProblem:
-        """The modules deviate from their calibration alike in all R runs. Each run has a deviation of its own here,
-        so its uncertainty is widened by the root of R: all runs together then say as little of it as one does."""
-        wider = float(np.sqrt(len(self.runs)))
-        piece = replace(
-            self.piece,
-            place_uncertainty=self.piece.place_uncertainty * wider,
-            tilt_uncertainty=self.piece.tilt_uncertainty * wider,
-        )
-        return replace(self.foreseen(), piece=piece)
-
-    def extras(self, own: Array) -> tuple[Array, Array]:
-        """The modules' deviations from their calibration, in standard uncertainties of it."""
-        first = len(SETUP) * len(self._used)
-        piece = self.piece
-        u = np.tile([piece.place_uncertainty] * 2 + [piece.tilt_uncertainty] * 2, len(self.calibrated))
-        by_own = np.zeros((len(own), len(u), own.shape[1]))
-        by_own[:, np.arange(len(u)), first + np.arange(len(u))] = 1.0 / u
-        return own[:, first:] / u, by_own
 
 
 def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> LShapeProblem:
@@ -314,14 +33,11 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> LShapeProble
         raise DataError(
             f"campaign {campaign.name} has no [artefact.l_shape]; l-shape needs its modules and placements"
         )
-    if len(chain.joints) != 3 or any(joint.turns for joint in chain.joints):
-        axes = ", ".join(joint.name for joint in chain.joints)
-        raise DataError(f"l-shape is a method for three linear axes; this machine has {axes}")
+    base = l_shape_base(chain)
     probings = campaign.probings
-    base = model.base_of(chain) if model.base else tuple(parse_effect(text, chain) for text in base_of(chain))
     return LShapeProblem(
         context=context_of(campaign, chain),
-        base=base,
+        base=model.base_of(chain) if model.base else tuple(parse_effect(text, chain) for text in base),
         added=model.added_to(chain),
         sigma=np.full((len(probings), 4), campaign.probe.standard_uncertainty),
         spots=np.column_stack([probings.channels[name] for name in COLUMNS]) * MICROMETRE.factor,
@@ -335,16 +51,22 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     """What the plan left out."""
     assert isinstance(problem, LShapeProblem)
     rows = problem.context.run == run
-    used = {problem.piece.placements[place].plane for place in np.unique(problem.placement[rows])}
+    used = {problem.piece.placements[index].plane for index in np.unique(problem.placement[rows])}
     missing = [plane for plane in ("XY", "XZ", "YZ") if plane not in used]
     if missing:
         return f"; lay the piece in the {' and the '.join(missing)} plane too"
     return f"; scan {len(ORDERS) + 1} or more modules along every arm, as a cubic needs"
 
 
-def identify(
-    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
-) -> Identification:
-    """The geometric errors of every run at once. Raises DataError where the data do not suffice."""
-    problem = problem_of(campaign, model)
-    return identification(campaign, model, problem, solve(problem), advice)
+METHOD = ChainMethod(
+    name=NAME,
+    title="L-shaped standard piece",
+    description="modules of an L, scanned by an angle sensor: the 21 errors of three axes",
+    nouns=Nouns(target="module", row="reading", tool_point="tip"),
+    problem_of=problem_of,
+    advice=advice,
+    base_effects=l_shape_base,
+    # Spots move by micrometres whatever is exchanged; noise and module errors leave no more than this.
+    gross_times=2.5,
+    stepwise=Stepwise(stepwise),
+)

@@ -1,236 +1,29 @@
-"""Rotary probing: location errors of rotary axes from touching one test piece at indexed angles.
-
-A touch tells one number: how far the stylus tip's centre stands from the surface, along its normal. The same points
-are touched at several angles, so their heights are unknowns of the run, and place and shape of the piece cancel. A
-sphere is touched from several sides at every pose; its centre and its effective radius (its own and the tip's) are
-unknowns. The linear axes and the stylus tip count as known: their errors go into the result (docs/rotary-probing.md
-says how far), as none of these touches can tell them from errors of the rotary axes.
-
-Any chain with rotary axes, any poses, faces with any normals. Source: S. Ibaraki, T. Iritani, T. Matsushita, 2012;
-its closed forms are in ``rotary_patterns``. Two products of small numbers are neglected: the tilt of a face against
-its stated normal times the location errors (2 mrad and 30 µm: 0.06 µm), and the curvature of a sphere over the
-change of the touched place between two identifications (below 1 nm).
-"""
+"""The method ``rotary-probing``: location errors of rotary axes from one test piece touched at indexed angles."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-
-import numpy as np
-import numpy.typing as npt
-
-from monitor.effects import Context, context_of
-from monitor.exceptions import DataError
-from monitor.machine import Evaluation, evaluate
-from monitor.methods.chain.identification import Identification
-from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
-from monitor.methods.chain.results import identification
-from monitor.methods.model import Model, chain_of
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.sufficiency import still_joints
+from monitor.methods.method import ChainMethod, Nouns
 from monitor.methods.rotary_probing.base import rotary_base
-from monitor.records import Array, Campaign
-
-NAME = "rotary-probing"
-DEFAULT_MODEL = Model(NAME)
-NORMAL = ("normal_x", "normal_y", "normal_z")
-# One point of the piece comes back to the same place of the table's frame to within set-up and location errors. More
-# than this apart (mm) and the machine file is wrong, or two points share a name.
-FARTHEST_APART = 2.0
-# A stated normal and the direction from a sphere's centre to the tip agree to this (rad), or one of them is wrong.
-LARGEST_TILT = 0.2
-# The direction from a sphere's centre is taken from the solution before: each time the rest falls by the ratio of
-# the location errors to the radius, so from 50 µm and 10 mm it is 3 nm after two.
-DIRECTIONS = 3
-base_effects = rotary_base
-#: What counts as known, so that no reading speaks of its errors.
-TAKEN_AS_KNOWN = ("the linear axes", "the stylus tip")
-
-
-@dataclass(frozen=True)
-class RotaryProblem(ChainProblem):
-    """Touches of faces and spheres. ``normal`` (n, 3) is the direction in which a touch tells, outwards, in the frame
-    of the last work axis; ``place`` (n, 3) mm the touched point's reference in it, a sphere's centre for its touches;
-    ``ball`` (n,) whether the target is a sphere; ``tip`` (3,) mm the tip's centre in the spindle frame."""
-
-    normal: Array
-    place: Array
-    ball: npt.NDArray[np.bool_]
-    tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @cached_property
-    def _kinds(self) -> tuple[tuple[str, bool], ...]:
-        balls = set(self.context.target[self.ball].tolist())
-        return tuple((name, name in balls) for name in self.targets)
-
-    @cached_property
-    def _first(self) -> npt.NDArray[np.int64]:
-        """Place (n,) of the first own unknown of every touch's target."""
-        sizes = [4 if ball else 1 for _, ball in self._kinds]
-        return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)[self._target]
-
-    @cached_property
-    def own_names(self) -> tuple[str, ...]:
-        """Heights of the points, centres and effective radii of the spheres."""
-        names: list[str] = []
-        for name, ball in self._kinds:
-            names += (
-                [f"ball {name} {what}" for what in ("x", "y", "z", "radius")] if ball else [f"height {name}"]
-            )
-        return tuple(names)
-
-    @cached_property
-    def own_start(self) -> Array:
-        """Points at their references, spheres at theirs with no radius: the problem is all but linear."""
-        return np.zeros((len(self.runs), len(self.own_names)))
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        """The one number of a touch."""
-        return ("normal",)
-
-    @property
-    def measured_joints(self) -> tuple[int, ...]:
-        """The linear axes: they stop where the tip meets the surface."""
-        return tuple(place for place, joint in enumerate(self.context.chain.joints) if not joint.turns)
-
-    def ends(self, own: Array) -> tuple[Array, Array]:
-        """Points of the surface (of the surface that the tip's centre meets) and the tip."""
-        mine = own[self._run]
-        rows = np.arange(len(self.context))
-        height = mine[rows, self._first + 3 * self.ball]
-        ends = self.place + height[:, None] * self.normal
-        for axis in range(3):
-            ends[self.ball, axis] += mine[self.ball, self._first[self.ball] + axis]
-        return ends, np.broadcast_to(np.array(self.tip), ends.shape)
-
-    def by_own(self, own: Array, seen: Evaluation) -> Array:
-        """Derivatives (n, 3, q) by heights, centres and radii."""
-        found = np.zeros((len(self.context), 3, own.shape[1]))
-        rows = np.arange(len(self.context))
-        found[rows, :, self._first + 3 * self.ball] = -self.normal
-        for axis in range(3):
-            found[rows[self.ball], axis, self._first[self.ball] + axis] = -1.0
-        return found
-
-    def observe(self, rows: Array) -> Array:
-        """The part along the normal (n, 1, ...)."""
-        told: Array = np.einsum("ni,ni...->n...", self.normal, rows)[:, None]
-        return told
-
-
-def _normals(campaign: Campaign) -> Array:
-    missing = [name for name in NORMAL if name not in campaign.probings.channels]
-    if missing:
-        raise DataError(
-            f"campaign {campaign.name} has no column {' nor '.join(missing)}; {NAME} needs the outward normal of every "
-            "touched surface, in the frame of the last work axis"
-        )
-    normal = np.column_stack([campaign.probings.channels[name] for name in NORMAL])
-    length = np.linalg.norm(normal, axis=1)
-    if not np.all(np.isfinite(length)) or np.any(np.abs(length - 1.0) > 0.01):
-        row = int(np.flatnonzero(~(np.abs(length - 1.0) <= 0.01))[0])
-        raise DataError(
-            f"run {campaign.probings.run[row]}, sequence {campaign.probings.sequence[row]}: a normal is a vector of "
-            f"length 1, not {normal[row].tolist()}"
-        )
-    return np.asarray(normal / length[:, None])
-
-
-def _references(context: Context, tips: Array, ball: npt.NDArray[np.bool_]) -> Array:
-    """Where each touched point lies (n, 3): the mean over its run and target, a sphere's nominal centre."""
-    found = np.where(ball[:, None], context.nominal, 0.0)
-    for run in np.unique(context.run):
-        for target in np.unique(context.target[(context.run == run) & ~ball]):
-            rows = (context.run == run) & (context.target == target)
-            found[rows] = tips[rows].mean(axis=0)
-            apart = float(np.linalg.norm(tips[rows] - found[rows], axis=1).max())
-            if apart > FARTHEST_APART:
-                raise DataError(
-                    f"run {run}: the touches of point {target} lie up to {2.0 * apart:.3g} mm apart in the table's "
-                    "frame: the readings contradict the machine file; check the axis signs, the topology, the tip and "
-                    "that every point has its own name"
-                )
-    return found
-
-
-def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProblem:
-    """The least-squares problem of a campaign under a model.
-
-    Every touch has the probe's stated standard uncertainty along the normal. Raises DataError for readings that
-    contradict the machine file, a normal that is none, or a machine without a rotary axis.
-    """
-    chain = chain_of(campaign.machine)
-    own = model if model.base else replace(model, base=rotary_base(chain))
-    context = context_of(campaign, chain)
-    normal = _normals(campaign)
-    ball = np.isin(context.target, [one.id for one in campaign.artefact.balls])
-    tip = campaign.probe.tip or (0.0, 0.0, 0.0)
-    none = np.zeros((len(context), len(chain.joints), 2, 6))
-    tips = evaluate(chain, context.positions, none, np.zeros((len(context), 3)), np.array(tip)).residual
-    place = _references(context, tips, ball)
-    problem = RotaryProblem(
-        context=replace(context, nominal=place),
-        base=own.base_of(chain),
-        added=own.added_to(chain),
-        sigma=np.full((len(context), 1), campaign.probe.standard_uncertainty),
-        normal=normal,
-        place=place,
-        ball=ball,
-        tip=tip,
-    )
-    if ball.any():
-        problem = _directed(problem, tips)
-    return problem.foreseen() if problem.added else problem
-
-
-def _directed(problem: RotaryProblem, tips: Array) -> RotaryProblem:
-    """The problem with every touch of a sphere telling along the line from its centre to the tip."""
-    plain = replace(problem, added=())
-    stated = problem.normal[problem.ball]
-    for _ in range(DIRECTIONS):
-        solution = solve_problem(plain)
-        own = solution.local[:, len(plain.base_names) :]
-        rows = np.flatnonzero(problem.ball)
-        mine = own[plain._run[rows]]
-        shift = np.stack([mine[np.arange(len(rows)), plain._first[rows] + axis] for axis in range(3)], axis=1)
-        # The vector leads from the sphere's surface to the tip; from its centre it is a radius along the normal more.
-        vector = plain.evaluated(solution.local, solution.common).residual[rows]
-        vector = vector + plain.ends(own)[0][rows] - (plain.place[rows] + shift)
-        direction = vector / np.linalg.norm(vector, axis=1, keepdims=True)
-        tilt = np.arccos(np.clip(np.sum(direction * stated, axis=1), -1.0, 1.0))
-        if float(tilt.max()) > LARGEST_TILT:
-            row = rows[int(tilt.argmax())]
-            raise DataError(
-                f"run {problem.context.run[row]}, sequence {problem.context.sequence[row]}: the stated normal and the "
-                f"line from the centre of ball {problem.context.target[row]} to the tip are "
-                f"{np.degrees(tilt.max()):.3g} degrees apart; check the normal, the ball's nominal_mm and the tip"
-            )
-        normal = problem.normal.copy()
-        normal[rows] = direction
-        plain = replace(plain, normal=normal)
-    return replace(problem, normal=plain.normal)
+from monitor.methods.rotary_probing.problem import NAME, problem_of
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
-    """What the plan kept still and would have to move."""
-    rows = problem.context.run == run
-    still = [
-        joint.name
-        for place, joint in enumerate(problem.context.chain.joints)
-        if joint.kind == "rotary" and np.ptp(problem.context.positions[rows, place]) == 0
-    ]
+    """What the plan did not move and would have to move."""
+    still = [joint.name for joint in still_joints(problem, run, "rotary")]
     if still:
         return f": {' and '.join(still)} stands at one angle throughout; index it too"
     return "; touch more faces or other angles: the same points at opposite angles, and faces that look elsewhere"
 
 
-def identify(
-    campaign: Campaign, model: Model = DEFAULT_MODEL, solve: Solver = solve_problem
-) -> Identification:
-    """The location errors of every run of a campaign, with the covariance of the probe's stated uncertainty.
-
-    Raises DataError where the readings contradict the machine file, EffectError where the model names an effect
-    that the machine or the data do not have.
-    """
-    problem = problem_of(campaign, model)
-    return identification(campaign, model, problem, solve(problem), advice)
+METHOD = ChainMethod(
+    name=NAME,
+    title="rotary probing",
+    description="a block, a part or spheres, touched at indexed angles of two rotary axes",
+    nouns=Nouns(target="target", row="touch", tool_point="tip"),
+    problem_of=problem_of,
+    advice=advice,
+    base_effects=rotary_base,
+    taken_as_known=("the linear axes", "the stylus tip"),
+)

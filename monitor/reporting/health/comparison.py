@@ -31,8 +31,8 @@ class ResidualMap:
 class GroupMean:
     """Mean residual of ``n`` probings in µm with its standard uncertainty, before and after (None: not known)."""
 
-    at: float
     n: int
+    at: float
     before_um: float
     u_before_um: float
     after_um: float | None

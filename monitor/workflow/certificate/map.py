@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from monitor.discovery import fit
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.records import Array
 from monitor.reporting.certificate.volumetric_result import Length, Place, VolumetricResult
 from monitor.units import DEGREE, MICROMETRE
@@ -14,7 +14,7 @@ from monitor.workflow.volumetric.volumetric import Mapped, at_zero, map_of
 
 def volumetric_result(found: Evaluation, state: str) -> VolumetricResult:
     """The map of an evaluated run in display units. Raises InputError where not three linear axes moved."""
-    problem = method_named(found.campaign.method).problem_of(found.campaign, as_model(found.model))
+    problem = campaign_method(found.campaign).problem_of(found.campaign, as_model(found.model))
     mapped = map_of(found, fit(problem))
     drawn = at_zero(mapped)
     error, p = mapped.error, found.p

@@ -1,120 +1,152 @@
-"""What is said of a curve in a few sentences: what the model lacks, the noise, the readings that were left out."""
+"""Comparison and explanation of a curve in the unit of its response, and in micrometres where that is a length."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
+from monitor.discovery.curve.compare import CurveComparison as Comparison
+from monitor.discovery.curve.compare import compare_curve
 from monitor.discovery.curve.explain import CurveExplanation
-from monitor.discovery.search.comparison import Verdict
-from monitor.methods.curve.problem import problem_of
+from monitor.discovery.curve.missing import CurveMissing as Missing
+from monitor.discovery.curve.quality import bic
+from monitor.discovery.search.comparison import Part
 from monitor.records import CurveCampaign
-
-#: So many rows on average at each value of a column make it look set rather than read.
-ROWS_A_SETTING = 4
-#: So many outliers, none further from the next than this, are a stretch of the series rather than single readings.
-FEWEST_TOGETHER, NEAR = 5, 3
-
-
-def correlation(noise: Mapping[str, Any]) -> str:
-    """The noise in words: both of its numbers, for what a mean is worth depends on how slowly it fades."""
-    told = f"correlation {noise['lag_one']:.2f}"
-    return f"{told}, times {noise['slow']:.2f} with each further row" if noise["lag_one"] > 0.0 else told
-
-
-def _exchanged(curve: CurveCampaign) -> str | None:
-    """A hint where the response looks like what was set and an input of the base like what was read."""
-    values = len(np.unique(curve.measured))
-    if values * ROWS_A_SETTING > len(curve):
-        return None
-    for effect in problem_of(curve).base:
-        taken = len(np.unique(curve.columns[effect.column])) if effect.column in curve.columns else 0
-        if effect.column != curve.time and 2 * taken > len(curve):
-            return (
-                f"{curve.response} takes only {values} different values and {effect.column} {taken}: if "
-                f"{curve.response} was set and {effect.column} was read, exchange them in response and base."
-            )
-    return None
+from monitor.workflow.explain.compare_answer import CurveComparison, CurvePart
+from monitor.workflow.explain.curve_sentences import curve_sentences
+from monitor.workflow.explain.explain_answer import (
+    BadRow,
+    CurveMissing,
+    ExplainAnswer,
+)
+from monitor.workflow.explain.shared_answer import (
+    coefficients,
+    coinciding,
+    lack_of_fit_test,
+    rivals,
+    searched_value,
+)
+from monitor.workflow.identify.curve import curve_noise, in_micrometres, response_unit
 
 
-def _likely(likely: Sequence[Mapping[str, Any]], more: bool) -> str:
-    """What is told of effects that noise alone might bring forth."""
-    doubt = max(one["noise_alone_p"] for one in likely)
-    named = likely[0]["effect"] + (f": {likely[0]['meaning']}" if not more else "")
-    named += "".join(f", then {one['effect']}" for one in likely[1:])
-    return (
-        f"{'Also likely' if more else 'Likely'}, not certain: {named}. Noise whose neighbouring rows resemble each "
-        f"other would by itself look so in about {doubt:.0%} of such series; a longer one can tell."
+def _part(curve: CurveCampaign, part: Part) -> CurvePart:
+    return CurvePart(
+        in_micrometres(curve, part.rms),
+        part.rms,
+        in_micrometres(curve, part.largest),
+        part.largest,
+        part.count,
     )
 
 
-def answer(document: Mapping[str, Any], found: CurveExplanation) -> str:
-    """The finding in a few sentences."""
-    parts = []
-    missing = document["missing"]
-    certain = [one for one in missing if one["certain"]]
-    likely = [one for one in missing if not one["certain"]]
-    if certain:
-        parts.append(f"The model lacks {certain[0]['effect']}: {certain[0]['meaning']}.")
-        if len(certain) > 1:
-            parts.append(f"After that {', then '.join(one['effect'] for one in certain[1:])}.")
-    if likely:
-        parts.append(_likely(likely, bool(certain)))
-    if missing:
-        if missing[0]["indistinguishable_from"]:
-            parts.append(
-                f"These rows cannot rule out {', '.join(missing[0]['indistinguishable_from'])} in its place."
-            )
-    elif document["verdict"] == Verdict.SOMETHING_IS_MISSING:
-        parts.append(
-            "The model does not explain the measurements, but no effect that the columns allow explains more."
-        )
-    elif found.first.exact:
-        parts.append("The model fits exactly, to the rounding of the numbers; nothing is left to explain.")
-    else:
-        parts.append("Nothing is missing that these rows can show.")
-    hint = _exchanged(found.first.problem.curve)
-    if hint is not None:
-        parts.append(hint)
-    if missing and found.final.exact:
-        parts.append("With all of it the model fits exactly, to the rounding of the numbers.")
-    noise = document["autocorrelation_after"]
-    if noise["noticed"]:
-        resembles = "resemble" if noise["lag_one"] > 0 else "alternate against"
-        parts.append(
-            f"Neighbouring rows {resembles} each other ({correlation(noise)}): "
-            + (
-                f"for a mean they are worth {noise['effective_rows']:.0f} of {noise['rows']} rows, and "
-                if noise["lag_one"] > 0
-                else ""
-            )
-            + "all uncertainties and tests allow for it."
-        )
-    if document["suspect_data"]:
-        stretch = _stretch([one["sequence"] for one in document["suspect_data"]])
-        rows = ", ".join(str(one["sequence"]) for one in document["suspect_data"])
-        one = len(document["suspect_data"]) == 1
-        parts.append(f"{'Row' if one else 'Rows'} {rows} {'contradicts' if one else 'contradict'} the rest and "
-                     f"{'was' if one else 'were'} left out.")  # fmt: skip
-        if stretch is not None:
-            count, first, last = stretch
-            parts.append(
-                f"{count} of them lie between rows {first} and {last}: a stretch in which {document['response']} "
-                "behaved otherwise rather than single wrong readings."
-            )
-    return " ".join(parts)
+def curve_comparison(comparison: Comparison, model: str) -> CurveComparison:
+    """The comparison of a curve with the model of that name."""
+    fit = comparison.fit
+    curve = fit.problem.curve
+    largest = float(np.abs(fit.residual).max())
+    return CurveComparison(
+        campaign=curve.name,
+        model=model,
+        method=curve.method,
+        base=curve.base,
+        response=curve.response,
+        unit=response_unit(curve),
+        rows=len(curve),
+        rms_um=in_micrometres(curve, fit.rms),
+        rms=fit.rms,
+        largest_um=in_micrometres(curve, largest),
+        largest=largest,
+        repeatability_um=in_micrometres(curve, comparison.repeatability),
+        repeatability=comparison.repeatability,
+        expected_rms_um=in_micrometres(curve, comparison.expected_rms),
+        expected_rms=comparison.expected_rms,
+        residual_deviation_um=in_micrometres(curve, fit.deviation),
+        residual_deviation=fit.deviation,
+        stated_uncertainty_um=in_micrometres(curve, curve.standard_uncertainty),
+        stated_uncertainty=curve.standard_uncertainty,
+        degrees_of_freedom=fit.degrees_of_freedom,
+        bic=bic(fit),
+        lack_of_fit=lack_of_fit_test(comparison.lack_of_fit),
+        excess_over_statement_p=comparison.excess_p_value,
+        autocorrelation=curve_noise(comparison.noise, fit),
+        verdict=comparison.verdict,
+        by={
+            column: {name: _part(curve, part) for name, part in parts.items()}
+            for column, parts in comparison.by.items()
+        },
+    )
 
 
-def _stretch(rows: Sequence[int]) -> tuple[int, int, int] | None:
-    """How many rows of the longest stretch lie together, its first and its last; None where none does."""
-    groups: list[list[int]] = []
-    for row in sorted(rows):
-        if groups and row - groups[-1][-1] <= NEAR:
-            groups[-1].append(row)
-        else:
-            groups.append([row])
-    longest = max(groups, key=len, default=[])
-    together = len(longest) >= FEWEST_TOGETHER and 2 * len(longest) > longest[-1] - longest[0]
-    return (len(longest), longest[0], longest[-1]) if together else None
+def _curve_missing(curve: CurveCampaign, effect: Missing) -> CurveMissing:
+    return CurveMissing(
+        rank=effect.rank,
+        effect=effect.effect,
+        certain=effect.certain,
+        noise_alone_p=effect.noise_alone,
+        meaning=effect.description.meaning,
+        cause=effect.description.cause,
+        remedy=effect.description.remedy,
+        described_in=effect.description.described_in,
+        amplitude=effect.amplitude,
+        u=effect.u,
+        unit=effect.units[0].name,
+        coefficients=coefficients(effect),
+        peak_um=in_micrometres(curve, effect.peak),
+        peak=effect.peak,
+        p_value=effect.p_value,
+        q_value=effect.q_value,
+        rms_before_um=in_micrometres(curve, effect.rms_before),
+        rms_before=effect.rms_before,
+        rms_after_um=in_micrometres(curve, effect.rms_after),
+        rms_after=effect.rms_after,
+        heldout_before_um=in_micrometres(curve, effect.held_out_before),
+        heldout_before=effect.held_out_before,
+        heldout_after_um=in_micrometres(curve, effect.held_out_after),
+        heldout_after=effect.held_out_after,
+        bic_before=effect.bic_before,
+        bic_after=effect.bic_after,
+        indistinguishable_from=rivals(effect),
+        coinciding=coinciding(effect),
+        tell_apart_by=(),
+        varies_from_run_to_run=False,
+        searched=searched_value(effect),
+    )
+
+
+def curve_explain_answer(explanation: CurveExplanation, model: str) -> ExplainAnswer:
+    """The explanation of a curve: what a comparison says, what the model lacks, and the rows that were left out."""
+    curve = explanation.first.problem.curve
+    comparison = curve_comparison(compare_curve(explanation.first, lacks=bool(explanation.missing)), model)
+    if explanation.suspect and not explanation.missing:
+        # An outlier is named as such: the verdict is the one without it.
+        verdict = compare_curve(explanation.final, lacks=False).verdict
+        comparison = replace(comparison, verdict=verdict)
+    missing = tuple(_curve_missing(curve, effect) for effect in explanation.missing)
+    suspect_data = tuple(
+        BadRow(
+            run=1,
+            sequence=outlier.row + 1,
+            line=int(curve.lines[outlier.row]),
+            target=None,
+            axis=curve.response,
+            value=float(curve.measured[outlier.row]),
+            size_um=in_micrometres(curve, outlier.size),
+            size=outlier.size,
+            p_value=outlier.p_value,
+        )
+        for outlier in explanation.suspect
+    )
+    noise = curve_noise(explanation.noise, explanation.final)
+    return ExplainAnswer(
+        comparison=comparison,
+        missing=missing,
+        suspect_data=suspect_data,
+        changes=(),
+        blind_spots=tuple(explanation.blind),
+        not_recorded=dict(explanation.refused),
+        autocorrelation_after=noise,
+        answer=curve_sentences(
+            explanation, comparison, missing, noise, [row.sequence for row in suspect_data]
+        ),
+    )

@@ -1,60 +1,59 @@
-"""A run of the L-shaped piece identified step by step, beside the fit of all at once."""
+"""A run of the L-shaped piece identified step by step, beside the fit of all parameters at once."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
 from monitor.exceptions import DataError
-from monitor.methods import method_named
+from monitor.methods import Unable, campaign_method, methods
+from monitor.methods.chain.identification import StepwiseCoefficient
 from monitor.methods.chain.problem import solve_problem
-from monitor.methods.l_shape.method import LShapeProblem
-from monitor.methods.l_shape.stepwise import Step, stepwise
 from monitor.store import Database, load_campaign
-from monitor.units import Unit
 from monitor.workflow.campaign_parts import only_run
-from monitor.workflow.models import as_model, resolve
+from monitor.workflow.identify.answer import StepwiseAnswer, StepwiseParameter
+from monitor.workflow.identify.fitting import machine_problem
+from monitor.workflow.identify.request import StepwiseRequest
+from monitor.workflow.models import resolve
 
-Document = dict[str, Any]
 
-
-def steps(db: Database, campaign: str, model: str | None = None, run: int | None = None) -> Document:
-    """One run (the last unless ``run`` says another) by both ways, with what tells them apart.
+def identify_stepwise(db: Database, request: StepwiseRequest) -> StepwiseAnswer:
+    """One run by both ways, with what tells them apart.
 
     Raises NotFoundError for an unknown campaign or run, DataError for a campaign of another method.
     """
-    loaded = load_campaign(db, campaign)
-    if loaded.method != "l-shape":
+    campaign = load_campaign(db, request.campaign)
+    stepwise = campaign_method(campaign).stepwise
+    if isinstance(stepwise, Unable):
+        able = (name for name, method in methods().items() if not isinstance(method.stepwise, Unable))
         raise DataError(
-            f"campaign {campaign} was measured by {loaded.method}; only l-shape has a stepwise way"
+            f"campaign {request.campaign} was measured by {campaign.method}; only {' and '.join(able)} has a "
+            "stepwise way"
         )
-    number = max(one.run for one in loaded.runs) if run is None else run
-    loaded = only_run(loaded, number)
-    stored = resolve(db, model, loaded.method)
-    problem = method_named(loaded.method).problem_of(loaded, as_model(stored))
-    assert isinstance(problem, LShapeProblem)
-    found = stepwise(problem, solve_problem(problem), number)
-    units = {effect.text: effect.unit for effect in problem.all_orders()}
-    return {
-        "campaign": campaign,
-        "run": number,
-        "stepwise": {one.parameter: _document(one, units[one.parameter]) for one in found},
-    }
+    number = max(run.run for run in campaign.runs) if request.run is None else request.run
+    campaign = only_run(campaign, number)
+    problem = machine_problem(campaign, resolve(db, request.model, campaign.method))
+    coefficients = stepwise.coefficients(problem, solve_problem(problem), number)
+    return StepwiseAnswer(
+        request.campaign,
+        number,
+        {coefficient.parameter: _parameter(coefficient) for coefficient in coefficients},
+    )
 
 
-def _document(one: Step, unit: Unit) -> Document:
-    def shown(value: float) -> float | None:
+def _parameter(coefficient: StepwiseCoefficient) -> StepwiseParameter:
+    unit = coefficient.unit
+
+    def displayed(value: float) -> float | None:
         return unit.to_display(value) if np.isfinite(value) else None
 
-    return {
-        "unit": unit.name,
-        "stepwise": shown(one.stepwise),
-        "u_stepwise": shown(one.u_stepwise),
-        "at_once": shown(one.at_once),
-        "u_at_once": shown(one.u_at_once),
-        "difference_by_method": shown(one.by_method),
-        "u_difference_by_noise": shown(one.u_noise),
-        "agrees": one.agrees,
-        "why": one.why,
-    }
+    return StepwiseParameter(
+        unit=unit.name,
+        stepwise=displayed(coefficient.stepwise),
+        u_stepwise=displayed(coefficient.u_stepwise),
+        at_once=displayed(coefficient.at_once),
+        u_at_once=displayed(coefficient.u_at_once),
+        difference_by_method=displayed(coefficient.by_method),
+        u_difference_by_noise=displayed(coefficient.u_noise),
+        agrees=coefficient.agrees,
+        why=coefficient.why,
+    )

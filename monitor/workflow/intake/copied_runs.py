@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from monitor.exceptions import CampaignError, Fault, MonitorError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.records import Campaign
 from monitor.store import Database, run_fingerprints
 from monitor.units import MICROMETRE
@@ -64,7 +64,7 @@ def _rms(db: Database, campaign: Campaign, run: int) -> float:
         one = only_run(campaign, run)
         # Who simulates without noise may state none either, and nothing can be weighed by it.
         one = replace(one, probe=replace(one.probe, standard_uncertainty=MICROMETRE.to_internal(1.0)))
-        return float(method_named(campaign.method).identify(one, model).runs[0].rms)
+        return float(campaign_method(campaign).identify(one, model).runs[0].rms)
     except MonitorError:
         return float("inf")
 

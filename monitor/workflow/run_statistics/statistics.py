@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.methods.tracker import method as tracker
+from monitor.methods import Unable, campaign_method, require
 from monitor.records import Array, Campaign
 from monitor.statistics import Homogeneity, Pooling, homogeneity, pool
 from monitor.store import (
@@ -22,7 +22,8 @@ from monitor.store import (
     save_analysis,
 )
 from monitor.units import DEGREE
-from monitor.workflow.identify.identification import identify
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.models import resolve
 from monitor.workflow.run_statistics.columns import campaign_columns, group_labels, selected
 from monitor.workflow.run_statistics.matrix_files import write_matrices
@@ -31,8 +32,6 @@ from monitor.workflow.run_statistics.tests import SEED, components, histogram, n
 from monitor.workflow.selections import group
 
 Document = dict[str, Any]
-
-OWN_FRAMES = "points seen by a tracker stand in another frame in every run"
 
 
 def _matrix(found: StoredIdentification, runs: list[int]) -> tuple[list[str], list[Any], Array]:
@@ -116,7 +115,7 @@ def _identified(db: Database, campaign: Campaign, model: str | None) -> StoredId
             return found
     except NotFoundError:
         pass
-    identify(db, campaign.name, model)
+    identify(db, IdentifyRequest(campaign.name, model))
     return load_identification(db, campaign.name, stored.name, stored.version)
 
 
@@ -165,6 +164,7 @@ def stats(
     that the runs do not have, DataError for fewer than two runs.
     """
     loaded = load_campaign(db, campaign)
+    require(campaign_method(loaded).statistics, loaded, "stats")
     labels = _groups(db, loaded, by)
     keep = _chosen(db, loaded, where, select)
     runs = [run.run for run, kept in zip(loaded.runs, keep, strict=True) if kept]
@@ -229,9 +229,9 @@ def _statistics(values: Array, groups: list[str], names: list[str]) -> tuple[Poo
 
 def _probed(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | str:
     """Names and values (R, 3 m), mm, of the probed coordinates, or why there are none."""
-    # What a tracker sees stands in a frame of its own in every run: there are no coordinates to put side by side.
-    if campaign.method == tracker.NAME:
-        return OWN_FRAMES
+    comparable = campaign_method(campaign).coordinates
+    if isinstance(comparable, Unable):
+        return comparable.why
     return coordinates(campaign, runs) or "the runs do not follow one plan"
 
 

@@ -17,7 +17,7 @@ from monitor.discovery.machine.model_uncertainty import model_uncertainty as mod
 from monitor.discovery.machine.variants import variants_of
 from monitor.effects.catalogue import catalogue
 from monitor.exceptions import DataError, InputError
-from monitor.methods import method_named
+from monitor.methods import campaign_method
 from monitor.methods.chain.identification import Refusal
 from monitor.methods.chain.results import refusals
 from monitor.records import Array, Campaign, LinearAxes
@@ -125,7 +125,7 @@ def evaluate(
     _check(method, digits, seed, p)
     loaded = runs_before(load_campaign(db, campaign), before)
     stored = resolve(db, model, loaded.method)
-    found = fit(method_named(loaded.method).problem_of(loaded, as_model(stored)))
+    found = fit(campaign_method(loaded).problem_of(loaded, as_model(stored)))
     chosen = None
     if select is not None:
         chosen = SelectedReadings(select, *selected_readings(db, select, loaded.name, stored, found.problem))
@@ -181,7 +181,7 @@ def evaluate_fit(
         inputs, of_axes = with_linear_axes(one, inputs, at, names, linear_axes)
         words += "; and the errors of the linear axes as stated"
         contributions = [*of_axes, *contributions]
-    words += left_out(getattr(method_named(loaded.method), "TAKEN_AS_KNOWN", ()), linear_axes is not None)
+    words += left_out(campaign_method(loaded).taken_as_known, linear_axes is not None)
     framework = _framework(at, readings_only, names, units, p, contributions)
     mcm = validation = None
     if method != "guf":
@@ -207,7 +207,7 @@ def evaluate_fit(
             finite_dof=False,
         )
         validation = validate(plain, mcm, digits=digits)
-    advice = method_named(loaded.method).advice
+    advice = campaign_method(loaded).advice
     refused = refusals(found.problem, found.solution.null_space[place], number, advice)
     asked = wished(p, None if chosen is None else chosen.name, model_uncertainty, linear_axes)
     return Evaluated(

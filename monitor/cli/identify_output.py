@@ -1,0 +1,108 @@
+"""What `monitor identify` prints: the parameters of the runs, the coefficients of a curve, the steps of the L-shape."""
+
+from __future__ import annotations
+
+from monitor.cli import output
+from monitor.cli.residual_output import four_digits, with_uncertainty
+from monitor.workflow.explain.curve_sentences import correlation
+from monitor.workflow.identify.answer import CurveRun, IdentifyAnswer, MachineRun, StepwiseAnswer
+
+# A screen holds so many runs beside the names of the parameters.
+SHOWN_RUNS = 6
+
+
+def show(answer: IdentifyAnswer) -> None:
+    """The parameters of the runs, or the coefficients of a curve."""
+    for run in answer.runs:
+        if isinstance(run, CurveRun):
+            _coefficients(answer, run)
+    runs = [run for run in answer.runs if isinstance(run, MachineRun)]
+    if runs:
+        _machine(answer, runs)
+
+
+def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
+    """The parameters of the last runs, newest last, and what was refused."""
+    shown = runs[-SHOWN_RUNS:]
+    before = f" (the last {len(shown)} of {len(runs)} runs; --json has all)" if len(runs) > len(shown) else ""
+    output.table(
+        f"{answer.campaign}, model {answer.model}{before}",
+        ["parameter", "unit", *(f"run {run.run}" for run in shown), "u"],
+        [*_rows(shown), ["RMS", "µm", *(f"{run.rms_um:.2f}" for run in shown), ""]],
+        text_columns=2,
+    )
+    notes = [run.note for run in shown if run.note]
+    if notes:
+        output.say(notes[0] + (f" (and {len(notes) - 1} more of these runs)" if len(notes) > 1 else ""))
+    for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
+        output.say(f"no number: {why}")
+    for name, estimate in answer.added.items():
+        output.say(
+            f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "
+            f"{estimate.unit} in all runs"
+        )
+    for refusal in answer.added_refused:
+        output.say(f"no number: {', '.join(refusal.parameters)}: {refusal.why}")
+
+
+def _rows(runs: list[MachineRun]) -> list[list[str]]:
+    """A row for every parameter: its unit, its value in every run, and the standard uncertainty of the last."""
+    rows = []
+    for name in dict.fromkeys(name for run in runs for name in run.parameters):
+        estimates = [run.parameters.get(name) for run in runs]
+        last = [estimate for estimate in estimates if estimate is not None][-1]
+        values = ["-" if each is None else output.rounded(each.value, each.u) for each in estimates]
+        rows.append([name, last.unit, *values, output.two_digits(last.u)])
+    return rows
+
+
+def _coefficients(answer: IdentifyAnswer, run: CurveRun) -> None:
+    curve, noise = answer.curve, answer.autocorrelation
+    assert curve is not None
+    assert noise is not None
+    rows = [
+        [name, with_uncertainty(estimate.value, estimate.u), estimate.unit]
+        for name, estimate in run.parameters.items()
+    ]
+    rows.append(["residual standard deviation", four_digits(run.residual_deviation), curve.unit])
+    output.table(
+        f"{answer.campaign}, model {answer.model} ({curve.base}), {run.degrees_of_freedom} degrees of freedom",
+        ["coefficient", "value ± u", "unit"],
+        rows,
+    )
+    for refusal in run.refused:
+        output.say(f"no number: {refusal.why}")
+    if noise.noticed:
+        output.say(
+            f"neighbouring rows resemble each other ({correlation(noise)}); u allows for it: "
+            f"{noise.effective_rows:.0f} of {noise.rows} rows for a mean"
+        )
+
+
+def stepwise(answer: StepwiseAnswer) -> None:
+    """Every parameter by both ways."""
+    rows = []
+    for name, step in answer.stepwise.items():
+        both = step.at_once is not None
+        rows.append(
+            [
+                name,
+                step.unit,
+                output.rounded(step.stepwise, step.u_stepwise),
+                output.two_digits(step.u_stepwise),
+                output.rounded(step.at_once, step.u_at_once) if both else "-",
+                output.two_digits(step.u_at_once) if both else "-",
+                output.rounded(step.difference_by_method, step.u_stepwise) if both else "-",
+                "" if step.agrees else "differs",
+                step.why,
+            ]
+        )
+    output.table(
+        f"{answer.campaign}, run {answer.run}: step by step and all at once",
+        ["parameter", "unit", "stepwise", "u", "at once", "u", "by method", "", "what tells them apart"],
+        rows,
+        text_columns=2,
+    )
+    output.say(
+        "by method: what of the difference remains without noise; 'differs': the rest exceeds 2 u of it"
+    )

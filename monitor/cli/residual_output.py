@@ -1,0 +1,64 @@
+"""What the verbs print of residuals: a machine in micrometres with two decimals, a curve with four digits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from monitor.cli import output
+from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
+from monitor.workflow.explain.curve_sentences import correlation
+
+
+def four_digits(value: float | None) -> str:
+    """A number with four digits; a dash where there is none."""
+    return "-" if value is None else f"{value:.4g}"
+
+
+def with_uncertainty(value: float | None, u: float | None) -> str:
+    """A value with its standard uncertainty, to two digits of the latter; with a power of ten where needed."""
+    if value is None:
+        return "-"
+    if u is None or not u > 0.0:
+        return f"{value:.6g}"
+    size = max(abs(value), u)
+    if 1e-4 <= size < 1e6:
+        return f"{output.rounded(value, u)} ± {output.two_digits(u)}"
+    power = int(f"{size:e}".partition("e")[2])
+    value, u = value / 10.0**power, u / 10.0**power
+    return f"({output.rounded(value, u)} ± {output.two_digits(u)})e{power:+03d}"
+
+
+def summary(comparison: MachineComparison | CurveComparison) -> None:
+    """The comparison in some sentences."""
+    curve = comparison if isinstance(comparison, CurveComparison) else None
+    number = output.micrometres if curve is None else four_digits
+    unit = comparison.unit
+    base = "" if curve is None else f" ({curve.base})"
+    source = "the probe's stated uncertainty" if curve is None else "the stated uncertainty"
+    expected = (
+        ""
+        if comparison.expected_rms is None
+        else f", expected {number(comparison.expected_rms)} {unit} from {source}"
+    )
+    repeats = (
+        "no repeats"
+        if curve is not None and curve.repeatability is None
+        else f"repeatability {number(comparison.repeatability)} {unit}"
+    )
+    model = f"{comparison.campaign}, model {comparison.model}{base}"
+    output.say(f"{model}: RMS {number(comparison.rms)} {unit}{expected}; {repeats}")
+    test = comparison.lack_of_fit
+    if test.f is not None:
+        output.say(f"lack of fit over repeatability: F = {test.f:.2f}, {output.stated('p', test.p)}")
+    if curve is not None and curve.autocorrelation.noticed:
+        output.say(
+            f"neighbouring rows resemble each other under this model: {correlation(curve.autocorrelation)} (a missing "
+            "effect or correlated noise; explain tells which)"
+        )
+    output.say(f"verdict: {comparison.verdict.value}")
+
+
+def files(names: Sequence[str] | None) -> None:
+    """The files of the figures, one a line."""
+    for name in names or ():
+        output.say(name)

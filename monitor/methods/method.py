@@ -1,0 +1,246 @@
+"""What a calibration method is: its names, its functions, and what it can do.
+
+A method is one folder of this package whose ``method.py`` has a ``METHOD``: a ``ChainMethod`` where a machine was
+measured, a ``CurveMethod`` where one response was measured over its inputs. The rest of the program asks these fields
+and never for a name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+from monitor.machine import Chain
+from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.chain.identification import Identification, StepwiseCoefficient
+from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
+from monitor.methods.chain.results import Advice, identification
+from monitor.methods.curve.fit import CurveFit
+from monitor.methods.curve.problem import CurveProblem
+from monitor.methods.model import Model
+from monitor.records import Array, Campaign, CurveCampaign
+from monitor.units import Unit
+
+
+@dataclass(frozen=True)
+class Able:
+    """The method answers the question."""
+
+
+@dataclass(frozen=True)
+class Unable:
+    """The method has no answer to the question; ``why`` is half a sentence that can follow a colon."""
+
+    why: str
+
+
+@dataclass(frozen=True)
+class TouchPlan(Able):
+    """Plans are targets and indexations: the method's problem is a ``TouchProblem``."""
+
+
+@dataclass(frozen=True)
+class AnglePlan(Able):
+    """Plans are angles of a table, of which ``candidates_of`` weighs those in degrees that are given."""
+
+    candidates_of: Callable[[Campaign, Model, Sequence[float]], AngleCandidates]
+
+
+@dataclass(frozen=True)
+class Stepwise(Able):
+    """One run can be identified step by step too, beside the fit of all unknowns at once."""
+
+    coefficients: Callable[[ChainProblem, Solution, int], tuple[StepwiseCoefficient, ...]]
+
+
+class VirtualCampaign(Protocol):
+    """Makes a campaign with an effect whose largest displacement is ``peak`` (mm), under a ``noise`` (mm) of a reading.
+
+    Raises EffectError for an effect that the virtual machine does not have or that does nothing in its plan.
+    """
+
+    def __call__(
+        self,
+        name: str,
+        rng: np.random.Generator,
+        *,
+        effect: str | None = None,
+        peak: float = 0.0,
+        noise: float = ...,
+    ) -> Campaign: ...
+
+
+@dataclass(frozen=True)
+class Rehearsal(Able):
+    """Virtual campaigns of a ``machine``; ``noise_um`` is the standard deviation of a reading where none is named."""
+
+    machine: Literal["machine tool", "robot"]
+    virtual_campaign: VirtualCampaign
+    noise_um: float
+
+
+class ExpectedAngles(Protocol):
+    """What a plan of angles of a table promises.
+
+    ``shape`` are standard uncertainties of the shape's points in mm and ``u`` those of all parameters in internal
+    units, NaN where the plan gives no number; ``nullity`` counts the dimensions that it leaves open and ``left_out``
+    the points that would lie beyond the nodes.
+    """
+
+    @property
+    def angles(self) -> tuple[float, ...]: ...
+    @property
+    def probings(self) -> int: ...
+    @property
+    def left_out(self) -> int: ...
+    @property
+    def nullity(self) -> int: ...
+    @property
+    def u(self) -> dict[str, float]: ...
+    @property
+    def shape(self) -> Array: ...
+
+
+class AngleCandidates(Protocol):
+    """Angles of a table (degrees) to choose from, with the ``present`` plan of the first run."""
+
+    @property
+    def present(self) -> tuple[float, ...]: ...
+    @property
+    def table(self) -> str: ...
+    @property
+    def conditions(self) -> Mapping[str, str]: ...
+    @property
+    def units(self) -> Mapping[str, Unit]: ...
+
+    def expected(self, angles: Sequence[float]) -> ExpectedAngles:
+        """What a plan of these angles promises."""
+
+    def next_angles(self, count: int) -> tuple[Sequence[ExpectedAngles], tuple[float, ...]]:
+        """Every single angle added to the present plan, best first, and the best ``count`` angles."""
+
+
+@dataclass(frozen=True)
+class Nouns:
+    """What a ``target`` and a ``row`` of a campaign are called, and ``tool_point`` where an effect is seen largest."""
+
+    target: str
+    row: str
+    tool_point: str
+
+
+@dataclass(frozen=True)
+class Method:
+    """A calibration method: ``name`` as campaigns write it, ``title`` and ``description`` as people read them.
+
+    The other fields say to which questions the method has an answer; ``coordinates`` is whether the probed
+    coordinates of several runs can stand side by side in the statistics.
+    """
+
+    name: str
+    title: str
+    description: str
+    nouns: Nouns
+    statistics: Able | Unable
+    coordinates: Able | Unable
+    uncertainty: Able | Unable
+    plan: TouchPlan | AnglePlan | Unable
+    stepwise: Stepwise | Unable
+    map: Able | Unable
+    trend: Able | Unable
+    certificate: Able | Unable
+    rehearsal: Rehearsal | Unable
+
+    @property
+    def own_model(self) -> Model:
+        """The model that a campaign of the method is identified with unless another is named."""
+        return Model(self.name)
+
+
+class ProblemOf(Protocol):
+    """Makes the least-squares problem of a campaign under a model.
+
+    Raises DataError where the readings or the machine do not suffice, EffectError for an effect that they lack.
+    """
+
+    def __call__(self, campaign: Campaign, model: Model = ...) -> ChainProblem: ...
+
+
+class CurveProblemOf(Protocol):
+    """Makes the least-squares problem of a curve under a model; EffectError for an effect that it does not have."""
+
+    def __call__(self, campaign: CurveCampaign, model: Model = ...) -> CurveProblem: ...
+
+
+def nothing_to_refuse(campaign: Campaign, problem: ChainProblem) -> None:
+    """Accept every campaign that has a problem."""
+
+
+NO_REHEARSAL = Unable("there is no virtual machine for it")
+NO_STEPWISE = Unable("all unknowns are found at once")
+NO_TOUCH_PLAN = Unable("what a plan cannot tell apart, identify names with what to do")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChainMethod(Method):
+    """A method that measures a machine: readings on its kinematic chain.
+
+    ``refuse`` raises DataError for a campaign that has too little to be identified. ``gross_times`` stated standard
+    uncertainties in the residual are first of all a mistake of the file; of a run of more than ``trial_rows`` some
+    poses suffice to try such a mistake (None: all rows are needed). ``taken_as_known`` counts as free of errors, so
+    that no reading speaks of them.
+    """
+
+    problem_of: ProblemOf
+    advice: Advice
+    base_effects: Callable[[Chain], tuple[str, ...]] = base_effects
+    refuse: Callable[[Campaign, ChainProblem], None] = nothing_to_refuse
+    gross_times: float = 100.0
+    trial_rows: int | None = None
+    taken_as_known: tuple[str, ...] = ()
+    statistics: Able | Unable = Able()
+    coordinates: Able | Unable = Able()
+    uncertainty: Able | Unable = Able()
+    plan: TouchPlan | AnglePlan | Unable = NO_TOUCH_PLAN
+    stepwise: Stepwise | Unable = NO_STEPWISE
+    map: Able | Unable = Able()
+    trend: Able | Unable = Able()
+    certificate: Able | Unable = Able()
+    rehearsal: Rehearsal | Unable = NO_REHEARSAL
+
+    def identify(
+        self, campaign: Campaign, model: Model | None = None, solve: Solver = solve_problem
+    ) -> Identification:
+        """The geometric errors of every run of a campaign, with the covariance of the stated uncertainties.
+
+        ``solve`` gives the solution of the problem. Raises DataError where the readings do not suffice or contradict
+        the machine file, EffectError where the model names an effect that the machine or the data do not have.
+        """
+        model = model or self.own_model
+        problem = self.problem_of(campaign, model)
+        self.refuse(campaign, problem)
+        return identification(campaign, model, problem, solve(problem), self.advice)
+
+
+NO_MACHINE = Unable("a curve has no machine")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurveMethod(Method):
+    """A method that measures one response over its inputs: no machine, no runs."""
+
+    problem_of: CurveProblemOf
+    fit: Callable[[CurveProblem], CurveFit]
+    statistics: Able | Unable = Unable("a curve is one run")
+    coordinates: Able | Unable = NO_MACHINE
+    uncertainty: Able | Unable = Unable("identify gives the uncertainties of the coefficients")
+    plan: TouchPlan | AnglePlan | Unable = NO_MACHINE
+    stepwise: Stepwise | Unable = NO_STEPWISE
+    map: Able | Unable = NO_MACHINE
+    trend: Able | Unable = NO_MACHINE
+    certificate: Able | Unable = NO_MACHINE
+    rehearsal: Rehearsal | Unable = NO_REHEARSAL

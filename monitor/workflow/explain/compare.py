@@ -1,0 +1,64 @@
+"""Model against measurement: where a model fails on a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from monitor.discovery import Fit
+from monitor.discovery import compare as compare_fit
+from monitor.discovery.curve.compare import compare_curve
+from monitor.documents import to_document
+from monitor.methods.curve.fit import CurveFit
+from monitor.store import Database, save_analysis
+from monitor.workflow.explain.compare_answer import CompareAnswer
+from monitor.workflow.explain.curve_answer import curve_comparison
+from monitor.workflow.explain.machine_answer import machine_comparison
+from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.identify.fitting import fitted
+from monitor.workflow.models import label
+
+#: Draws the figures of an answer into a folder and returns the names of the files.
+Draw = Callable[[Path], Sequence[str]]
+
+
+def compare(db: Database, request: CompareRequest) -> CompareAnswer:
+    """Compare a model with a campaign; the answer is stored, without the names of the figures.
+
+    Raises NotFoundError, DataError where the readings do not suffice, InputError for a folder that cannot be made.
+    """
+    fit = fitted(db, request.campaign, request.model)
+    model = label(fit.model)
+    answer, draw = (
+        _compare_curve(fit.fit, model)
+        if isinstance(fit.fit, CurveFit)
+        else _compare_machine(fit.fit, request.campaign, model)
+    )
+    save_analysis(
+        db, "comparison", to_document(answer), method=fit.campaign.method, campaign=request.campaign,
+        model=fit.model.name, model_version=fit.model.version,
+    )  # fmt: skip
+    return answer if request.figures is None else replace(answer, figures=tuple(draw(request.figures)))
+
+
+def _compare_machine(fit: Fit, campaign: str, model: str) -> tuple[CompareAnswer, Draw]:
+    comparison = compare_fit(fit, campaign, model)
+
+    def draw(folder: Path) -> Sequence[str]:
+        # Loaded here: drawing costs a second that a comparison without figures need not wait.
+        from monitor.workflow.explain.figures import comparison_figures
+
+        return comparison_figures(comparison, fit, folder)
+
+    return CompareAnswer(machine_comparison(comparison), fit.problem.target_word), draw
+
+
+def _compare_curve(fit: CurveFit, model: str) -> tuple[CompareAnswer, Draw]:
+    def draw(folder: Path) -> Sequence[str]:
+        # Loaded here, as above.
+        from monitor.workflow.explain.curve_figures import curve_figures
+
+        return curve_figures(fit, None, folder)
+
+    return CompareAnswer(curve_comparison(compare_curve(fit), model)), draw

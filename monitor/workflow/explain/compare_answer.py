@@ -1,0 +1,133 @@
+"""The answer of `compare`: how large the residual is, how large it should be, and where it is too large.
+
+A machine's residuals are lengths in micrometres. A curve's stand in the unit of its response; keys that end in ``_um``
+repeat them in micrometres where the response is a length and are None elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from monitor.discovery import Verdict
+from monitor.documents import INLINED, OMITTED
+from monitor.units import MICROMETRE
+from monitor.workflow.identify.answer import CurveNoise
+
+
+@dataclass(frozen=True)
+class LackOfFitTest:
+    """F of lack of fit over pure error and its p-value; all None where no probing or row was repeated."""
+
+    f: float | None = None
+    p: float | None = None
+    degrees_of_freedom: float | None = None
+    pure_error_degrees_of_freedom: float | None = None
+
+
+@dataclass(frozen=True)
+class MachinePart:
+    """RMS and largest coordinate of the residual over ``n`` probings."""
+
+    rms_um: float
+    largest_um: float
+    n: int
+
+    @property
+    def rms(self) -> float:
+        return self.rms_um
+
+    @property
+    def largest(self) -> float:
+        return self.largest_um
+
+
+@dataclass(frozen=True)
+class CurvePart:
+    """RMS and largest residual over ``n`` rows of a curve."""
+
+    rms_um: float | None
+    rms: float
+    largest_um: float | None
+    largest: float
+    n: int
+
+
+@dataclass(frozen=True)
+class MachineComparison:
+    """A model against the probings of a machine.
+
+    ``expected_rms_um`` is what the stated standard uncertainty would leave, ``repeatability_um`` the standard deviation
+    of a coordinate over the runs (None with one run or plans that differ), ``residual_deviation_um`` the RMS per degree
+    of freedom. ``by`` breaks the residual down by target, axis, run, part of the run and indexation.
+    """
+
+    campaign: str
+    model: str
+    rms_um: float
+    largest_um: float
+    repeatability_um: float | None
+    expected_rms_um: float
+    residual_deviation_um: float
+    stated_uncertainty_um: float
+    lack_of_fit: LackOfFitTest
+    excess_over_statement_p: float
+    verdict: Verdict
+    by: Mapping[str, Mapping[str, MachinePart]]
+
+    @property
+    def unit(self) -> str:
+        return MICROMETRE.name
+
+    @property
+    def rms(self) -> float:
+        return self.rms_um
+
+    @property
+    def repeatability(self) -> float | None:
+        return self.repeatability_um
+
+    @property
+    def expected_rms(self) -> float:
+        return self.expected_rms_um
+
+
+@dataclass(frozen=True)
+class CurveComparison:
+    """A model against the rows of a curve; what a machine's comparison has, and the ``autocorrelation`` of the rows."""
+
+    campaign: str
+    model: str
+    method: str
+    base: str
+    response: str
+    unit: str
+    rows: int
+    rms_um: float | None
+    rms: float
+    largest_um: float | None
+    largest: float
+    repeatability_um: float | None
+    repeatability: float | None
+    expected_rms_um: float | None
+    expected_rms: float | None
+    residual_deviation_um: float | None
+    residual_deviation: float
+    stated_uncertainty_um: float | None
+    stated_uncertainty: float | None
+    degrees_of_freedom: int
+    bic: float
+    lack_of_fit: LackOfFitTest
+    excess_over_statement_p: float | None
+    autocorrelation: CurveNoise
+    verdict: Verdict
+    by: Mapping[str, Mapping[str, CurvePart]]
+
+
+@dataclass(frozen=True)
+class CompareAnswer:
+    """The comparison; ``target_word`` is what a machine's method calls its targets, None for a curve."""
+
+    comparison: CurveComparison | MachineComparison = field(metadata=INLINED)
+    target_word: str | None = field(default=None, metadata=OMITTED)
+    figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

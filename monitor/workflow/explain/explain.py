@@ -1,0 +1,124 @@
+"""Which physical effect a model lacks on a campaign, or what looks wrong in its file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from monitor.discovery import Explanation, Fit, Verdict, find_mistakes, fit, is_gross
+from monitor.discovery import compare as compare_fit
+from monitor.discovery import explain as search
+from monitor.discovery.curve.explain import explain_curve
+from monitor.documents import to_document
+from monitor.exceptions import DataError
+from monitor.records import Campaign, CurveCampaign
+from monitor.store import Database, StoredModel, save_analysis
+from monitor.workflow.campaign_parts import kind_of, method_of
+from monitor.workflow.explain.compare import Draw
+from monitor.workflow.explain.curve_answer import curve_explain_answer
+from monitor.workflow.explain.explain_answer import ExplainAnswer
+from monitor.workflow.explain.machine_answer import explain_answer
+from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sentence
+from monitor.workflow.explain.request import RATE, ExplainRequest
+from monitor.workflow.identify.fitting import curve_problem, load_measured, machine_problem
+from monitor.workflow.models import label, resolve
+
+# Seeds the search for steps, whose null distribution is drawn; stored with the result.
+SEED = 20260302
+
+
+def first_fit(campaign: Campaign, model: StoredModel) -> Fit:
+    """The model fitted to a machine's campaign.
+
+    Raises DataError where it cannot be fitted, with what looks wrong in the file where that can be said.
+    """
+    try:
+        return fit(machine_problem(campaign, model))
+    except DataError as error:
+        mistakes = find_mistakes(campaign, lambda changed: machine_problem(changed, model), None)
+        raise DataError(f"{error}. {mistake_sentence(mistakes)}" if mistakes else str(error)) from error
+
+
+def explanation_of(campaign: Campaign, model: StoredModel, first: Fit, rate: float = RATE) -> Explanation:
+    """Which physical effect a model lacks, or what looks wrong in the file; ``first`` is its fit to the campaign."""
+    mistakes = (
+        find_mistakes(campaign, lambda changed: machine_problem(changed, model), first)
+        if is_gross(campaign, first)
+        else ()
+    )
+    if mistakes:
+        comparison = replace(
+            compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING
+        )
+        return Explanation(comparison, (), (), (), (), (), (), first, mistakes)
+    rng = np.random.default_rng(SEED)
+    explanation = search(campaign, first.problem, label(model), rate=rate, rng=rng, first=first)
+    if is_hopeless(explanation):
+        # The effects that were found leave nearly all of the residual: none of them is an answer.
+        return replace(explanation, missing=(), suspect=(), moves=(), steps=())
+    return explanation
+
+
+def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
+    """Search for the effects that a model lacks; the answer is stored, without the names of the figures.
+
+    Raises NotFoundError, DataError where the model cannot be fitted, InputError for a folder that cannot be made.
+    """
+    measured = load_measured(db, request.campaign)
+    model = resolve(db, request.model, measured.method)
+    answer, draw = (
+        _search_curve(measured, model, request.rate)
+        if isinstance(measured, CurveCampaign)
+        else _search_machine(measured, model, request.rate)
+    )
+    save_explanation(db, answer, measured.method, model)
+    return answer if request.figures is None else replace(answer, figures=tuple(draw(request.figures)))
+
+
+def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[ExplainAnswer, Draw]:
+    first = first_fit(campaign, model)
+    explanation = explanation_of(campaign, model, first, rate)
+    answer = explain_answer(explanation)
+
+    def draw(folder: Path) -> Sequence[str]:
+        # Loaded here: drawing costs a second that an explanation without figures need not wait.
+        from monitor.workflow.explain.figures import comparison_figures, explanation_figures
+
+        files = [
+            *comparison_figures(explanation.comparison, first, folder),
+            *explanation_figures(answer, explanation, folder),
+        ]
+        # The residual over the workspace belongs to both.
+        return list(dict.fromkeys(files))
+
+    return answer, draw
+
+
+def _search_curve(curve: CurveCampaign, model: StoredModel, rate: float) -> tuple[ExplainAnswer, Draw]:
+    explanation = explain_curve(curve_problem(curve, model), rate=rate)
+
+    def draw(folder: Path) -> Sequence[str]:
+        # Loaded here, as above.
+        from monitor.workflow.explain.curve_figures import curve_figures
+
+        return curve_figures(explanation.first, explanation, folder)
+
+    return curve_explain_answer(explanation, label(model)), draw
+
+
+def save_explanation(
+    db: Database, answer: ExplainAnswer, method: str, model: StoredModel, before: datetime | None = None
+) -> None:
+    """Store an explanation, as ``partial`` where runs from ``before`` on took no part.
+
+    The seed of the search for steps is stored with that of a machine.
+    """
+    save_analysis(
+        db, kind_of("explanation", before), to_document(answer), method=method_of(method, before),
+        campaign=answer.comparison.campaign, model=model.name, model_version=model.version,
+        seed=None if answer.machine is None else SEED,
+    )  # fmt: skip

@@ -1,0 +1,214 @@
+"""The answer of `explain`: a comparison, the effects that the model lacks, and readings and changes named as such."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from monitor.documents import INLINED, OMITTED, named
+from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
+from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
+from monitor.workflow.identify.answer import CurveNoise, Estimate
+
+
+@dataclass(frozen=True)
+class SearchedValue:
+    """A value that was searched for in the data: a time constant, a pitch, a period; ``u`` is None where unknown."""
+
+    what: str
+    value: float
+    u: float | None
+    unit: str
+    frequency: float | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class DeviationsApart:
+    """How many standard deviations apart two effects are with the present plan, and with the added poses."""
+
+    present: float = field(metadata=named("now"))
+    proposed: float = field(metadata=named("then"))
+
+
+@dataclass(frozen=True)
+class MachineMissing:
+    """An effect that a machine's model lacks: size in ``unit``, evidence, errors before and after it is added, rivals.
+
+    ``heldout_..`` are None with one run of few poses, ``heldout_days_..`` with fewer than three days. ``coinciding``
+    are rivals that no data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart.
+    """
+
+    rank: int
+    effect: str
+    meaning: str
+    cause: str
+    remedy: str
+    described_in: str
+    amplitude: float
+    u: float
+    unit: str
+    coefficients: Mapping[str, Estimate]
+    peak_um: float
+    p_value: float
+    q_value: float
+    rms_before_um: float
+    rms_after_um: float
+    heldout_before_um: float | None
+    heldout_after_um: float | None
+    heldout_days_before_um: float | None
+    heldout_days_after_um: float | None
+    indistinguishable_from: tuple[str, ...]
+    coinciding: tuple[str, ...]
+    tell_apart_by: tuple[dict[str, float], ...]
+    standard_deviations_apart: DeviationsApart
+    varies_from_run_to_run: bool
+    searched: SearchedValue | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class CurveMissing:
+    """An effect that a curve's model lacks; it is ``certain`` where noise alone would seldom look so."""
+
+    rank: int
+    effect: str
+    certain: bool
+    noise_alone_p: float
+    meaning: str
+    cause: str
+    remedy: str
+    described_in: str
+    amplitude: float
+    u: float
+    unit: str
+    coefficients: Mapping[str, Estimate]
+    peak_um: float | None
+    peak: float
+    p_value: float
+    q_value: float
+    rms_before_um: float | None
+    rms_before: float
+    rms_after_um: float | None
+    rms_after: float
+    heldout_before_um: float | None
+    heldout_before: float | None
+    heldout_after_um: float | None
+    heldout_after: float | None
+    bic_before: float
+    bic_after: float
+    indistinguishable_from: tuple[str, ...]
+    coinciding: tuple[str, ...]
+    tell_apart_by: tuple[dict[str, float], ...]
+    varies_from_run_to_run: bool
+    searched: SearchedValue | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class BadProbing:
+    """A probing that contradicts the same one of the other runs; it was left out."""
+
+    run: int
+    sequence: int
+    target: str
+    axis: str
+    size_um: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class BadRow:
+    """A row that contradicts the rest of its curve; it was left out. ``line`` is its line of the file."""
+
+    run: int
+    sequence: int
+    line: int
+    target: None
+    axis: str
+    value: float
+    size_um: float | None
+    size: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class MovedTarget:
+    """A target that stands elsewhere from a probing of a run on."""
+
+    target: str
+    run: int
+    sequence: int
+    size: float
+    shift_um: tuple[float, ...]
+    unit: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class ChangedTarget:
+    """A target that stands elsewhere from a run on."""
+
+    target: str
+    run: int
+    size: float
+    u: float
+    unit: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class ChangedParameter:
+    """A parameter that stepped at a run."""
+
+    parameter: str
+    run: int
+    size: float
+    u: float
+    unit: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class LikelyMistake:
+    """What looks wrong in the file, and the RMS with it and with it undone."""
+
+    what: str
+    rms_as_recorded_um: float
+    rms_undone_um: float
+
+
+@dataclass(frozen=True)
+class MachineFindings:
+    """What only a machine's explanation says: ``held_out`` are the parts left out in turn for the held-out errors."""
+
+    target_word: str
+    held_out: str
+    likely_mistakes: tuple[LikelyMistake, ...]
+    undecided: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """What the pictures of an explanation show; both None where nothing is missing."""
+
+    residual_map: ResidualMap | None = None
+    residual_against: ResidualAgainst | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplainAnswer:
+    """The explanation of a machine or of a curve; ``answer`` is the finding in a few sentences.
+
+    ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why. A machine
+    has ``machine`` and ``pictures``, a curve the ``autocorrelation_after`` the missing effects are added.
+    """
+
+    comparison: CurveComparison | MachineComparison = field(metadata=INLINED)
+    missing: tuple[MachineMissing | CurveMissing, ...]
+    suspect_data: tuple[BadProbing | BadRow, ...]
+    changes: tuple[MovedTarget | ChangedTarget | ChangedParameter, ...]
+    blind_spots: tuple[str, ...]
+    not_recorded: Mapping[str, str]
+    machine: MachineFindings | None = field(default=None, metadata=INLINED)
+    autocorrelation_after: CurveNoise | None = field(default=None, metadata=OMITTED)
+    answer: str
+    pictures: Pictures | None = field(default=None, metadata=INLINED)
+    figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

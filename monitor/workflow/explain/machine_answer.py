@@ -1,0 +1,156 @@
+"""Comparison and explanation of a machine as answers: in display units, with the findings in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from monitor.discovery import ChainComparison, ChainMissing, Explanation, Verdict
+from monitor.discovery.machine.steps import Step
+from monitor.units import DEGREE, MICROMETRE, Unit
+from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
+from monitor.workflow.explain.explain_answer import (
+    BadProbing,
+    ChangedParameter,
+    ChangedTarget,
+    DeviationsApart,
+    ExplainAnswer,
+    LikelyMistake,
+    MachineFindings,
+    MachineMissing,
+    MovedTarget,
+    Pictures,
+)
+from monitor.workflow.explain.machine_sentences import ONE_RUN, machine_sentences
+from monitor.workflow.explain.residuals_against import pictures_of
+from monitor.workflow.explain.shared_answer import (
+    coefficients,
+    coinciding,
+    lack_of_fit_test,
+    rivals,
+    searched_value,
+)
+
+
+def micrometres(length: float | None) -> float | None:
+    """A length in mm in micrometres; None where there is none."""
+    return None if length is None else MICROMETRE.to_display(length)
+
+
+def machine_comparison(comparison: ChainComparison, verdict: Verdict | None = None) -> MachineComparison:
+    """The comparison of a machine in micrometres, with another ``verdict`` where one is named."""
+    um = MICROMETRE.to_display
+    return MachineComparison(
+        campaign=comparison.campaign,
+        model=comparison.model,
+        rms_um=um(comparison.rms),
+        largest_um=um(float(np.abs(comparison.vectors[~comparison.left_out]).max())),
+        repeatability_um=micrometres(comparison.repeatability),
+        expected_rms_um=um(comparison.expected_rms),
+        residual_deviation_um=um(comparison.residual_deviation),
+        stated_uncertainty_um=um(comparison.stated_uncertainty),
+        lack_of_fit=lack_of_fit_test(comparison.lack_of_fit),
+        excess_over_statement_p=comparison.excess_p_value,
+        verdict=verdict or comparison.verdict,
+        by={
+            kind: {
+                name: MachinePart(um(part.rms), um(part.largest), part.count) for name, part in parts.items()
+            }
+            for kind, parts in comparison.by.items()
+        },
+    )
+
+
+def _machine_missing(effect: ChainMissing) -> MachineMissing:
+    unit, um = effect.units[0], MICROMETRE.to_display
+    return MachineMissing(
+        rank=effect.rank,
+        effect=effect.effect,
+        meaning=effect.description.meaning,
+        cause=effect.description.cause,
+        remedy=effect.description.remedy,
+        described_in=effect.description.described_in,
+        amplitude=unit.to_display(effect.amplitude),
+        u=unit.to_display(effect.u),
+        unit=unit.name,
+        coefficients=coefficients(effect),
+        peak_um=um(effect.peak),
+        p_value=effect.p_value,
+        q_value=effect.q_value,
+        rms_before_um=um(effect.rms_before),
+        rms_after_um=um(effect.rms_after),
+        heldout_before_um=micrometres(effect.held_out_before),
+        heldout_after_um=micrometres(effect.held_out_after),
+        heldout_days_before_um=micrometres(effect.held_out_days_before),
+        heldout_days_after_um=micrometres(effect.held_out_days_after),
+        indistinguishable_from=rivals(effect),
+        coinciding=coinciding(effect),
+        tell_apart_by=tuple(
+            {f"{axis.lower()}_deg": round(DEGREE.to_display(angle), 6) for axis, angle in pose.items()}
+            for pose in effect.separation.poses
+        ),
+        standard_deviations_apart=DeviationsApart(effect.separation.before, effect.separation.after),
+        varies_from_run_to_run=effect.varies,
+        searched=searched_value(effect),
+    )
+
+
+def _step(step: Step, units: Mapping[str, Unit]) -> ChangedTarget | ChangedParameter:
+    if step.parameter is None:
+        assert step.target is not None
+        um = MICROMETRE.to_display
+        return ChangedTarget(step.target, step.run, um(step.size), um(step.u), MICROMETRE.name, step.p_value)
+    unit = units[step.parameter]
+    return ChangedParameter(
+        step.parameter, step.run, unit.to_display(step.size), unit.to_display(step.u), unit.name, step.p_value
+    )
+
+
+def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | ChangedParameter, ...]:
+    """Targets that moved in a run, then steps between runs."""
+    problem, um = explanation.final.problem, MICROMETRE.to_display
+    units = {name: effect.unit for effect in problem.base for name in effect.parameters(problem.context)}
+    moved = (
+        MovedTarget(
+            move.target, move.run, move.sequence, um(move.size), tuple(um(part) for part in move.shift),
+            MICROMETRE.name, move.p_value,
+        )
+        for move in explanation.moves
+    )  # fmt: skip
+    return (*moved, *(_step(step, units) for step in explanation.steps))
+
+
+def explain_answer(explanation: Explanation) -> ExplainAnswer:
+    """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
+    problem, um = explanation.final.problem, MICROMETRE.to_display
+    missing = tuple(_machine_missing(effect) for effect in explanation.missing)
+    comparison = machine_comparison(explanation.comparison, Verdict.SOMETHING_IS_MISSING if missing else None)
+    findings = MachineFindings(
+        target_word=problem.target_word,
+        held_out="runs" if len(problem.runs) > 1 else "blocks of poses",
+        likely_mistakes=tuple(
+            LikelyMistake(mistake.what, um(mistake.rms_as_recorded), um(mistake.rms_undone))
+            for mistake in explanation.mistakes
+        ),
+        undecided=(ONE_RUN,) if len(problem.runs) == 1 else (),
+    )
+    suspect_data = tuple(
+        BadProbing(point.run, point.sequence, point.target, point.axis, um(point.size), point.p_value)
+        for point in explanation.suspect
+    )
+    changes = _changes(explanation)
+    return ExplainAnswer(
+        comparison=comparison,
+        missing=missing,
+        suspect_data=suspect_data,
+        changes=changes,
+        blind_spots=tuple(explanation.blind),
+        not_recorded=dict(explanation.refused),
+        machine=findings,
+        answer=machine_sentences(explanation, comparison.verdict, missing, len(suspect_data), changes),
+        # Where nothing is missing there is nothing to picture.
+        pictures=pictures_of(explanation, missing[0].effect if missing else None)
+        if comparison.verdict is Verdict.SOMETHING_IS_MISSING
+        else Pictures(),
+    )

@@ -1,0 +1,143 @@
+"""The answer of `identify`: the parameters of every run with their standard uncertainties, and what has no number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from monitor.documents import INLINED, OMITTED
+from monitor.methods.chain.identification import Refusal
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter with its standard uncertainty in a display unit."""
+
+    value: float
+    u: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class CurveEstimate:
+    """A coefficient of a curve; ``u`` allows for the resemblance of neighbouring rows, ``u_independent_rows`` does not.
+
+    Both are None where a searched value has no standard uncertainty.
+    """
+
+    value: float
+    u: float | None
+    unit: str
+    u_independent_rows: float | None
+
+
+@dataclass(frozen=True)
+class MachineRun:
+    """A run of a machine; ``note`` is what has to be known before its numbers are used, empty for nothing."""
+
+    run: int
+    parameters: Mapping[str, Estimate]
+    refused: tuple[Refusal, ...]
+    rms_um: float
+    largest_um: float
+    chi_square: float
+    degrees_of_freedom: int
+    iterations: int
+    note: str
+
+
+@dataclass(frozen=True)
+class CurveRun:
+    """The one run of a curve; residuals in the unit of the response, and in micrometres where that is a length.
+
+    ``chi_square`` is None without a stated standard uncertainty.
+    """
+
+    run: int
+    parameters: Mapping[str, CurveEstimate]
+    refused: tuple[Refusal, ...]
+    rms_um: float | None
+    rms: float
+    largest_um: float | None
+    largest: float
+    residual_deviation_um: float | None
+    residual_deviation: float
+    chi_square: float | None
+    degrees_of_freedom: int
+    bic: float
+    iterations: int
+
+
+@dataclass(frozen=True)
+class CurveNoise:
+    """How neighbouring rows of a curve resemble each other under its model.
+
+    ``lag_one`` is the correlation of neighbours, ``slow`` its factor with each further row, ``effective_rows`` the
+    number of independent rows that a mean of the ``rows`` is worth.
+    """
+
+    noticed: bool
+    p_value: float
+    lag_one: float
+    slow: float
+    independent_share: float
+    rows: int
+    effective_rows: float
+
+
+@dataclass(frozen=True)
+class ResponseOverInputs:
+    """What a curve measures: its base model in one line, its response and the unit of that."""
+
+    base: str
+    response: str
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdentifyAnswer:
+    """The runs of a campaign under a model; ``added`` are the effects that all runs share.
+
+    A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither.
+    """
+
+    campaign: str
+    model: str
+    machine: str
+    method: str
+    curve: ResponseOverInputs | None = field(default=None, metadata=INLINED)
+    runs: tuple[MachineRun | CurveRun, ...]
+    added: Mapping[str, Estimate | CurveEstimate]
+    added_refused: tuple[Refusal, ...]
+    autocorrelation: CurveNoise | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class IdentificationsAnswer:
+    """The identifications of several campaigns."""
+
+    identifications: tuple[IdentifyAnswer, ...]
+
+
+@dataclass(frozen=True)
+class StepwiseParameter:
+    """A parameter by both ways, and what of their difference remains without noise."""
+
+    unit: str
+    stepwise: float | None
+    u_stepwise: float | None
+    at_once: float | None
+    u_at_once: float | None
+    difference_by_method: float | None
+    u_difference_by_noise: float | None
+    agrees: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class StepwiseAnswer:
+    """One run step by step, beside the fit of all parameters at once."""
+
+    campaign: str
+    run: int
+    stepwise: Mapping[str, StepwiseParameter]

@@ -1,0 +1,52 @@
+"""A campaign, a stored model, and the fit of the model to it: where identify, compare, explain and history start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from monitor.discovery import Fit, fit
+from monitor.methods import campaign_method
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.curve.fit import CurveFit
+from monitor.methods.curve.problem import CurveProblem
+from monitor.records import Campaign, CurveCampaign
+from monitor.store import Database, StoredModel, is_curve, load_campaign, load_curve
+from monitor.workflow.models import as_model, resolve
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """A version of a model, fitted to a campaign."""
+
+    campaign: Campaign | CurveCampaign
+    model: StoredModel
+    fit: Fit | CurveFit
+
+
+def load_measured(db: Database, name: str) -> Campaign | CurveCampaign:
+    """The campaign of that name, of a machine or a curve. Raises NotFoundError."""
+    return load_curve(db, name) if is_curve(db, name) else load_campaign(db, name)
+
+
+def machine_problem(campaign: Campaign, model: StoredModel) -> ChainProblem:
+    """The least-squares problem of a machine's campaign under a model."""
+    return campaign_method(campaign).problem_of(campaign, as_model(model))
+
+
+def curve_problem(curve: CurveCampaign, model: StoredModel) -> CurveProblem:
+    """The least-squares problem of a curve under a model."""
+    return campaign_method(curve).problem_of(curve, as_model(model))
+
+
+def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | CurveFit:
+    """A version of a model fitted to a campaign. Raises DataError where the readings do not suffice."""
+    if isinstance(campaign, CurveCampaign):
+        return campaign_method(campaign).fit(curve_problem(campaign, model))
+    return fit(machine_problem(campaign, model))
+
+
+def fitted(db: Database, campaign: str, model: str | None) -> FittedModel:
+    """A model (the method's own with None) fitted to a campaign. Raises NotFoundError, DataError."""
+    measured = load_measured(db, campaign)
+    stored = resolve(db, model, measured.method)
+    return FittedModel(measured, stored, fit_of(measured, stored))

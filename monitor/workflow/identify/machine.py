@@ -1,0 +1,96 @@
+"""The geometric errors of every run of a machine, as they are stored and as people see them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from monitor.methods import campaign_method
+from monitor.methods.chain.identification import Identification, RunIdentification
+from monitor.methods.chain.problem import Solver, solve_problem
+from monitor.records import Array, Campaign, Machine
+from monitor.store import StoredIdentification, StoredModel, StoredRun
+from monitor.units import MICROMETRE, Unit
+from monitor.workflow.identify.answer import Estimate, IdentifyAnswer, MachineRun
+from monitor.workflow.identify.notes import note
+from monitor.workflow.models import as_model
+
+
+def identified(
+    campaign: Campaign, model: StoredModel, solve: Solver = solve_problem
+) -> tuple[Identification, StoredIdentification]:
+    """Identify a campaign under a model; the result, and the same as it is stored.
+
+    ``solve`` gives the solution of the method's problem. Raises DataError, EffectError as ``identify``.
+    """
+    identification = campaign_method(campaign).identify(campaign, as_model(model), solve)
+    return identification, _stored(campaign, identification, model)
+
+
+def machine_answer(machine: Machine, identification: Identification) -> IdentifyAnswer:
+    """The identification of a machine in display units, with notes."""
+    return IdentifyAnswer(
+        campaign=identification.campaign,
+        model=identification.model,
+        machine=machine.id,
+        method=identification.method,
+        runs=tuple(_run(machine, identification, run) for run in identification.runs),
+        added=_estimates(
+            identification.added,
+            identification.added_units,
+            identification.added_estimate,
+            identification.added_covariance,
+        ),
+        added_refused=identification.added_refused,
+    )
+
+
+def _estimates(
+    names: tuple[str, ...], units: tuple[Unit, ...], estimate: Array, covariance: Array
+) -> dict[str, Estimate]:
+    """Every parameter that has a number."""
+    return {
+        name: Estimate(unit.to_display(float(value)), unit.to_display(float(np.sqrt(variance))), unit.name)
+        for name, unit, value, variance in zip(names, units, estimate, np.diag(covariance), strict=True)
+        if np.isfinite(value)
+    }
+
+
+def _run(machine: Machine, identification: Identification, run: RunIdentification) -> MachineRun:
+    return MachineRun(
+        run=run.run,
+        parameters=_estimates(identification.parameters, identification.units, run.estimate, run.covariance),
+        refused=run.refused,
+        rms_um=MICROMETRE.to_display(run.rms),
+        largest_um=MICROMETRE.to_display(float(np.abs(run.residuals).max())),
+        chi_square=run.chi_square,
+        degrees_of_freedom=run.degrees_of_freedom,
+        iterations=identification.iterations,
+        note=note(machine, identification, run),
+    )
+
+
+def _stored(campaign: Campaign, identification: Identification, model: StoredModel) -> StoredIdentification:
+    probings = campaign.probings
+    return StoredIdentification(
+        campaign=identification.campaign,
+        model=model.name,
+        model_version=model.version,
+        method=identification.method,
+        parameters=identification.parameters,
+        units=identification.units,
+        runs=tuple(
+            StoredRun(
+                run=run.run,
+                estimate=run.estimate,
+                covariance=run.covariance,
+                refused=tuple((refusal.parameters, refusal.why) for refusal in run.refused),
+                rms_mm=run.rms,
+                iterations=identification.iterations,
+                degrees_of_freedom=run.degrees_of_freedom,
+                chi_square=run.chi_square,
+                sequence=probings.sequence[probings.run == run.run],
+                residuals=run.residuals,
+            )
+            for run in identification.runs
+        ),
+    )

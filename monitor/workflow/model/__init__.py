@@ -1,0 +1,1 @@
+"""Models and their versions: list, show, add and remove effects."""

@@ -1,0 +1,70 @@
+"""Answers about models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+
+from monitor.documents import IN_UTC, INLINED
+from monitor.store import StoredModel
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.models import label, label_of
+
+
+@dataclass(frozen=True)
+class ModelVersion:
+    """A version of a model; ``added`` and ``removed`` are against its parent."""
+
+    model: str
+    name: str
+    version: int
+    parent: str | None
+    effects: tuple[str, ...]
+    added: tuple[str, ...]
+    removed: tuple[str, ...]
+    note: str
+    created_at: datetime = field(metadata=IN_UTC)
+
+
+@dataclass(frozen=True)
+class ModelsAnswer:
+    """All versions of all models."""
+
+    models: tuple[ModelVersion, ...]
+
+
+@dataclass(frozen=True)
+class ShowModelAnswer:
+    """A version, its base effects by machine or curve, and what its added effects mean."""
+
+    version: ModelVersion = field(metadata=INLINED)
+    base: Mapping[str, tuple[str, ...]]
+    meaning: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class ChangeModelAnswer:
+    """A new version; ``history`` is the error of its line on a campaign, empty where it was compared with none.
+
+    ``note_on_name`` says what the name without a version means from now on, where that changed.
+    """
+
+    model: ShowModelAnswer = field(metadata=INLINED)
+    history: tuple[MachineVersion | CurveVersion, ...]
+    note_on_name: str | None
+
+
+def model_version(stored: StoredModel) -> ModelVersion:
+    """A stored version as people see it."""
+    return ModelVersion(
+        model=label(stored),
+        name=stored.name,
+        version=stored.version,
+        parent=None if stored.parent is None else label_of(*stored.parent),
+        effects=stored.effects,
+        added=stored.added,
+        removed=stored.removed,
+        note=stored.note,
+        created_at=stored.created_at,
+    )

@@ -1,0 +1,83 @@
+"""New versions of models: with one more effect, or without one."""
+
+from __future__ import annotations
+
+from monitor.exceptions import InputError, NotFoundError
+from monitor.store import Database, StoredModel, list_models, save_model
+from monitor.workflow.explain.request import HistoryRequest
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.explain.versions import history
+from monitor.workflow.model.answer import ChangeModelAnswer
+from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest
+from monitor.workflow.model.show import shown
+from monitor.workflow.model.subjects import subjects_of
+from monitor.workflow.models import label, resolve
+
+
+def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
+    """Make a version with one more effect, and fit its line to a campaign.
+
+    The effect must exist on one of the machines that are there, or for a curve in its ``campaign``, else in one of
+    the curves that are there. Raises EffectError, NotFoundError.
+    """
+    model = version_with(db, request)
+    try:
+        steps = history(db, HistoryRequest(f"{model.name}@{model.version}", request.campaign)).steps
+    except NotFoundError:
+        if request.campaign is not None:
+            raise
+        steps = ()
+    return _changed(db, model, request.new_name, steps)
+
+
+def remove_effect(db: Database, request: RemoveEffectRequest) -> ChangeModelAnswer:
+    """Make a version without one of the added effects. Raises NotFoundError, InputError where it is not among them."""
+    parent = resolve(db, request.model)
+    if request.effect not in parent.effects:
+        effects = ", ".join(parent.effects) or "none; the base effects cannot be taken out"
+        raise InputError(f"model {label(parent)} has no added effect {request.effect}; it has {effects}")
+    rest = tuple(effect for effect in parent.effects if effect != request.effect)
+    name = _checked_name(request.new_name, parent)
+    model = save_model(db, name, rest, parent=(parent.name, parent.version))
+    return _changed(db, model, request.new_name, ())
+
+
+def version_with(db: Database, request: AddEffectRequest) -> StoredModel:
+    """The stored version with one more effect; its parent is the one it was added to. Raises as ``add_effect``."""
+    parent = resolve(db, request.to)
+    text = subjects_of(db, parent).canonical(request.effect, request.campaign)
+    if text in parent.effects:
+        raise InputError(
+            f"model {label(parent)} has {text} already; add another effect, or take it out first"
+        )
+    name = request.new_name
+    if name is not None and name != parent.name and name in set(list_models(db)["model"]):
+        raise InputError(
+            f"there is a model {name} already: add to it with --to {name}, or choose another name"
+        )
+    return save_model(
+        db, _checked_name(name, parent), (*parent.effects, text), parent=(parent.name, parent.version),
+        note=request.note,
+    )  # fmt: skip
+
+
+def _checked_name(name: str | None, parent: StoredModel) -> str:
+    if name is None:
+        return parent.name
+    if "@" in name or not name.strip():
+        raise InputError(f"'{name}' cannot name a model: leave out @, which separates name and version")
+    return name
+
+
+def _changed(
+    db: Database, model: StoredModel, new_name: str | None, steps: tuple[MachineVersion | CurveVersion, ...]
+) -> ChangeModelAnswer:
+    """The answer; without a new name the name itself means another version from now on, which others have to know."""
+    name, version = model.name, model.version
+    note = None
+    if version > 1 and new_name in (None, name):
+        note = (
+            f"'{name}' without a version means {label(model)} from now on, for everybody and every campaign; "
+            f"{name}@{version - 1} is what it was (--as NAME leaves {name} alone)"
+        )
+    return ChangeModelAnswer(shown(db, model), steps, note)

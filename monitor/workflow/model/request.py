@@ -1,0 +1,35 @@
+"""Requests about models."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ShowModelRequest:
+    """Show a model, or a version of it: ``NAME@2``."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class AddEffectRequest:
+    """Make a version of the model ``to`` with one more effect, under another name with ``new_name``.
+
+    ``campaign`` is where the error before and after is shown; with None it is that on which the model was last used.
+    """
+
+    effect: str
+    to: str
+    new_name: str | None = None
+    note: str = ""
+    campaign: str | None = None
+
+
+@dataclass(frozen=True)
+class RemoveEffectRequest:
+    """Make a version of the model ``model`` without one of its added effects."""
+
+    effect: str
+    model: str
+    new_name: str | None = None

@@ -1,0 +1,36 @@
+"""List the models, and show one."""
+
+from __future__ import annotations
+
+from monitor.methods import CurveMethod, methods
+from monitor.store import Database, StoredModel, curve_names, list_models, load_model
+from monitor.workflow.model.answer import ModelsAnswer, ShowModelAnswer, model_version
+from monitor.workflow.model.request import ShowModelRequest
+from monitor.workflow.model.subjects import subjects_of
+from monitor.workflow.models import resolve
+
+
+def list_all_models(db: Database) -> ModelsAnswer:
+    """All models with their versions; the methods' own are made where they are not there yet."""
+    curves = bool(curve_names(db))
+    for method in methods().values():
+        if curves or not isinstance(method, CurveMethod):
+            resolve(db, method.name)
+    frame = list_models(db)
+    return ModelsAnswer(
+        tuple(
+            model_version(load_model(db, str(name), int(version)))
+            for name, version in zip(frame["model"], frame["version"], strict=True)
+        )
+    )
+
+
+def show_model(db: Database, request: ShowModelRequest) -> ShowModelAnswer:
+    """A model, its added effects in words, and its base effects on every machine or curve. Raises NotFoundError."""
+    return shown(db, resolve(db, request.name))
+
+
+def shown(db: Database, model: StoredModel) -> ShowModelAnswer:
+    """A stored version with its base and its effects in words."""
+    subjects = subjects_of(db, model)
+    return ShowModelAnswer(model_version(model), subjects.base(), subjects.meaning(model.effects))

@@ -1,0 +1,152 @@
+"""What has the effects of a model: the machines of the database under a calibration method, or its curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from monitor.effects import parse_effect
+from monitor.effects.curve import inputs_of, parse_curve_effect
+from monitor.effects.curve.words import describe_curve
+from monitor.effects.words import describe
+from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.machine import Chain
+from monitor.methods import ChainMethod, CurveMethod, methods
+from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.model import Model, chain_of
+from monitor.store import Database, StoredModel, curve_names, described_machines, load_curve, load_model
+
+Subject = TypeVar("Subject")
+
+
+class Subjects(Protocol):
+    """Everything in the database that can have the effects of a model."""
+
+    def base(self) -> dict[str, tuple[str, ...]]:
+        """Return the base effects of each of them."""
+
+    def meaning(self, effects: Sequence[str]) -> dict[str, str]:
+        """Return what effects mean on the first of them that has them; one that none has is left out."""
+
+    def canonical(self, effect: str, campaign: str | None) -> str:
+        """Return the text of an effect in its own words.
+
+        Raises NotFoundError where there is none that could have it, EffectError where none has it or its base has.
+        """
+
+
+@dataclass(frozen=True)
+class Machines:
+    """The machines that a calibration method applies to; with None a model that descends from no method's own."""
+
+    db: Database
+    method: ChainMethod | None
+
+    def base(self) -> dict[str, tuple[str, ...]]:
+        base: dict[str, tuple[str, ...]] = {}
+        for machine in described_machines(self.db):
+            try:
+                base[machine.id] = self._base_of(chain_of(machine))
+            except DataError:
+                # A method that this machine cannot be calibrated by has no base on it.
+                continue
+        return base
+
+    def meaning(self, effects: Sequence[str]) -> dict[str, str]:
+        meaning: dict[str, str] = {}
+        for machine in described_machines(self.db):
+            chain = chain_of(machine)
+            try:
+                self._base_of(chain)
+            except DataError:
+                continue
+            for text in effects:
+                try:
+                    meaning.setdefault(text, describe(parse_effect(text, chain)).meaning)
+                except InputError:
+                    continue
+        return meaning
+
+    def canonical(self, effect: str, campaign: str | None) -> str:
+        chains = tuple(dict.fromkeys(chain_of(machine) for machine in described_machines(self.db)))
+        if not chains:
+            raise NotFoundError("there is no machine yet that could have an effect; import a campaign first")
+        text = _first(chains, lambda chain: parse_effect(effect, chain).text)
+        if self._is_base(text, chains):
+            raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
+        return text
+
+    def _base_of(self, chain: Chain) -> tuple[str, ...]:
+        """The effects that are free in every run of the method; those of the complete model for no method."""
+        return (base_effects if self.method is None else self.method.base_effects)(chain)
+
+    def _is_base(self, effect: str, chains: Sequence[Chain]) -> bool:
+        """Whether an effect is a base effect on every machine that the method can calibrate."""
+        answers = []
+        for chain in chains:
+            try:
+                answers.append(effect in self._base_of(chain))
+            except DataError:
+                continue
+        return bool(answers) and all(answers)
+
+
+@dataclass(frozen=True)
+class Curves:
+    """The curves of the database."""
+
+    db: Database
+    method: CurveMethod
+
+    def base(self) -> dict[str, tuple[str, ...]]:
+        return {name: (load_curve(self.db, name).base,) for name in curve_names(self.db)}
+
+    def meaning(self, effects: Sequence[str]) -> dict[str, str]:
+        meaning: dict[str, str] = {}
+        for name in curve_names(self.db):
+            curve = load_curve(self.db, name)
+            for text in effects:
+                try:
+                    effect = parse_curve_effect(text, inputs_of(curve))
+                except InputError:
+                    continue
+                unit, clock = curve.units.get(effect.column, ""), effect.column == curve.time
+                meaning.setdefault(text, describe_curve(effect, curve.response, unit, clock=clock).meaning)
+        return meaning
+
+    def canonical(self, effect: str, campaign: str | None) -> str:
+        """As the protocol says; a ``campaign`` is the one curve that must have the effect."""
+        names = curve_names(self.db) if campaign is None else (campaign,)
+        if not names:
+            raise NotFoundError(
+                "there is no curve yet that could have an effect; import a campaign of one first"
+            )
+
+        def text_on(name: str) -> str:
+            curve = load_curve(self.db, name)
+            text = parse_curve_effect(effect, inputs_of(curve)).text
+            self.method.problem_of(curve, Model(name, added=(text,)))
+            return text
+
+        return _first(names, text_on)
+
+
+def _first(subjects: Sequence[Subject], text_on: Callable[[Subject], str]) -> str:
+    """The text of the first subject that has it. Raises the fault of the first where none has it."""
+    fault: InputError | None = None
+    for subject in subjects:
+        try:
+            return text_on(subject)
+        except InputError as error:
+            fault = fault or error
+    assert fault is not None
+    raise fault
+
+
+def subjects_of(db: Database, model: StoredModel) -> Subjects:
+    """The subjects of the method that a model descends from."""
+    while model.parent is not None:
+        model = load_model(db, *model.parent)
+    method = methods().get(model.name)
+    return Curves(db, method) if isinstance(method, CurveMethod) else Machines(db, method)
