@@ -26,9 +26,6 @@ COMMON = {"-h", "--help", "--db", "--json"}
 #: Options without a help besides --model, to be emptied.
 WITHOUT_HELP = {
     "certificate withdraw --reason",
-    "model history --figures",
-    "model remove --as",
-    "model remove --from",
     "simulate --seed",
 }
 
@@ -79,8 +76,6 @@ LACKING: set[str] = {
     "uncertainty/tolerance.py",
     "uncertainty/volumetric.py",
     "workflow/certificate/files.py",
-    "workflow/explain/compare_answer.py",
-    "workflow/explain/versions.py",
     "workflow/health/facts.py",
     "workflow/health/verdict.py",
     "workflow/history/change_search.py",
