@@ -39,9 +39,9 @@ def _play(chain: Chain) -> Iterable[str]:
 
 def _cycles(chain: Chain, pitches: Mapping[str, float]) -> Iterable[str]:
     for joint in chain.of_kind("linear"):
-        own = COMPONENTS[joint.main]
+        along = COMPONENTS[joint.main]
         for pitch in sorted({*SCREW_LEADS_MM, *([pitches[joint.name]] if joint.name in pitches else [])}):
-            yield f"E{own}{joint.name}:cyclic{pitch:g}mm"
+            yield f"E{along}{joint.name}:cyclic{pitch:g}mm"
 
 
 def _turns(chain: Chain) -> Iterable[str]:
@@ -68,43 +68,45 @@ def _weight(chain: Chain) -> Iterable[str]:
 
 
 def of_balls(drivers: Iterable[str]) -> tuple[str, ...]:
-    """Effects of balls on stems, for methods that touch them."""
+    """Return the effects of balls on stems, for methods that touch them."""
     return ("stem:gravity", *(f"artefact:expansion@{driver}" for driver in drivers))
 
 
 def of_tracker(
     chain: Chain, drivers: Iterable[str], ratios: Mapping[str, float] | None = None
 ) -> tuple[str, ...]:
-    """Effects that hundreds of poses, seen from outside, can show: of drives that give way, gears, read-out, tracker.
+    """Return effects that hundreds of poses, observed from outside, can show: of drives, gears, read-out and tracker.
 
     ``ratios`` are gear ratios by axis. A strain wave gear errs twice a turn of its generator, a gear pair once a
     turn of its pinion.
     """
     texts = []
     for joint in chain.joints:
-        own = COMPONENTS[joint.main + 3 * joint.turns]
-        texts.append(f"E{own}{joint.name}:lag")
-        if joint.turns:
-            texts += [f"E{own}{joint.name}:compliance@{driver}" for driver in ("gravity", "link_weights")]
-            texts += [f"E{axis}{joint.name}:compliance@gravity" for axis in "ABC" if axis != own]
-        if joint.turns and joint.name in (ratios or {}):
-            ratio = (ratios or {})[joint.name]
-            texts += [f"E{own}{joint.name}:harmonic{times * ratio:.6g}" for times in (1, 2)]
-    texts += [f"tracker:{what}@{driver}" for driver in drivers for what in ("shift", "turn")]
+        driven = f"{COMPONENTS[joint.main + 3 * joint.turns]}{joint.name}"
+        texts.append(f"E{driven}:lag")
+        if not joint.turns:
+            continue
+        texts += [f"E{driven}:compliance@{driver}" for driver in ("gravity", "link_weights")]
+        texts += [
+            f"E{axis}{joint.name}:compliance@gravity" for axis in "ABC" if f"{axis}{joint.name}" != driven
+        ]
+        if ratios and joint.name in ratios:
+            texts += [f"E{driven}:harmonic{times * ratios[joint.name]:.6g}" for times in (1, 2)]
+    texts += [f"tracker:{motion}@{driver}" for driver in drivers for motion in ("shift", "turn")]
     return tuple(texts)
 
 
 def drivers_of(context: Context) -> tuple[str, ...]:
-    """The drivers that the recorded columns allow: time, and every channel that changes.
+    """Return the drivers that the recorded columns allow: time, and every channel that changes.
 
-    One with empty cells is among them, so that its effects are refused aloud and not passed over.
+    A channel with empty cells is among them, so that its effects are refused with a message and not left out.
     """
     channels = [
         name
         for name, values in sorted(context.columns.items())
         if name.rpartition("_")[2] in CONDITION_SUFFIXES
-        and len(known := values[np.isfinite(values)])
-        and known.min() < known.max()
+        and len(recorded := values[np.isfinite(values)])
+        and recorded.min() < recorded.max()
     ]
     return ("warmup", "run_time", *channels)
 
@@ -116,10 +118,10 @@ def catalogue(
     pitches: Mapping[str, float] | None = None,
     more: Iterable[str] | None = None,
 ) -> tuple[ChainEffect | ArtefactEffect, ...]:
-    """Every effect of the catalogue that is not in ``base``, in the order of its families.
+    """Return every effect of the catalogue that is not in ``base``, in the order of its families.
 
-    ``drivers`` are names without @; ``pitches`` the scale pitch in mm of axes whose file gives one; ``more`` what
-    only the method can see, the balls' own effects where it is not given.
+    ``drivers`` are names without @; ``pitches`` the scale pitch in mm of axes whose file gives one; ``more`` the
+    effects that only the method can show, those of the balls where it is None.
     """
     base = tuple(base)
     drivers = tuple(drivers)
@@ -132,15 +134,15 @@ def catalogue(
         *_weight(chain),
         *(of_balls(drivers) if more is None else more),
     ]
-    known = {parse_effect(text, chain).text for text in base}
-    found: dict[str, ChainEffect | ArtefactEffect] = {}
+    excluded = {parse_effect(text, chain).text for text in base}
+    effects: dict[str, ChainEffect | ArtefactEffect] = {}
     for text in texts:
         effect = parse_effect(text, chain)
-        if effect.text not in known:
-            found.setdefault(effect.text, effect)
-    return tuple(found.values())
+        if effect.text not in excluded:
+            effects.setdefault(effect.text, effect)
+    return tuple(effects.values())
 
 
 def is_driven(effect: ChainEffect | ArtefactEffect) -> bool:
-    """Whether an effect has a driver."""
+    """Return whether an effect has a driver."""
     return not isinstance(effect.driver, Always)

@@ -1,4 +1,4 @@
-"""What an effect may depend on: where every axis stood, when, after which move, and what was recorded."""
+"""What an effect may depend on: position and last move of every axis, time, and recorded columns."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.machine import Chain, gravity_in_joint_frames
-from monitor.records import Array, Campaign
+from monitor.records import Array, Campaign, Probings
 from monitor.units import DEGREE
 
 # ISO 1:2022: the reference temperature of geometrical specifications.
 REFERENCE_TEMPERATURE_DEGC = 20.0
-# A smaller move (mm, rad) reverses nothing: an axis that is sent to the same place again comes back to a micrometre or
+# A smaller move (mm, rad) reverses nothing: an axis that is sent to the same position again returns to a micrometre or
 # a few microradians, and play and friction of guides and gears take a few of each to be turned round.
 SMALLEST_MOVE_MM = 10e-3
 SMALLEST_MOVE_RAD = 50e-6
@@ -24,10 +24,10 @@ SMALLEST_MOVE_RAD = 50e-6
 
 @dataclass(frozen=True)
 class Context:
-    """n probings as effects see them.
+    """n probings, as the effects need them.
 
-    ``positions`` (n, J) physical displacements in mm and rad as read; ``expected`` (n, J) the same free of each
-    row's own noise, where a method can tell, for what follows fine steps; ``run`` (n,) the run's number;
+    ``positions`` (n, J) physical displacements in mm and rad as read; ``expected`` (n, J) the same without each
+    row's noise, where a method can compute it, for effects that follow fine steps; ``run`` (n,) the run's number;
     ``sequence`` (n,);
     ``time`` (n,) s since the run began; ``day_time`` (n,) s since the first run of the day began; ``run_time``
     (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
@@ -52,20 +52,20 @@ class Context:
 
     @property
     def places(self) -> Array:
-        """Where every axis stood (n, J) as effects see it: ``expected`` where there is one, else as read.
+        """The positions (n, J) of the axes for effects: ``expected`` where a method computed it, else as read.
 
-        Where a measured axis stops depends on the noise of that touch. An effect that looked at the reading would see
-        the noise that it is to explain.
+        The position at which a measured axis stops depends on the noise of that touch. An effect of the reading would
+        fit the noise that it is to explain.
         """
         return self.positions if self.expected is None else self.expected
 
     def expecting(self, expected: Array) -> Context:
-        """The same probings with ``expected`` (n, J), in the columns of the axes' readings too."""
+        """Return the same probings with ``expected`` (n, J), in the columns of the axes' readings too."""
         columns = dict(self.columns)
-        for place, joint in enumerate(self.chain.joints):
+        for index, joint in enumerate(self.chain.joints):
             name = f"{joint.name.lower()}_{'deg' if joint.turns else 'mm'}"
-            if name in columns and not np.array_equal(expected[:, place], self.positions[:, place]):
-                columns[name] = joint.sign * expected[:, place] / (DEGREE.factor if joint.turns else 1.0)
+            if name in columns and not np.array_equal(expected[:, index], self.positions[:, index]):
+                columns[name] = joint.sign * expected[:, index] / (DEGREE.factor if joint.turns else 1.0)
         return replace(self, expected=expected, columns=columns)
 
     @cached_property
@@ -73,7 +73,7 @@ class Context:
         """Sign (n, J) of every axis's last travel; before an axis has moved in a run, that of its position.
 
         The controller references every axis at zero, so a first position is reached from there. Moves are counted from
-        where the last one ended; too small a one leaves the sign as it was.
+        the end of the last one; a move that is too small leaves the sign as it was.
         """
         turning = np.array([joint.turns for joint in self.chain.joints], dtype=bool)
         smallest = np.where(turning, SMALLEST_MOVE_RAD, SMALLEST_MOVE_MM)
@@ -120,17 +120,17 @@ class Context:
 
 
 def positions_of(chain: Chain, readings: Mapping[str, Array]) -> Array:
-    """Physical displacements (n, J) of all joints; a joint without readings stands at zero."""
+    """Return physical displacements (n, J) of all joints; a joint without readings stands at zero."""
     count = len(next(iter(readings.values())))
     positions = np.zeros((count, len(chain.joints)))
-    for place, joint in enumerate(chain.joints):
+    for index, joint in enumerate(chain.joints):
         if joint.name in readings:
-            positions[:, place] = joint.sign * readings[joint.name]
+            positions[:, index] = joint.sign * readings[joint.name]
     return positions
 
 
 def _nominal(campaign: Campaign) -> Array:
-    """Where every target should be (n, 3) mm: its ball, else ``nominal_x_mm`` and so on, NaN where nothing says it."""
+    """Return nominal positions (n, 3) mm of the targets: of the ball, else ``nominal_x_mm`` and so on, else NaN."""
     probings = campaign.probings
     balls = {ball.id: ball.nominal for ball in campaign.artefact.balls}
     recorded = [probings.channels.get(f"nominal_{axis}_mm") for axis in "xyz"]
@@ -138,46 +138,62 @@ def _nominal(campaign: Campaign) -> Array:
     rows = np.column_stack(
         [np.full(len(probings), unknown) if column is None else column for column in recorded]
     )
-    for place, target in enumerate(probings.target):
+    for index, target in enumerate(probings.target):
         if target in balls:
-            rows[place] = balls[target]
+            rows[index] = balls[target]
     return rows
 
 
-def context_of(campaign: Campaign, chain: Chain) -> Context:
-    """The context of all probings of a campaign, in file order."""
-    probings = campaign.probings
-    if len(probings) == 0:
-        raise DataError(f"campaign {campaign.name} has no probings")
-    runs = {run.run: run for run in campaign.runs}
+def _day_time(campaign: Campaign) -> Array:
+    """Return the time (n,) s since the first run of the day began."""
     first_of_day = {
         run.day: min(other.started_at for other in campaign.runs if other.day == run.day)
         for run in campaign.runs
     }
-    since = {number: (run.started_at - first_of_day[run.day]).total_seconds() for number, run in runs.items()}
+    starts = {run.run: (run.started_at - first_of_day[run.day]).total_seconds() for run in campaign.runs}
+    day_time: Array = campaign.probings.time + np.array([starts[int(run)] for run in campaign.probings.run])
+    return day_time
+
+
+def _run_time(probings: Probings) -> Array:
+    """Return the time (n,) within a run, from 0 at its first probing to 1 at its last."""
     run_time = np.zeros(len(probings))
     for number in np.unique(probings.run):
         rows = probings.run == number
         start, end = probings.time[rows].min(), probings.time[rows].max()
         run_time[rows] = (probings.time[rows] - start) / (end - start) if end > start else 0.0
+    return run_time
+
+
+def _columns(campaign: Campaign, chain: Chain) -> dict[str, Array]:
+    """Return channels, conditions of the runs, readings of the axes and the time, by the names in the file."""
+    probings = campaign.probings
+    runs = {run.run: run for run in campaign.runs}
     columns: dict[str, Array] = dict(probings.channels)
     for name in sorted({name for run in campaign.runs for name in run.conditions}):
         if name not in columns:
             columns[name] = np.array([runs[int(run)].conditions.get(name, np.nan) for run in probings.run])
+    turning = {joint.name for joint in chain.joints if joint.turns}
     for axis, values in probings.readings.items():
-        joint = next((joint for joint in chain.joints if joint.name == axis), None)
-        turns = joint is not None and joint.turns
+        turns = axis in turning
         columns[f"{axis.lower()}_{'deg' if turns else 'mm'}"] = values / DEGREE.factor if turns else values
-    columns["time_s"] = probings.time
+    return {**columns, "time_s": probings.time}
+
+
+def context_of(campaign: Campaign, chain: Chain) -> Context:
+    """Return the context of all probings of a campaign, in file order. Raises DataError where there are none."""
+    probings = campaign.probings
+    if len(probings) == 0:
+        raise DataError(f"campaign {campaign.name} has no probings")
     return Context(
         chain=chain,
         positions=positions_of(chain, probings.readings),
         run=probings.run,
         sequence=probings.sequence,
         time=probings.time,
-        day_time=probings.time + np.array([since[int(run)] for run in probings.run]),
-        run_time=run_time,
+        day_time=_day_time(campaign),
+        run_time=_run_time(probings),
         target=probings.target,
         nominal=_nominal(campaign),
-        columns=columns,
+        columns=_columns(campaign, chain),
     )

@@ -1,7 +1,7 @@
 """An effect: one entry of a model, written ``term:shape@driver``.
 
-``parse_effect`` turns the text into an object that gives its basis functions at every probing, what they do
-to the tip-to-target vector, and the names and units of its coefficients. Effects of the chain add to the
+``parse_effect`` turns the text into an object with its basis functions at every probing, their effect on the
+tip-to-target vector, and the names and units of its coefficients. Effects of the chain add to the
 errors of one joint; effects of the artefact shift the target.
 """
 
@@ -13,10 +13,13 @@ from typing import Protocol
 
 import numpy as np
 
-from monitor.effects.artefact import ArtefactChange, parse_artefact
+from monitor.effects.artefact import HEADS, ArtefactChange, parse_artefact
 from monitor.effects.context import Context
-from monitor.effects.drivers import Always, Driver, WarmUp, parse_driver
-from monitor.effects.shapes import Compliance, Const, Cyclic, Nodes, Poly, Shape, parse_shape
+from monitor.effects.driver import Driver
+from monitor.effects.drivers import Always, WarmUp, parse_driver
+from monitor.effects.joint_error import JointError
+from monitor.effects.shape import DescribedShape, Shape
+from monitor.effects.shapes import Compliance, Const, Nodes, Poly, parse_shape
 from monitor.effects.weight import weight_driver
 from monitor.exceptions import EffectError
 from monitor.machine import LOCATION, MOTION, Chain, Joint, Term, parse_term
@@ -33,14 +36,14 @@ class ChainBasis:
 
     @property
     def size(self) -> int:
-        """How many coefficients the effect has."""
+        """The number of coefficients of the effect."""
         return int(self.columns.shape[-1])
 
     def displacement(self, by_error: Array) -> Array:
-        """Change (n, 3, k) of the tip-to-target vector for each coefficient, from ``ChainPose.by_error``."""
+        """Return the change (n, 3, k) of the tip-to-target vector for each coefficient, from ``by_error``."""
         direction = by_error[:, :, self.term.joint, self.term.stage, self.term.component]
-        moved: Array = direction[:, :, None] * self.columns[:, None, :]
-        return moved
+        change: Array = direction[:, :, None] * self.columns[:, None, :]
+        return change
 
     def apply(self, coefficients: Array, errors: Array, target: Array) -> None:
         """Add the effect, in place, to ``errors`` (n, J, 2, 6); ``coefficients`` is (k,) or (n, k)."""
@@ -56,11 +59,11 @@ class ArtefactBasis:
 
     @property
     def size(self) -> int:
-        """How many coefficients the effect has."""
+        """The number of coefficients of the effect."""
         return int(self.shifts.shape[-1])
 
     def displacement(self, by_error: Array) -> Array:
-        """Change (n, 3, k) of the tip-to-target vector for each coefficient."""
+        """Return the change (n, 3, k) of the tip-to-target vector for each coefficient."""
         return -self.shifts
 
     def apply(self, coefficients: Array, errors: Array, target: Array) -> None:
@@ -72,7 +75,7 @@ Basis = ChainBasis | ArtefactBasis
 
 
 class Effect(Protocol):
-    """What every effect offers; n probings, k coefficients."""
+    """What every effect offers, at n probings with k coefficients."""
 
     @property
     def text(self) -> str:
@@ -80,7 +83,7 @@ class Effect(Protocol):
         ...
 
     def parameters(self, context: Context) -> tuple[str, ...]:
-        """Names of the k coefficients."""
+        """Return the names of the k coefficients."""
         ...
 
     @property
@@ -89,7 +92,7 @@ class Effect(Protocol):
         ...
 
     def basis(self, context: Context) -> Basis:
-        """The effect evaluated at every probing of a context."""
+        """Evaluate the effect at every probing of a context."""
         ...
 
 
@@ -129,8 +132,8 @@ class ChainEffect:
         return unit if driver is ONE else unit.per(driver)
 
     def parameters(self, context: Context) -> tuple[str, ...]:
-        # The gain is known by its ISO 230-1 symbol alone; that is how certificates print it.
-        # So is an error at a named place: EXX(-110).
+        # The gain is named by its ISO 230-1 symbol alone; that is how certificates print it.
+        # So is an error at a node of the user: EXX(-110).
         name = self.term.symbol if self.is_gain or isinstance(self.shape, Nodes) else self.text
         return tuple(f"{name}{s}{d}" for s in self.shape.labels for d in self.driver.labels(context))
 
@@ -171,47 +174,29 @@ class ArtefactEffect:
 
 
 def parse_effect(text: str, chain: Chain) -> ChainEffect | ArtefactEffect:
-    """The effect that a text names on a chain; EffectError says what is wrong and what would be right."""
+    """Return the effect that a text names on a chain. Raises EffectError, which says what would be right."""
     body, driver_text = _split_driver(text.strip())
-    head, _, rest = body.partition(":")
-    if head in ("ball", "artefact", "stem", "shape", "tracker"):
+    head, _, shape_text = body.partition(":")
+    if head in HEADS:
         return ArtefactEffect(parse_artefact(body), parse_driver(driver_text), driver_text)
     term = parse_term(head, chain)
-    if not rest:
-        if term.stage != LOCATION:
+    error = JointError(term, chain.joints[term.joint])
+    if not shape_text:
+        if not error.is_location:
             raise EffectError(
                 f"'{text}' is an error motion and needs a shape: write for example {head}:poly1 or {head}:const"
             )
-        rest = "const"
-    joint = chain.joints[term.joint]
-    shape = parse_shape(rest)
-    if isinstance(shape, Cyclic) and joint.turns:
-        raise EffectError(
-            f"'{text}': a cyclic pitch in mm belongs to a linear axis; for {joint.name} write harmonic1"
-        )
-    if rest.startswith("harmonic") and not joint.turns:
-        raise EffectError(f"'{text}': a harmonic belongs to a rotary axis; for {joint.name} write cyclic20mm")
-    if isinstance(shape, Compliance):
-        return ChainEffect(term, joint, shape, rest, _weight(text, term, joint, driver_text), driver_text)
-    return ChainEffect(term, joint, shape, rest, parse_driver(driver_text, joint), driver_text)
-
-
-def _weight(text: str, term: Term, joint: Joint, driver_text: str) -> Driver:
-    own = f"E{'ABC'[joint.main]}{joint.name}:compliance@gravity"
-    if not term.is_rotation or term.stage == LOCATION or not joint.turns:
-        example = f"write for example {own}" if joint.turns else f"{joint.name} does not turn"
-        raise EffectError(f"'{text}': a compliance is a rotation of a rotary axis under a torque; {example}")
-    driver = weight_driver(driver_text, term, joint)
-    if driver is None:
-        raise EffectError(
-            f"'{text}': a compliance answers to weights: write @gravity (a load at the flange) or @link_weights (the "
-            f"weight of every link), for example {own}"
-        )
-    return driver
+        shape_text = "const"
+    shape = parse_shape(shape_text)
+    if isinstance(shape, DescribedShape):
+        shape.refuse(text, error)
+    weighed = isinstance(shape, Compliance)
+    driver = weight_driver(text, driver_text, error) if weighed else parse_driver(driver_text)
+    return ChainEffect(term, error.joint, shape, shape_text, driver, driver_text)
 
 
 def _split_driver(text: str) -> tuple[str, str]:
-    """Body and driver; an @ inside brackets belongs to a formula."""
+    """Return body and driver; an @ inside brackets belongs to a formula."""
     at = text.rfind("@")
     if at == -1 or ")" in text[at:]:
         return text, ""
@@ -221,5 +206,5 @@ def _split_driver(text: str) -> tuple[str, str]:
 
 
 def with_time_constant(effect: ChainEffect | ArtefactEffect, seconds: float) -> ChainEffect | ArtefactEffect:
-    """The same effect with the time constant of its warm-up fixed; its text keeps ``@warmup``."""
+    """Return the effect with the time constant of its warm-up fixed; its text keeps ``@warmup``."""
     return replace(effect, driver=WarmUp(seconds))

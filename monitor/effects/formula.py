@@ -46,7 +46,7 @@ LONGEST = 500
 
 
 class _AnyColumn(dict[str, Array]):
-    """Has every column, with the value 1: to read a formula before the data are there."""
+    """A mapping that has every column, with the value 1: to check a formula without data."""
 
     def __contains__(self, name: object) -> bool:
         return True
@@ -62,7 +62,7 @@ class Formula:
     text: str
 
     def evaluate(self, columns: Mapping[str, Array], count: int) -> Array:
-        """Its value (count,) at every probing; EffectError names what is unknown or not finite."""
+        """Evaluate the formula (count,) at every probing. Raises EffectError for what is unknown or not finite."""
         value = np.broadcast_to(self._computed(columns), (count,))
         bad = ~np.isfinite(value)
         if bad.any():
@@ -72,7 +72,7 @@ class Formula:
         return value.copy()
 
     def check(self) -> None:
-        """EffectError where the formula cannot be read or uses what is not allowed; columns are not known yet."""
+        """Raise EffectError where the formula cannot be read or uses what is not allowed; needs no columns."""
         self._computed(_AnyColumn())
 
     def _computed(self, columns: Mapping[str, Array]) -> Array:
@@ -114,28 +114,28 @@ class Formula:
                 return self._value(operand, columns)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return np.logical_not(self._value(operand, columns)).astype(float)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
-                return OPERATORS[type(op)](self._value(left, columns), self._value(right, columns))
+            case ast.BinOp(left=first, op=op, right=right) if type(op) in OPERATORS:
+                return OPERATORS[type(op)](self._value(first, columns), self._value(right, columns))
             case ast.BoolOp(op=op, values=values):
                 result = self._value(values[0], columns)
                 for value in values[1:]:
                     result = OPERATORS[type(op)](result, self._value(value, columns)).astype(float)
                 return result
-            case ast.Compare(left=left, ops=ops, comparators=comparators):
-                result, before = 1.0, self._value(left, columns)
-                for sign, comparator in zip(ops, comparators, strict=True):
-                    if type(sign) not in OPERATORS:
-                        break
-                    after = self._value(comparator, columns)
-                    result = np.multiply(
-                        result, np.asarray(OPERATORS[type(sign)](before, after), dtype=float)
-                    )
-                    before = after
-                else:
-                    return result
+            case ast.Compare(ops=ops) if all(type(sign) in OPERATORS for sign in ops):
+                return self._compared(node, columns)
             case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
                 return FUNCTIONS[name](self._value(argument, columns))
         raise EffectError(
             f"the formula '{self.text}' uses '{ast.unparse(node)}', which is not allowed; allowed are numbers, "
             f"recorded columns, pi, + - * / **, comparisons, and, or, not, and {', '.join(FUNCTIONS)}"
         )
+
+    def _compared(self, node: ast.Compare, columns: Mapping[str, Array]) -> Any:
+        """Return 1 where every comparison of a chain such as ``0 <= x < 2`` holds, 0 elsewhere."""
+        result: Any = 1.0
+        before = self._value(node.left, columns)
+        for sign, comparator in zip(node.ops, node.comparators, strict=True):
+            after = self._value(comparator, columns)
+            result = np.multiply(result, np.asarray(OPERATORS[type(sign)](before, after), dtype=float))
+            before = after
+        return result

@@ -14,65 +14,81 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.effects.context import Context
-from monitor.machine import Joint, Term, torques_in_joint_frames
+from monitor.effects.driver import DescribedDriver
+from monitor.effects.joint_error import JointError
+from monitor.effects.shapes.compliance import example_of
+from monitor.exceptions import EffectError
+from monitor.machine import torques_in_joint_frames
 from monitor.records import Array
 from monitor.units import METRE, MILLIMETRE, Unit
 
 
 def _carried(context: Context, joint: int) -> range:
-    """The joint and those further out on its branch."""
+    """Return the joint and those further out on its branch."""
     work = len(context.chain.work)
     return range(joint, work if joint < work else len(context.chain.joints))
 
 
+def _phrase(weight: str, error: JointError) -> str:
+    axis = "its axis" if error.is_along else "XYZ"[error.term.component - 3]
+    return f", in proportion to the torque of {weight} about {axis}"
+
+
 @dataclass(frozen=True)
-class Load:
+class Load(DescribedDriver):
     """The torque, about the axis of a term, of a unit weight at the flange."""
 
-    component: int
+    error: JointError
 
-    def labels(self, context: Context) -> tuple[str, ...]:
-        return ("",)
+    @property
+    def phrase(self) -> str:
+        return _phrase("a load at the flange", self.error)
 
     def columns(self, context: Context, joint: int | None) -> Array:
         assert joint is not None
-        last = _carried(context, joint)[-1]
-        torques = torques_in_joint_frames(context.chain, context.positions, last, np.zeros(3))
-        return torques[:, joint, self.component, None]
+        flange = _carried(context, joint)[-1]
+        torques = torques_in_joint_frames(context.chain, context.positions, flange, np.zeros(3))
+        return torques[:, joint, self.error.term.component - 3, None]
 
     def unit(self) -> Unit:
         return METRE
 
 
 @dataclass(frozen=True)
-class LinkWeights:
-    """The torques of weights fixed to the axis itself and to each one further out, each at any place there."""
+class LinkWeights(DescribedDriver):
+    """The torques of weights fixed to the axis itself and to each one further out, each anywhere on its link."""
 
-    joint: Joint
-    component: int
+    error: JointError
+
+    @property
+    def phrase(self) -> str:
+        return _phrase("the weight of all that it carries", self.error)
 
     def labels(self, context: Context) -> tuple[str, ...]:
-        carried = _carried(context, context.chain.index(self.joint.name))
-        return tuple(f".{context.chain.joints[at].name}{axis}" for at in carried for axis in "xyz")
+        carried = _carried(context, context.chain.index(self.error.name))
+        return tuple(f".{context.chain.joints[link].name}{axis}" for link in carried for axis in "xyz")
 
     def columns(self, context: Context, joint: int | None) -> Array:
         assert joint is not None
-        found = []
-        for at in _carried(context, joint):
-            none = torques_in_joint_frames(context.chain, context.positions, at, np.zeros(3))
+        torques = []
+        for link in _carried(context, joint):
+            at_origin = torques_in_joint_frames(context.chain, context.positions, link, np.zeros(3))
             for axis in np.eye(3):
-                whole = torques_in_joint_frames(context.chain, context.positions, at, axis)
-                found.append((whole - none)[:, joint, self.component])
-        return np.column_stack(found)
+                off_origin = torques_in_joint_frames(context.chain, context.positions, link, axis)
+                torques.append((off_origin - at_origin)[:, joint, self.error.term.component - 3])
+        return np.column_stack(torques)
 
     def unit(self) -> Unit:
         return MILLIMETRE
 
 
-def weight_driver(text: str, term: Term, joint: Joint) -> Load | LinkWeights | None:
-    """The driver that a compliance is written with; None for any other name."""
-    if text == "gravity":
-        return Load(term.component - 3)
-    if text == "link_weights":
-        return LinkWeights(joint, term.component - 3)
-    return None
+def weight_driver(effect_text: str, driver_text: str, error: JointError) -> Load | LinkWeights:
+    """Return the driver that a compliance is written with. Raises EffectError for any other name."""
+    if driver_text == "gravity":
+        return Load(error)
+    if driver_text == "link_weights":
+        return LinkWeights(error)
+    raise EffectError(
+        f"'{effect_text}': a compliance answers to weights: write @gravity (a load at the flange) or @link_weights "
+        f"(the weight of every link), for example {example_of(error)}"
+    )

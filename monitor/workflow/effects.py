@@ -3,113 +3,174 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
 
-from monitor.discovery.curve.candidates import catalogue as curve_catalogue
+from monitor.discovery.curve.catalogue import catalogue as curve_catalogue
+from monitor.documents import OMITTED
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
-from monitor.effects.curve import SEARCHED
-from monitor.effects.curve_words import describe_curve
-from monitor.effects.words import Words, describe
+from monitor.effects.curve import SEARCHED, CurveEffect
+from monitor.effects.curve.words import describe_curve
+from monitor.effects.description import Description
+from monitor.effects.words import describe
+from monitor.exceptions import InputError
 from monitor.machine import parse_topology
 from monitor.methods import campaign_method
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.curve.fit import fit
-from monitor.methods.curve.problem import grid
+from monitor.methods.curve.problem import CurveProblem, grid
 from monitor.methods.curve.problem import problem_of as curve_problem_of
 from monitor.readers import read_campaign
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, is_curve, load_campaign, load_curve
 
-Document = dict[str, Any]
-
 # Those that every campaign has, and two channels as examples.
 DRIVERS = ("warmup", "run_time", "ambient_degC", "x_axis_degC")
+DEFAULT_TOPOLOGY = "w C B X b Z Y (C1) t"
 
 
-def _told(effect: str, unit: str, words: Words) -> Document:
-    return {
-        "effect": effect,
-        "unit": unit,
-        "meaning": words.meaning,
-        "cause": words.cause,
-        "remedy": words.remedy,
-        "described_in": words.described_in,
-    }
+@dataclass(frozen=True)
+class EffectsRequest:
+    """The effects of a topology, or of a campaign folder that need not be imported, that contain a text."""
+
+    topology: str | None = None
+    folder: Path | None = None
+    text: str | None = None
+
+    def __post_init__(self) -> None:
+        if (self.topology is None) == (self.folder is None):
+            raise InputError("give a topology or a campaign folder, one of the two")
 
 
-def _of_chain(effects: Iterable[ChainEffect | ArtefactEffect]) -> list[Document]:
-    return [_told(effect.text, effect.unit.name, describe(effect)) for effect in effects]
+@dataclass(frozen=True)
+class CampaignEffectsRequest:
+    """The effects of a campaign of the database that contain a text."""
+
+    campaign: str
+    text: str | None = None
 
 
-def _with(found: list[Document], text: str | None) -> list[Document]:
-    """Those that contain ``text`` in any of their words."""
+@dataclass(frozen=True)
+class CatalogueEffect:
+    """An effect, the unit of its coefficients, and its description."""
+
+    effect: str
+    unit: str
+    meaning: str
+    cause: str
+    remedy: str
+    described_in: str
+
+    def contains(self, text: str) -> bool:
+        """Return whether any of the fields contains a text, in upper or lower case."""
+        return text.lower() in " ".join(getattr(self, column.name) for column in fields(self)).lower()
+
+
+@dataclass(frozen=True)
+class EffectsAnswer:
+    """The effects of the catalogue, beside those of the base model.
+
+    A topology has neither campaign nor machine and drivers; a curve has a campaign alone.
+    """
+
+    campaign: str | None = field(default=None, metadata=OMITTED)
+    machine: str | None = field(default=None, metadata=OMITTED)
+    topology: str | None = field(default=None, metadata=OMITTED)
+    drivers: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    base: tuple[str, ...] = ()
+    effects: tuple[CatalogueEffect, ...] = ()
+
+
+def effects(request: EffectsRequest) -> EffectsAnswer:
+    """Return the effects of a topology or of a campaign folder.
+
+    Raises TopologyError, CampaignError, and DataError where the readings of a folder do not suffice.
+    """
+    if request.folder is not None:
+        return _selected(_of_campaign(read_campaign(request.folder)), request.text)
+    chain = parse_topology(request.topology or DEFAULT_TOPOLOGY)
+    base = tuple(base_effects(chain))
+    others = (*of_balls(DRIVERS), *of_tracker(chain, DRIVERS))
+    described = _described(catalogue(chain, base, DRIVERS, more=others))
+    return _selected(EffectsAnswer(topology=chain.topology, base=base, effects=described), request.text)
+
+
+def campaign_effects(db: Database, request: CampaignEffectsRequest) -> EffectsAnswer:
+    """Return every effect that `explain` looks for in a campaign of the database.
+
+    Raises NotFoundError, and DataError where the readings do not suffice.
+    """
+    name = request.campaign
+    campaign = load_curve(db, name) if is_curve(db, name) else load_campaign(db, name)
+    return _selected(_of_campaign(campaign), request.text)
+
+
+def _selected(answer: EffectsAnswer, text: str | None) -> EffectsAnswer:
+    """Leave out the effects that do not contain a text in any of their fields."""
     if text is None:
-        return found
-    return [one for one in found if text.lower() in " ".join(one.values()).lower()]
+        return answer
+    return replace(answer, effects=tuple(effect for effect in answer.effects if effect.contains(text)))
 
 
-def effects(topology: str, text: str | None = None) -> Document:
-    """Every effect of the catalogue on a chain whose name or words contain ``text``; TopologyError."""
-    chain = parse_topology(topology)
-    base = base_effects(chain)
-    more = (*of_balls(DRIVERS), *of_tracker(chain, DRIVERS))
-    found = _of_chain(catalogue(chain, base, DRIVERS, more=more))
-    return {"topology": chain.topology, "base": list(base), "effects": _with(found, text)}
+def _of_campaign(campaign: Campaign | CurveCampaign) -> EffectsAnswer:
+    """Return the effects of a machine's own axes, freely positioned ones too, of the method and of the columns.
 
-
-def effects_of_folder(folder: Path, text: str | None = None) -> Document:
-    """As ``effects_of``, of a campaign folder that need not be imported. Raises CampaignError."""
-    return effects_of(read_campaign(folder), text)
-
-
-def effects_of_campaign(db: Database, name: str, text: str | None = None) -> Document:
-    """As ``effects_of``, of a campaign of the database. Raises NotFoundError."""
-    return effects_of(load_curve(db, name) if is_curve(db, name) else load_campaign(db, name), text)
-
-
-def effects_of(campaign: Campaign | CurveCampaign, text: str | None = None) -> Document:
-    """Every effect that `explain` looks for in a campaign: those of its machine's own axes, freely placed ones too, of
-    its method and of the columns that were recorded. Of a curve, those of its columns.
-
-    Raises DataError where the readings do not suffice.
+    Those of a curve are the effects of its columns.
     """
     if isinstance(campaign, CurveCampaign):
-        problem = curve_problem_of(campaign)
-        fit(problem)
-        unit = campaign.units.get(campaign.response, "") or "1"
-        found = []
-        for effect in curve_catalogue(problem):
-            own = problem.inputs.units.get(effect.column, "")
-            shown = effect
-            if effect.free:
-                values = grid(effect, problem.inputs)
-                if len(values) == 0:
-                    continue
-                shown = effect.at(float(values[0]))
-            words = describe_curve(shown, campaign.response, own, clock=effect.column == campaign.time)
-            if effect.free:
-                what = SEARCHED[effect.shape]
-                words = replace(
-                    words,
-                    meaning=f"{effect.shape} of {effect.column} in {campaign.response}, its {what} searched",
-                )
-            found.append(_told(effect.text, unit, words))
-        return {"campaign": campaign.name, "base": [campaign.base], "effects": _with(found, text)}
-    machine = campaign_method(campaign).problem_of(campaign)
-    drivers = drivers_of(machine.context)
+        return _of_curve(campaign)
+    problem = campaign_method(campaign).problem_of(campaign)
+    chain, drivers = problem.context.chain, drivers_of(problem.context)
     pitches = {
         name: axis.scale_pitch for name, axis in campaign.machine.axes.items() if axis.scale_pitch is not None
     }
-    base = [effect.text for effect in machine.base]
-    looked_for = catalogue(machine.context.chain, base, drivers, pitches, machine.method_effects(drivers))
-    return {
-        "campaign": campaign.name,
-        "machine": campaign.machine.id,
-        "topology": machine.context.chain.topology,
-        "drivers": list(drivers),
-        "base": base,
-        "effects": _with(_of_chain(looked_for), text),
-    }
+    base = tuple(effect.text for effect in problem.base)
+    return EffectsAnswer(
+        campaign=campaign.name,
+        machine=campaign.machine.id,
+        topology=chain.topology,
+        drivers=drivers,
+        base=base,
+        effects=_described(catalogue(chain, base, drivers, pitches, problem.method_effects(drivers))),
+    )
+
+
+def _described(effects: Iterable[ChainEffect | ArtefactEffect]) -> tuple[CatalogueEffect, ...]:
+    return tuple(_entry(effect.text, effect.unit.name, describe(effect)) for effect in effects)
+
+
+def _entry(effect: str, unit: str, description: Description) -> CatalogueEffect:
+    return CatalogueEffect(
+        effect, unit, description.meaning, description.cause, description.remedy, description.described_in
+    )
+
+
+def _of_curve(curve: CurveCampaign) -> EffectsAnswer:
+    problem = curve_problem_of(curve)
+    fit(problem)  # refuses readings that do not suffice
+    unit = curve.units.get(curve.response, "") or "1"
+    descriptions = ((effect, _describe_of_curve(effect, problem)) for effect in curve_catalogue(problem))
+    return EffectsAnswer(
+        campaign=curve.name,
+        base=(curve.base,),
+        effects=tuple(
+            _entry(effect.text, unit, description)
+            for effect, description in descriptions
+            if description is not None
+        ),
+    )
+
+
+def _describe_of_curve(effect: CurveEffect, problem: CurveProblem) -> Description | None:
+    """Describe an effect of a curve; None for a searched one where the column has no value to search."""
+    curve = problem.curve
+    unit, is_time = problem.inputs.units.get(effect.column, ""), effect.column == curve.time
+    if not effect.free:
+        return describe_curve(effect, curve.response, unit, clock=is_time)
+    values = grid(effect, problem.inputs)
+    if len(values) == 0:
+        return None
+    description = describe_curve(effect.at(float(values[0])), curve.response, unit, clock=is_time)
+    meaning = f"{effect.shape} of {effect.column} in {curve.response}, its {SEARCHED[effect.shape]} searched"
+    return replace(description, meaning=meaning)

@@ -1,53 +1,100 @@
-"""A virtual campaign folder, to rehearse."""
+"""Writes a virtual campaign folder, to rehearse."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from monitor.exceptions import InputError
-from monitor.methods.samba.virtual import virtual_campaign
-from monitor.methods.tracker.virtual import virtual_robot
+from monitor.methods import Rehearsal, methods
 from monitor.readers import write_campaign
 from monitor.units import MICROMETRE
 
 
-def simulate(
-    out: Path, effect: str | None, peak_um: float, noise_um: float | None, seed: int, robot: bool = False
-) -> dict[str, Any]:
-    """Write a campaign folder named after ``out``; its hidden effect has the peak displacement ``peak_um``.
+@dataclass(frozen=True)
+class SimulateRequest:
+    """A virtual campaign: its folder, the hidden effect with its largest displacement, and the noise of a reading.
 
-    A machine tool touched by ``samba`` (noise of 1 µm where none is given), or a ``robot`` tracked (20 µm).
+    The campaign is named after ``out``. ``robot`` asks for a robot that a tracker observes instead of a machine tool
+    that a probe touches.
     """
-    make = virtual_robot if robot else virtual_campaign
-    noise_um = (20.0 if robot else 1.0) if noise_um is None else noise_um
-    if noise_um <= 0 or not np.isfinite(noise_um):
-        raise InputError(f"--noise {noise_um}: the noise of a reading must be above 0 µm")
-    if not np.isfinite(peak_um) or peak_um <= 0:
-        raise InputError(f"--peak {peak_um}: the peak must be a number of µm above 0")
-    if seed < 0:
-        raise InputError(f"--seed {seed}: a seed is a whole number from 0 on")
-    campaign = make(
-        out.resolve().name,
-        np.random.default_rng(seed),
-        effect=effect,
-        peak=MICROMETRE.to_internal(peak_um),
-        noise=MICROMETRE.to_internal(noise_um),
+
+    out: Path
+    effect: str | None = None
+    peak_um: float = 5.0
+    noise_um: float | None = None
+    seed: int = 1
+    robot: bool = False
+
+    def __post_init__(self) -> None:
+        if self.noise <= 0 or not math.isfinite(self.noise):
+            raise InputError(f"--noise {self.noise}: the noise of a reading must be above 0 µm")
+        if not math.isfinite(self.peak_um) or self.peak_um <= 0:
+            raise InputError(f"--peak {self.peak_um}: the peak must be a number of µm above 0")
+        if self.seed < 0:
+            raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 on")
+
+    @property
+    def noise(self) -> float:
+        """The noise in µm, that of the instrument where the request names none."""
+        if self.noise_um is not None:
+            return self.noise_um
+        return self.rehearsal.noise_um
+
+    @property
+    def rehearsal(self) -> Rehearsal:
+        """The virtual machine of the first method that has one of the kind."""
+        machine = "robot" if self.robot else "machine tool"
+        rehearsals = (method.rehearsal for method in methods().values())
+        return next(
+            rehearsal
+            for rehearsal in rehearsals
+            if isinstance(rehearsal, Rehearsal) and rehearsal.machine == machine
+        )
+
+
+@dataclass(frozen=True)
+class SimulateAnswer:
+    """What was written; ``peak_um`` is None where nothing is hidden."""
+
+    folder: str
+    campaign: str
+    effect: str | None
+    peak_um: float | None
+    noise_um: float
+    seed: int
+    runs: int
+    probings: int
+    message: str
+
+
+def simulate(request: SimulateRequest) -> SimulateAnswer:
+    """Write a virtual campaign folder. Raises InputError for an effect that the machine or robot does not have."""
+    campaign = request.rehearsal.virtual_campaign(
+        request.out.resolve().name,
+        np.random.default_rng(request.seed),
+        effect=request.effect,
+        peak=MICROMETRE.to_internal(request.peak_um),
+        noise=MICROMETRE.to_internal(request.noise),
     )
-    write_campaign(campaign, out)
-    touches = len(campaign.probings) // len(campaign.runs)
-    hidden = f"{effect} with a peak of {peak_um:g} µm is hidden" if effect else "nothing is hidden"
-    runs = f"{len(campaign.runs)} run{'s' if len(campaign.runs) > 1 else ''}"
-    return {
-        "folder": str(out),
-        "campaign": campaign.name,
-        "effect": effect,
-        "peak_um": peak_um if effect else None,
-        "noise_um": noise_um,
-        "seed": seed,
-        "runs": len(campaign.runs),
-        "probings": len(campaign.probings),
-        "message": f"{out}: {runs} of {touches} probings; {hidden}",
-    }
+    write_campaign(campaign, request.out)
+    runs, probings = len(campaign.runs), len(campaign.probings)
+    hidden = (
+        f"{request.effect} with a peak of {request.peak_um:g} µm is hidden"
+        if request.effect
+        else "nothing is hidden"
+    )
+    return SimulateAnswer(
+        folder=str(request.out),
+        campaign=campaign.name,
+        effect=request.effect,
+        peak_um=request.peak_um if request.effect else None,
+        noise_um=request.noise,
+        seed=request.seed,
+        runs=runs,
+        probings=probings,
+        message=f"{request.out}: {runs} run{'s' if runs > 1 else ''} of {probings // runs} probings; {hidden}",
+    )

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
 
 from monitor.cli import output
 from monitor.cli.database import check_path, opened
 from monitor.cli.parser import common
-from monitor.workflow.effects import effects, effects_of_campaign, effects_of_folder
+from monitor.documents import to_document
+from monitor.workflow.effects import (
+    DEFAULT_TOPOLOGY,
+    CampaignEffectsRequest,
+    EffectsAnswer,
+    EffectsRequest,
+    campaign_effects,
+    effects,
+)
 
 EXAMPLE = "monitor effects backlash\n  monitor effects lag --folder examples/tracked-robot"
 
@@ -21,7 +28,7 @@ def options(parser: ArgumentParser) -> None:
     )
     whose = parser.add_mutually_exclusive_group()
     whose.add_argument(
-        "--topology", default="w C B X b Z Y (C1) t", help="the machine (default: 'w C B X b Z Y (C1) t')"
+        "--topology", default=DEFAULT_TOPOLOGY, help=f"the machine (default: '{DEFAULT_TOPOLOGY}')"
     )
     whose.add_argument(
         "--folder", metavar="FOLDER", help="what explain looks for in this campaign folder, robots too"
@@ -31,30 +38,29 @@ def options(parser: ArgumentParser) -> None:
     )
 
 
-def _found(options: Namespace) -> dict[str, Any]:
-    if options.folder is not None:
-        return effects_of_folder(Path(options.folder), options.text)
+def _answer(options: Namespace) -> EffectsAnswer:
     if options.campaign is not None:
         check_path(options.db, may_be_new=False)
         with opened(options) as db:
-            return effects_of_campaign(db, options.campaign, options.text)
-    return effects(options.topology, options.text)
+            return campaign_effects(db, CampaignEffectsRequest(options.campaign, options.text))
+    if options.folder is not None:
+        return effects(EffectsRequest(folder=Path(options.folder), text=options.text))
+    return effects(EffectsRequest(topology=options.topology, text=options.text))
 
 
 def run(options: Namespace) -> int:
-    found = _found(options)
+    answer = _answer(options)
     if options.json:
-        output.document(found)
+        output.document(to_document(answer))
         return 0
-    if not found["effects"]:
+    if not answer.effects:
         output.say(
             f"no effect says '{options.text}'; try another word, such as backlash, thermal, worm or guideway"
         )
         return 0
-    rows = [[one["effect"], one["unit"], one["meaning"], one["cause"]] for one in found["effects"]]
-    whose = found["campaign"] if "campaign" in found else found["topology"]
+    rows = [[effect.effect, effect.unit, effect.meaning, effect.cause] for effect in answer.effects]
     output.table(
-        f"{len(rows)} effects of {whose}",
+        f"{len(rows)} effects of {answer.campaign or answer.topology}",
         ["effect", "unit", "what it is", "usual cause"],
         rows,
         text_columns=4,

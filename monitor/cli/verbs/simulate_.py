@@ -7,7 +7,8 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.parser import common
-from monitor.workflow.simulation import simulate
+from monitor.documents import to_document
+from monitor.workflow.simulation import SimulateRequest, simulate
 
 EXAMPLE = 'monitor simulate rehearsal --effect "EBB:harmonic2" --peak 5 --seed 7'
 
@@ -34,9 +35,11 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    found = simulate(options.out, options.effect, options.peak, options.noise, options.seed, options.robot)
+    answer = simulate(
+        SimulateRequest(options.out, options.effect, options.peak, options.noise, options.seed, options.robot)
+    )
     if options.json:
-        output.document(found)
+        output.document(to_document(answer))
     else:
-        output.say(found["message"])
+        output.say(answer.message)
     return 0

@@ -13,7 +13,7 @@ from monitor.reporting.figures.style import save
 from monitor.reporting.figures.trend import parameter_over_time
 from monitor.reporting.health.words import in_words
 from monitor.statistics import predict
-from monitor.workflow.figures import ENDINGS, make_folder
+from monitor.workflow.figure_files import ENDINGS, make_folder
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, days_since_1970
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.trend.answer import ParameterTrend, TrendAnswer

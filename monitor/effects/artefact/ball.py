@@ -1,0 +1,69 @@
+"""``ball:2:moved(run 7, sequence 23)``: a ball that moved during a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from monitor.effects.context import Context
+from monitor.effects.description import OWN_DOCUMENT, Description
+from monitor.effects.registry import BuiltIn
+from monitor.exceptions import EffectError
+from monitor.records import Array
+from monitor.units import MICROMETRE, Unit
+
+
+@dataclass(frozen=True)
+class BallMoved(BuiltIn):
+    """A shift of ``ball`` from a probing on (run, sequence), to the end of that run.
+
+    The balls' positions are free in every run, so only the rest of the run in which it moved can show it.
+    """
+
+    ball: str
+    run: int
+    sequence: int
+    unit: Unit = MICROMETRE
+    pattern: ClassVar[str] = (
+        r"ball:(?P<ball>[^:]+):moved(?:\s*\(\s*run\s+(?P<run>\d+)\s*,\s*sequence\s+(?P<sequence>\d+)\s*\))?"
+    )
+
+    @classmethod
+    def of(cls, groups: Mapping[str, str]) -> Self:
+        if "run" not in groups:
+            text = f"ball:{groups['ball']}:moved"
+            raise EffectError(
+                f"'{text}' must say when: write {text}(run 7, sequence 23); `explain` finds the moment"
+            )
+        return cls(groups["ball"], int(groups["run"]), int(groups["sequence"]))
+
+    @property
+    def text(self) -> str:
+        return f"ball:{self.ball}:moved(run {self.run}, sequence {self.sequence})"
+
+    def labels(self, context: Context) -> tuple[str, ...]:
+        return (".x", ".y", ".z")
+
+    def shifts(self, context: Context) -> Array:
+        balls = np.unique(context.target)
+        if self.ball not in balls:
+            raise EffectError(f"'{self.text}': no ball {self.ball}; this campaign probed {', '.join(balls)}")
+        after = (
+            (context.run == self.run) & (context.sequence >= self.sequence) & (context.target == self.ball)
+        )
+        shifts: Array = after[:, None, None] * np.eye(3)
+        return shifts
+
+    def described(self, driven: str) -> Description:
+        return Description(
+            f"ball {self.ball} moved during run {self.run}",
+            "a stem came loose, or the ball was touched",
+            f"tighten the stem of ball {self.ball} and repeat the run",
+            OWN_DOCUMENT,
+        )
+
+
+REGISTERED = (BallMoved,)

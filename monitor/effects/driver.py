@@ -1,0 +1,58 @@
+"""What a driver is: what an effect is multiplied by.
+
+A driver is one small class like a shape. Another one is one more file of ``drivers`` or a plug-in of the group
+``monitor.drivers``.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from monitor.effects.context import Context
+from monitor.effects.description import Explanation
+from monitor.effects.joint_error import JointError
+from monitor.effects.registry import BuiltIn
+from monitor.records import Array
+from monitor.units import ONE, Unit
+
+
+class Driver(Protocol):
+    """What every driver offers."""
+
+    def labels(self, context: Context) -> tuple[str, ...]:
+        """Return a suffix for each multiplier."""
+        ...
+
+    def columns(self, context: Context, joint: int | None) -> Array:
+        """Return the multipliers (n, m) at every probing; ``joint`` is None for effects of the artefact."""
+        ...
+
+    def unit(self) -> Unit:
+        """Return the unit of the multiplier."""
+        ...
+
+
+class DescribedDriver(BuiltIn):
+    """A driver with its own words; here with what most have: one multiplier without a unit."""
+
+    @property
+    def phrase(self) -> str:
+        """The part of an effect's meaning that the driver makes; it begins with a comma."""
+        return ""
+
+    def labels(self, context: Context) -> tuple[str, ...]:
+        return ("",)
+
+    def unit(self) -> Unit:
+        return ONE
+
+    def explanation(self, error: JointError) -> Explanation | None:
+        """Explain an effect of a joint; None where the driver says nothing of its cause."""
+        return None
+
+
+class HeatDriver(DescribedDriver):
+    """A driver that stands for a temperature: its effects are explained by heat."""
+
+    def explanation(self, error: JointError) -> Explanation | None:
+        return error.explanation_of_heat()

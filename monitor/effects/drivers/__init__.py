@@ -1,0 +1,36 @@
+"""The drivers, one a file; no driver means 1.
+
+``@warmup`` without a time constant has one that is searched; with one (``@warmup45min``) it is fixed. A driver of no
+other name is a recorded channel.
+"""
+
+from __future__ import annotations
+
+from monitor.effects.driver import Driver
+from monitor.effects.drivers.always import Always
+from monitor.effects.drivers.channel import Channel
+from monitor.effects.drivers.each_run import EachRun
+from monitor.effects.drivers.run_time import RunTime
+from monitor.effects.drivers.warmup import WarmUp
+from monitor.effects.registry import parse, plug_ins
+from monitor.exceptions import EffectError
+from monitor.units import COLUMN_UNITS, column_unit
+
+__all__ = ["Always", "Channel", "Driver", "EachRun", "RunTime", "WarmUp", "parse_driver"]
+
+
+def parse_driver(text: str) -> Driver:
+    """Return the driver of a name (without its @). Raises EffectError, listing what there is, for an unknown one.
+
+    Only the data show whether a channel was recorded; ``Channel.columns`` refuses one that was not.
+    """
+    driver: Driver | None = parse(text, __name__, plug_ins("monitor.drivers"))
+    if driver is not None:
+        return driver
+    if column_unit(text) is None:
+        raise EffectError(
+            f"there is no driver '@{text}'; there are @warmup (or @warmup45min), @run_time, @sequence, @gravity, "
+            "@each_run and every recorded channel, whose name ends in a unit "
+            f"({', '.join('_' + suffix for suffix in COLUMN_UNITS)})"
+        )
+    return Channel(text)

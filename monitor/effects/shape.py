@@ -1,0 +1,56 @@
+"""What a shape is: how an effect depends on the position of its axis.
+
+A shape is one small class with a ``pattern`` that its name matches, ``columns`` (n, k) of a position and the ``unit``
+of its coefficients. Another one is one more file of ``shapes`` or a plug-in of the group ``monitor.shapes``.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from monitor.effects.context import Context
+from monitor.effects.description import Explanation
+from monitor.effects.joint_error import JointError
+from monitor.effects.registry import BuiltIn
+from monitor.machine import Joint
+from monitor.records import Array
+from monitor.units import Unit
+
+
+class Shape(Protocol):
+    """What every shape offers."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """A suffix for each coefficient; one empty one where there is a single coefficient."""
+        ...
+
+    def columns(self, context: Context, joint: int) -> Array:
+        """Return the basis functions (n, k) at every probing."""
+        ...
+
+    def unit(self, base: Unit, joint: Joint) -> Unit:
+        """Return the unit of the coefficients from that of the term."""
+        ...
+
+
+class DescribedShape(BuiltIn):
+    """A shape with its own words; here with what most have: one coefficient, in the unit of the term."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return ("",)
+
+    def unit(self, base: Unit, joint: Joint) -> Unit:
+        return base
+
+    def refuse(self, text: str, error: JointError) -> None:
+        """Raise EffectError where the error of an effect cannot have this shape."""
+
+    def phrase(self, error: JointError) -> str:
+        """Return the part of the effect's meaning that the shape makes; it begins with a comma."""
+        return ""
+
+    def explanation(self, error: JointError) -> Explanation | None:
+        """Explain the effect; None where the shape says nothing of its cause."""
+        return None

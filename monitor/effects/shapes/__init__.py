@@ -1,0 +1,43 @@
+"""The shapes, one a file, each with its pattern, its numbers and its words."""
+
+from __future__ import annotations
+
+from monitor.effects.registry import parse, plug_ins
+from monitor.effects.shape import Shape
+from monitor.effects.shapes.compliance import Compliance
+from monitor.effects.shapes.const import Const
+from monitor.effects.shapes.cyclic import Cyclic
+from monitor.effects.shapes.formula import FormulaShape
+from monitor.effects.shapes.harmonic import Harmonic
+from monitor.effects.shapes.nodes import Nodes, nodes_text
+from monitor.effects.shapes.poly import Poly
+from monitor.effects.shapes.reversal import Reversal
+from monitor.effects.shapes.table import TABLE_NODES, Table
+from monitor.exceptions import EffectError
+
+__all__ = [
+    "TABLE_NODES",
+    "Compliance",
+    "Const",
+    "Cyclic",
+    "FormulaShape",
+    "Harmonic",
+    "Nodes",
+    "Poly",
+    "Reversal",
+    "Table",
+    "nodes_text",
+    "parse_shape",
+]
+
+
+def parse_shape(text: str) -> Shape:
+    """Return the shape of a name. Raises EffectError, listing the shapes there are, for an unknown one."""
+    shape: Shape | None = parse(text, __name__, plug_ins("monitor.shapes"))
+    if shape is None:
+        raise EffectError(
+            f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic9999, cyclic20mm (any "
+            "pitch), reversal, lag, compliance, table (or table9 for nine nodes, up to table99; table(-100,0,100) for "
+            "your own nodes) and formula(...)"
+        )
+    return shape

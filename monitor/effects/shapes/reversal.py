@@ -1,0 +1,42 @@
+"""``reversal``: the play of an axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from monitor.effects.context import Context
+from monitor.effects.description import POSITIONING, Explanation
+from monitor.effects.joint_error import JointError
+from monitor.effects.shape import DescribedShape
+from monitor.records import Array
+
+
+@dataclass(frozen=True)
+class Reversal(DescribedShape):
+    """Half the reversal error, with the sign of the axis's last travel."""
+
+    pattern: ClassVar[str] = r"reversal"
+
+    def columns(self, context: Context, joint: int) -> Array:
+        return context.travel[:, joint, None]
+
+    def phrase(self, error: JointError) -> str:
+        return f", jumping when {error.name} reverses"
+
+    def explanation(self, error: JointError) -> Explanation:
+        name = error.name
+        if error.is_of_drive:
+            return Explanation(
+                f"backlash or wind-up of the drive of {name}: worn nut, loose coupling or thrust bearing, friction",
+                f"check nut, coupling and thrust bearing of {name}; then set the control's backlash compensation",
+                POSITIONING,
+            )
+        return Explanation(
+            f"play in the guide of {name} lets the carriage tip over when it reverses",
+            f"check preload, gibs and wear of the guide of {name}; it cannot be compensated well",
+            POSITIONING,
+        )
+
+
+REGISTERED = (Reversal,)

@@ -1,0 +1,24 @@
+"""Writes figures into a folder: every one as a vector graphic and as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from monitor.exceptions import InputError
+from monitor.reporting.figures.style import Figure, save
+
+ENDINGS = (".svg", ".png")
+
+
+def make_folder(folder: Path) -> Path:
+    """Make the folder of the figures where it does not exist. Raises InputError where it cannot be made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"the folder {folder} cannot be made: {error.strerror or error}") from error
+    return folder
+
+
+def save_figure(figure: Figure, folder: Path, name: str) -> list[str]:
+    """Write a figure under a name with every ending; return the names of the files."""
+    return [str(save(figure, folder / f"{name}{ending}")) for ending in ENDINGS]
