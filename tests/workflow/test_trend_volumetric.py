@@ -25,7 +25,8 @@ from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import StatedUncertainty
-from monitor.workflow.volumetric.volumetric import geometric_errors, poses_of, ranges_of
+from monitor.workflow.volumetric.error_map import poses_of, ranges_of
+from monitor.workflow.volumetric.known_errors import geometric_errors
 
 answers = load("answers", TESTS / "answers.py")
 trends = answers.trends
