@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from monitor.discovery import Fit, fit
+from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.variants import variants_of
-from monitor.discovery.machine.visible import see
 from monitor.effects.catalogue import catalogue
 from monitor.machine import Chain
 from monitor.methods.planning.candidates import Choice
@@ -110,7 +110,7 @@ def blind_spots(planned: PlannedCampaign, choice: Choice) -> tuple[str, ...]:
         if axis.scale_pitch is not None
     }
     variants = [variant for effect in catalogue(chain, base, (), pitches) for variant in variants_of(effect)]
-    visible = see(_fit_of(planned, choice), variants)
+    visible = scene_of(_fit_of(planned, choice), variants)
     return tuple(
         dict.fromkeys(candidate.family for candidate in visible.candidates if not candidate.detectable)
     )

@@ -45,7 +45,7 @@ def separation(campaign: Campaign, model: StoredModel, texts: tuple[str, str]) -
             }
             for pose in poses.poses
         ),
-        standard_deviations_apart=DeviationsApart(poses.now, poses.then),
+        standard_deviations_apart=DeviationsApart(poses.before, poses.after),
         verdict=_verdict(poses),
     )
 
