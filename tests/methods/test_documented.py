@@ -39,6 +39,15 @@ def cell(ability: Ability) -> str:
     return {TouchPlan: "balls, indexations", AnglePlan: "angles of the table"}.get(type(ability), "yes")
 
 
+def method_table() -> list[str]:
+    """The methods, and what their targets and rows are called."""
+    rows = ["| method | title | target | row |", "| --- | --- | --- | --- |"]
+    return rows + [
+        f"| `{name}` | {method.title} | {method.nouns.target} | {method.nouns.row} |"
+        for name, method in methods().items()
+    ]
+
+
 def verb_table() -> list[str]:
     """Method x verb, a verb a row."""
     rows = [
@@ -72,7 +81,7 @@ def method_row(method: Method) -> str:
     return f"| {name} | {method.description} |"
 
 
-@pytest.mark.parametrize("table", [verb_table, reason_table])
+@pytest.mark.parametrize("table", [method_table, verb_table, reason_table])
 def test_what_a_method_can_do_is_documented_as_it_is_registered(table: Callable[[], list[str]]) -> None:
     assert "\n".join(table()) in DOCUMENT.read_text(encoding="utf-8")
 
@@ -94,4 +103,4 @@ def test_the_readme_lists_every_method_with_an_example_of_it(name: str) -> None:
 
 if __name__ == "__main__":
     print("\n".join(["README.md", *map(method_row, methods().values()), "", "docs/methods.md", ""]))
-    print("\n".join([*verb_table(), "", *reason_table()]))
+    print("\n".join([*method_table(), "", *verb_table(), "", *reason_table()]))
