@@ -81,6 +81,7 @@ def method_row(method: Method) -> str:
     return f"| {name} | {method.description} |"
 
 
+@pytest.mark.skipif(not DOCUMENT.exists(), reason="the documents stay in the checkout")
 @pytest.mark.parametrize("table", [method_table, verb_table, reason_table])
 def test_what_a_method_can_do_is_documented_as_it_is_registered(table: Callable[[], list[str]]) -> None:
     assert "\n".join(table()) in DOCUMENT.read_text(encoding="utf-8")
