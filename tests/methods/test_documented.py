@@ -16,6 +16,7 @@ from monitor.methods import Able, AnglePlan, Method, TouchPlan, Unable, methods
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 README, DOCUMENT = CHECKOUT / "README.md", CHECKOUT / "docs" / "methods.md"
+IN_CHECKOUT = pytest.mark.skipif(not DOCUMENT.exists(), reason="the documents stay in the checkout")
 Ability = Able | Unable
 # What a user types, and the field of a method that says whether there is an answer; None: every method has one.
 VERBS: tuple[tuple[str, Callable[[Method], Ability] | None], ...] = (
@@ -81,7 +82,7 @@ def method_row(method: Method) -> str:
     return f"| {name} | {method.description} |"
 
 
-@pytest.mark.skipif(not DOCUMENT.exists(), reason="the documents stay in the checkout")
+@IN_CHECKOUT
 @pytest.mark.parametrize("table", [method_table, verb_table, reason_table])
 def test_what_a_method_can_do_is_documented_as_it_is_registered(table: Callable[[], list[str]]) -> None:
     assert "\n".join(table()) in DOCUMENT.read_text(encoding="utf-8")
@@ -93,6 +94,7 @@ def test_every_ability_stands_in_the_table() -> None:
     assert sorted(documented) == sorted(abilities)
 
 
+@IN_CHECKOUT
 @pytest.mark.parametrize("name", methods())
 def test_the_readme_lists_every_method_with_an_example_of_it(name: str) -> None:
     start = method_row(methods()[name]).removesuffix("|")
