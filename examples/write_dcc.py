@@ -23,7 +23,7 @@ from monitor.reporting.certificate.record import (
     Person,
     Reference,
 )
-from monitor.reporting.certificate.results import result_set
+from monitor.reporting.certificate.results import CoverageFactors, JointEstimate, ResultStatements, result_set
 from monitor.units import MICROMETRE, MICRORADIAN
 
 # Estimates and covariance in mm and rad; U and the regions follow from k_q and k_p (JCGM 102:2011, 6.5).
@@ -32,17 +32,23 @@ U_POSITION_MM, U_TILT_RAD, CORRELATION = 0.8e-3, 2.1e-6, 0.35
 BETWEEN = CORRELATION * U_POSITION_MM * U_TILT_RAD
 
 RESULT = result_set(
-    ["EX0C", "EB0C"],
-    [MICROMETRE, MICRORADIAN],
-    [POSITION_MM, TILT_RAD],
-    [[U_POSITION_MM**2, BETWEEN], [BETWEEN, U_TILT_RAD**2]],
-    descriptions={"EX0C": "position in X of axis C", "EB0C": "orientation about Y of axis C"},
-    state="as found",
-    p=0.95,
-    k_p=2.45,  # root of the chi-square quantile, 2 dimensions
-    k_q=2.24,  # two intervals at once (Bonferroni)
-    rank=2,
-    evaluation="GUM uncertainty framework, JCGM 102:2011 clause 6",
+    JointEstimate(
+        ["EX0C", "EB0C"],
+        [MICROMETRE, MICRORADIAN],
+        [POSITION_MM, TILT_RAD],
+        [[U_POSITION_MM**2, BETWEEN], [BETWEEN, U_TILT_RAD**2]],
+    ),
+    CoverageFactors(
+        p=0.95,
+        k_p=2.45,  # root of the chi-square quantile, 2 dimensions
+        k_q=2.24,  # two intervals at once (Bonferroni)
+        rank=2,
+    ),
+    ResultStatements(
+        state="as found",
+        evaluation="GUM uncertainty framework, JCGM 102:2011 clause 6",
+        descriptions={"EX0C": "position in X of axis C", "EB0C": "orientation about Y of axis C"},
+    ),
 )
 
 RECORD = CertificateRecord(

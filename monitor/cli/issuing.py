@@ -11,8 +11,7 @@ from typing import Any
 
 from monitor.exceptions import InputError
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
-from monitor.workflow.certificate.conformity import RULES
-from monitor.workflow.certificate.results import METHODS
+from monitor.workflow.certificate.request import METHODS, RULES
 
 #: The environment variable with a token's PIN, unless --pin-from names another; an argument could be seen by others.
 PIN = "MONITOR_TOKEN_PIN"
@@ -88,7 +87,7 @@ def _day(text: str) -> date:
 
 
 def issuing(options: Namespace) -> dict[str, Any]:
-    """The options as ``certificates.issue`` and ``certificates.amend`` take them. Raises InputError."""
+    """The options as the fields of ``CertificateOptions``. Raises InputError."""
     axes = None
     if options.linear_axes is not None:
         # Loaded here: hardly any certificate states errors of the linear axes.
@@ -96,6 +95,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
 
         axes = read_linear_axes(options.linear_axes)
     return {
+        "laboratory": options.laboratory,
         "as_left": options.as_left,
         "out": options.out,
         "number": options.number,

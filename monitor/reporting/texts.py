@@ -60,8 +60,8 @@ class Texts:
         if self.language == ENGLISH:
             return sentence
         for key, pattern in _patterns():
-            if found := pattern.fullmatch(sentence):
-                return self(key, **{name: self.computed(part) for name, part in found.groupdict().items()})
+            if match := pattern.fullmatch(sentence):
+                return self(key, **{name: self.computed(part) for name, part in match.groupdict().items()})
         if _NUMBER.fullmatch(sentence):
             return sentence.replace(".", self.decimal_sign)
         return ", ".join(map(self.computed, sentence.split(", "))) if ", " in sentence else sentence
@@ -70,8 +70,8 @@ class Texts:
 @cache
 def languages() -> tuple[str, ...]:
     """The languages that a certificate can be written in (ISO 639-1)."""
-    found = (_FILE.fullmatch(one.name) for one in report_folder().iterdir())
-    return tuple(sorted(match[1] for match in found if match))
+    names = (_FILE.fullmatch(file.name) for file in report_folder().iterdir())
+    return tuple(sorted(match[1] for match in names if match))
 
 
 @cache
@@ -80,19 +80,19 @@ def texts_of(language: str = ENGLISH) -> Texts:
     if language not in languages():
         raise InputError(f"there are no texts in {language!r}; there are {', '.join(languages())}")
     tables = tomllib.loads(report_text(f"certificate.{language}.toml"))
-    words = {f"{section}.{key}": text for section, table in tables.items() for key, text in table.items()}
-    return Texts(language, words)
+    sentences = {f"{section}.{key}": text for section, table in tables.items() for key, text in table.items()}
+    return Texts(language, sentences)
 
 
 @cache
 def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
     """The English sentences of the computation as patterns, in the order of their file."""
-    found = []
+    patterns = []
     for key, text in texts_of(ENGLISH).words.items():
         if key.startswith("sentences."):
             parts = [
-                re.escape(literal) + (f"(?P<{place}>.+?)" if place else "")
-                for literal, place, _, _ in string.Formatter().parse(text)
+                re.escape(literal) + (f"(?P<{name}>.+?)" if name else "")
+                for literal, name, _, _ in string.Formatter().parse(text)
             ]
-            found.append((key, re.compile("".join(parts))))
-    return tuple(found)
+            patterns.append((key, re.compile("".join(parts))))
+    return tuple(patterns)

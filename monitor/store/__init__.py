@@ -15,9 +15,13 @@ from monitor.store.analyses import (
     save_analysis,
     stored_analyses,
 )
+from monitor.store.audit import AuditEntry, last_entries
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
+    CampaignRow,
+    RunRow,
+    WithdrawnCampaign,
     described_machines,
     list_campaigns,
     list_machines,
@@ -74,7 +78,9 @@ from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
 __all__ = [
     "NOTE",
+    "AuditEntry",
     "Backup",
+    "CampaignRow",
     "Database",
     "FleetSums",
     "Imported",
@@ -82,6 +88,7 @@ __all__ = [
     "MachineEvent",
     "MachineHistory",
     "RecordedRun",
+    "RunRow",
     "StoredAnalysis",
     "StoredCertificate",
     "StoredEvent",
@@ -92,6 +99,7 @@ __all__ = [
     "StoredSelection",
     "Verification",
     "Withdrawal",
+    "WithdrawnCampaign",
     "analysis_text",
     "campaign_machines",
     "campaign_notes",
@@ -111,6 +119,7 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "last_entries",
     "last_used_campaign",
     "latest_documents",
     "latest_tolerances",

@@ -39,20 +39,32 @@ class StoredAnalysis:
     computed_at: datetime
 
 
+class Subject(TypedDict, total=False):
+    """What a result is of; None or left out where it is of no campaign, machine, run or model."""
+
+    campaign: str | None
+    machine: str | None
+    run: int | None
+    model: str | None
+    model_version: int | None
+
+
+class Which(Subject, total=False):
+    """What narrows the choice of results; what is left out or None does not."""
+
+    method: str | None
+
+
 def save_analysis(
     db: Database,
     kind: str,
     document: Mapping[str, Any],
     *,
     method: str,
-    campaign: str | None = None,
-    machine: str | None = None,
-    run: int | None = None,
-    model: str | None = None,
-    model_version: int | None = None,
     seed: int | None = None,
+    **subject: Unpack[Subject],
 ) -> int:
-    """Keep a result; its number. ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend.
+    """Store a result; its number. ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend.
 
     Raises DataError for a document that is not JSON (NaN and infinities included), NotFoundError for a
     campaign or machine that is not there.
@@ -63,6 +75,7 @@ def save_analysis(
         text = json.dumps(document, ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError) as fault:
         raise DataError(f"the {kind} result cannot be kept as JSON: {fault}") from fault
+    campaign, machine = subject.get("campaign"), subject.get("machine")
     with db.transaction():
         campaign_id = None if campaign is None else campaign_number(db, campaign)
         if machine is not None:
@@ -75,9 +88,9 @@ def save_analysis(
                 kind,
                 machine,
                 campaign_id,
-                run,
-                model,
-                model_version,
+                subject.get("run"),
+                subject.get("model"),
+                subject.get("model_version"),
                 method,
                 None if seed is None else str(seed),
                 text,
@@ -95,29 +108,18 @@ def latest_documents(db: Database, kind: str, campaigns: Mapping[int, str]) -> d
     if not numbers:
         return {}
     marks = ", ".join("?" * len(numbers))
-    found = db.rows(
+    rows = db.rows(
         "SELECT campaign_id, arg_max(document, analysis_id) FROM analysis "
         f"WHERE kind = ? AND campaign_id IN ({marks}) GROUP BY campaign_id",
         [kind, *numbers],
     )
-    return dict(sorted((campaigns[number], json.loads(document)) for number, document in found))
-
-
-class Which(TypedDict, total=False):
-    """What narrows the choice of results; what is left out or None does not."""
-
-    campaign: str | None
-    machine: str | None
-    run: int | None
-    model: str | None
-    model_version: int | None
-    method: str | None
+    return dict(sorted((campaigns[number], json.loads(document)) for number, document in rows))
 
 
 def load_analysis(db: Database, kind: str, **which: Unpack[Which]) -> StoredAnalysis:
     """The latest result of a kind; what is named narrows the choice. Raises NotFoundError."""
-    found = stored_analyses(db, kind, most=1, **which)
-    if not found:
+    latest = stored_analyses(db, kind, most=1, **which)
+    if not latest:
         run = which.get("run")
         named = [
             which.get("campaign"), which.get("machine"), None if run is None else f"run {run}", which.get("model"),
@@ -125,7 +127,7 @@ def load_analysis(db: Database, kind: str, **which: Unpack[Which]) -> StoredAnal
         ]  # fmt: skip
         about = ", ".join(name for name in named if name is not None)
         raise NotFoundError(f"there is no stored {kind} result{' of ' + about if about else ''} yet")
-    return found[0]
+    return latest[0]
 
 
 def stored_analyses(
@@ -155,29 +157,25 @@ def stored_analyses(
             "most": most,
         },
     )
-    found = []
-    for (
-        number,
-        kind,
-        machine,
-        campaign,
-        run,
-        model,
-        version,
-        method,
-        seed,
-        document,
-        software,
-        moment,
-    ) in rows:
-        drawn = None if seed is None else int(seed)
-        found.append(
-            StoredAnalysis(
-                number, kind, machine, campaign, run, model, version, method, drawn, json.loads(document),
-                software, moment,
-            )
-        )  # fmt: skip
-    return tuple(found)
+    return tuple(_stored(row) for row in rows)
+
+
+def _stored(row: tuple[Any, ...]) -> StoredAnalysis:
+    number, kind, machine, campaign, run, model, version, method, seed, document, software, computed_at = row
+    return StoredAnalysis(
+        number=number,
+        kind=kind,
+        machine=machine,
+        campaign=campaign,
+        run=run,
+        model=model,
+        model_version=version,
+        method=method,
+        seed=None if seed is None else int(seed),
+        document=json.loads(document),
+        software_version=software,
+        computed_at=computed_at,
+    )
 
 
 def list_analyses(db: Database, kind: str | None = None) -> pd.DataFrame:
@@ -196,11 +194,11 @@ def analysis_content(db: Database, number: int) -> str:
 
 def check_analysis(db: Database, number: int) -> None:
     """Raise StoreError where a stored result is not what the audit says was stored."""
-    told = db.rows(
+    entries = db.rows(
         "SELECT content_sha256 FROM audit WHERE subject = 'analysis' AND key = ? ORDER BY entry",
         [str(number)],
     )
-    if not told or told[-1][0] != analysis_content(db, number):
+    if not entries or entries[-1][0] != analysis_content(db, number):
         raise StoreError(
             f"the stored result {number} was altered after it was stored; `monitor verify` tells what else was"
         )

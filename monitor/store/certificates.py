@@ -122,11 +122,11 @@ def load_certificate(db: Database, number: str) -> StoredCertificate:
         [number],
     )
     if not entries:
-        known = [
+        numbers = [
             name for (name,) in db.rows("SELECT number FROM v_certificates ORDER BY number DESC LIMIT 20")
         ]
-        there = f"there are {', '.join(known)}" if known else "none was made yet"
-        raise NotFoundError(f"there is no certificate {number!r}; {there}")
+        existing = f"there are {', '.join(numbers)}" if numbers else "none was made yet"
+        raise NotFoundError(f"there is no certificate {number!r}; {existing}")
     document = next(entry for entry in reversed(entries) if entry[3] is not None)
     state, runs, _, _, _, _, _, reason, replaced_by, campaign, campaign_id, withdrawn, machine = entries[-1]
     return StoredCertificate(
@@ -159,8 +159,8 @@ def certificate_numbers(db: Database) -> list[str]:
 
 def find_certificate(db: Database, pdf_sha256: str) -> str | None:
     """The number of the certificate whose document has this hash, None where there is none."""
-    found = db.rows("SELECT number FROM certificate WHERE pdf_sha256 = ? ORDER BY entry", [pdf_sha256])
-    return str(found[-1][0]) if found else None
+    numbers = db.rows("SELECT number FROM certificate WHERE pdf_sha256 = ? ORDER BY entry", [pdf_sha256])
+    return str(numbers[-1][0]) if numbers else None
 
 
 def certificate_faults(db: Database) -> tuple[str, ...]:
@@ -212,9 +212,9 @@ def _append(
     entry, previous = last[0] if last else (0, audit.NO_ENTRY_BEFORE)
     values = [entry + 1, number, state, campaign_id, runs, *document, reason, replaced_by]
     values += [__version__, utc_now(), previous]
-    own = audit.digest(*values)
+    entry_sha256 = audit.digest(*values)
     db.execute(
         f"INSERT INTO certificate ({_COLUMNS}) VALUES (?, ?, ?, ?, ?::BIGINT[], ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        [*values, own],
+        [*values, entry_sha256],
     )
-    audit.record(db, state, "certificate", f"{number} entry {entry + 1}", own)
+    audit.record(db, state, "certificate", f"{number} entry {entry + 1}", entry_sha256)

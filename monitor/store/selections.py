@@ -40,19 +40,19 @@ def save_selection(db: Database, campaign: str, name: str, condition: str, runs:
     """
     if not name.strip():
         raise InputError("a selection needs a name, for example hot-cold-star")
-    chosen = sorted({int(run) for run in runs})
-    if not chosen:
+    selected = sorted({int(run) for run in runs})
+    if not selected:
         raise InputError(f"selection {name} holds no run of campaign {campaign}; nothing was kept")
     with db.transaction():
         campaign_id = campaign_number(db, campaign)
-        known = {run for (run,) in db.rows("SELECT run FROM run WHERE campaign_id = ?", [campaign_id])}
-        strange = [run for run in chosen if run not in known]
+        existing = {run for (run,) in db.rows("SELECT run FROM run WHERE campaign_id = ?", [campaign_id])}
+        strange = [run for run in selected if run not in existing]
         if strange:
             raise NotFoundError(f"campaign {campaign!r} has no run {strange[0]}")
         number = db.next_number("selection", "selection_id")
         db.execute(
             "INSERT INTO selection VALUES (?, ?, ?, ?, ?::BIGINT[], ?, ?)",
-            [number, campaign_id, name, condition, chosen, __version__, utc_now()],
+            [number, campaign_id, name, condition, selected, __version__, utc_now()],
         )
         audit.record(db, "save", "selection", str(number), selection_content(db, number))
     return number
@@ -69,7 +69,7 @@ def find_selection(db: Database, name: str, campaign: str | None = None) -> Stor
         {"name": name, "campaign": campaign},
     )
     if not rows:
-        there = [
+        existing = [
             f"{other} (of {owner})"
             for other, owner in db.rows("SELECT selection, campaign FROM v_selections ORDER BY ALL LIMIT 21")
         ]
@@ -77,16 +77,16 @@ def find_selection(db: Database, name: str, campaign: str | None = None) -> Stor
         raise NotFoundError(
             f"there is no selection {name!r}{of}; "
             + (
-                f"there are {', '.join(there[:20])}{' and more' if len(there) > 20 else ''}"
-                if there
+                f"there are {', '.join(existing[:20])}{' and more' if len(existing) > 20 else ''}"
+                if existing
                 else f'`monitor select CAMPAIGN --name {name} --where "hours >= 6"` makes one'
             )
         )
     if len(rows) > 1:
         owners = ", ".join(row[2] for row in rows)
         raise InputError(f"selection {name!r} exists for several campaigns ({owners}); name the campaign too")
-    number, kept, owner, condition, runs, made_at = rows[0]
-    return StoredSelection(number, kept, owner, condition, tuple(runs), made_at)
+    number, selection, owner, condition, runs, made_at = rows[0]
+    return StoredSelection(number, selection, owner, condition, tuple(runs), made_at)
 
 
 def list_selections(db: Database, campaign: str | None = None) -> pd.DataFrame:

@@ -1,6 +1,12 @@
 """Uncertainty after JCGM 102:2011: input covariance, GUM framework, adaptive Monte Carlo, coverage, validation."""
 
-from monitor.uncertainty.adaptive import MonteCarloResult, Tolerances, adaptive_monte_carlo, monte_carlo
+from monitor.uncertainty.adaptive import (
+    MonteCarloOptions,
+    MonteCarloResult,
+    Tolerances,
+    adaptive_monte_carlo,
+    monte_carlo,
+)
 from monitor.uncertainty.covariance import (
     Inputs,
     covariance_of_day,
@@ -31,11 +37,11 @@ from monitor.uncertainty.marginals import (
     StudentT,
     Triangular,
 )
+from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.montecarlo import RunEstimator, run_estimator
 from monitor.uncertainty.projection import Projection, nearest_correlation
 from monitor.uncertainty.propagation import Model, Summary
-from monitor.uncertainty.row_problem import RowProblem, repeated_readings, run_problem
-from monitor.uncertainty.run_problem import OneRun, RunProblem
+from monitor.uncertainty.row_run import RowRun, measured_run, repeated_readings
 from monitor.uncertainty.sampling import (
     BlockSampler,
     JointDistribution,
@@ -46,6 +52,7 @@ from monitor.uncertainty.sampling import (
 )
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
 from monitor.uncertainty.tolerance import numerical_tolerance
+from monitor.uncertainty.touched_run import TouchedRun
 from monitor.uncertainty.validation import Comparison, Validation, validate
 
 __all__ = [
@@ -58,21 +65,22 @@ __all__ = [
     "Inputs",
     "JointDistribution",
     "Marginal",
+    "MeasuredRun",
     "Model",
+    "MonteCarloOptions",
     "MonteCarloResult",
     "Normal",
-    "OneRun",
     "OutputContribution",
     "Projection",
     "Rectangular",
-    "RowProblem",
+    "RowRun",
     "RunEstimator",
-    "RunProblem",
     "Sampled",
     "Sensitivity",
     "StudentT",
     "Summary",
     "Tolerances",
+    "TouchedRun",
     "Triangular",
     "Validation",
     "adaptive_monte_carlo",
@@ -86,6 +94,7 @@ __all__ = [
     "independent",
     "joined",
     "joint_coverage",
+    "measured_run",
     "monte_carlo",
     "nearest_correlation",
     "normal_inputs",
@@ -95,7 +104,6 @@ __all__ = [
     "rectangle_factor",
     "repeated_readings",
     "run_estimator",
-    "run_problem",
     "sample_ellipsoid_factor",
     "sample_rectangle_factor",
     "sensitivity_of",

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,50 +99,67 @@ def sequence_length(p: float, block_size: int) -> int:
     return math.ceil(trials / block_size) * block_size
 
 
+@dataclass(frozen=True)
+class MonteCarloOptions:
+    """How far a Monte Carlo goes and what it keeps.
+
+    It is stable to ``digits`` significant digits, with tolerances divided by ``tighten``, after ``min_sequences`` at
+    least; ``max_trials`` end it in any case. ``keep`` bounds the sample behind k_p and k_q. Directions with an
+    eigenvalue of the correlation matrix below ``rank_tolerance`` times the largest take no part in k_p. ``workers``
+    are threads. Raises DataError for numbers that are too small.
+    """
+
+    p: float = 0.95
+    digits: int = 2
+    tighten: float = 1.0
+    min_sequences: int = 10
+    max_trials: int = 10_000_000
+    keep: int = 200_000
+    workers: int = 1
+    rank_tolerance: float = RANK_TOLERANCE
+
+    def __post_init__(self) -> None:
+        if self.digits < 1 or not self.tighten > 0.0 or self.min_sequences < 1 or self.keep < 1000:
+            raise DataError(
+                f"digits and min_sequences must be at least 1, tighten positive and keep at least 1000, but are "
+                f"{self.digits}, {self.min_sequences}, {self.tighten} and {self.keep}"
+            )
+
+
 def adaptive_monte_carlo(
     model: Model,
     sampler: BlockSampler,
     names: Sequence[str],
     units: Sequence[str],
-    *,
-    p: float = 0.95,
-    digits: int = 2,
-    tighten: float = 1.0,
-    min_sequences: int = 10,
-    max_trials: int = 10_000_000,
-    keep: int = 200_000,
-    workers: int = 1,
-    rank_tolerance: float = RANK_TOLERANCE,
+    options: MonteCarloOptions | None = None,
 ) -> MonteCarloResult:
-    """Propagate by sequences of M trials until stable to ``digits`` significant digits, or ``max_trials``.
+    """Propagate by sequences of M trials until stable, or until the most trials that ``options`` allow.
 
-    ``names`` and ``units`` are those of the m outputs of ``model``; ``keep`` bounds the sample behind k_p and
-    k_q; directions with an eigenvalue of the correlation matrix below ``rank_tolerance`` times the largest
-    take no part in k_p. Where ``max_trials`` ends the work before stability, ``stable`` is false.
+    ``names`` and ``units`` are those of the m outputs of ``model``. Where the most trials end the work before
+    stability, ``stable`` is false.
 
-    Raises RefusedResultError where trials did not converge and could matter: the result is refused when, with
-    all of them outside the coverage region, k_p or k_q would move by more than its tolerance, or, with all of
-    them as far out as the farthest trial seen, a standard uncertainty would.
+    Raises DataError where an output lacks a name or a unit, RefusedResultError where trials did not converge and could
+    matter: the result is refused when, with all of them outside the coverage region, k_p or k_q would move by more than
+    its tolerance, or, with all of them as far out as the farthest trial seen, a standard uncertainty would.
     """
-    _check(names, units, digits, tighten, min_sequences, keep)
-    length = sequence_length(p, sampler.block_size)
-    started = time.perf_counter()
-    total = Accumulator(len(names), p, keep, rank_tolerance)
-    with Trials(model, sampler, len(names), workers).pool() as trials:
+    if not names or len(names) != len(units):
+        raise DataError(f"every output needs a name and a unit, but there are {len(names)} and {len(units)}")
+    options = options or MonteCarloOptions()
+    length = sequence_length(options.p, sampler.block_size)
+    total = Accumulator(len(names), options.p, options.keep, options.rank_tolerance)
+    with Trials(model, sampler, len(names), options.workers).pool() as trials:
         while True:
             total.add(trials.sequence(length // sampler.block_size))
             _refuse_without_trials(total)
-            last = total.trials >= max_trials
-            if last or (
-                len(total.rows) >= max(min_sequences, 2) and _stable(total, total.quick(), digits, tighten)
-            ):
+            last = total.trials >= options.max_trials
+            enough = len(total.rows) >= max(options.min_sequences, 2)
+            if last or (enough and _stable(total, _tolerances(total.quick(), options))):
                 summary = total.summary()
-                stable = _stable(total, summary, digits, tighten)
-                if stable or last:
+                tolerances = _tolerances(summary, options)
+                if last or _stable(total, tolerances):
                     break
-    tolerances = _tolerances(summary, digits, tighten)
     _refuse_where_it_matters(total, summary, tolerances)
-    return _result(total, tolerances, stable, sampler, names, units, digits, tighten, started)
+    return _result(total, tolerances, sampler, names, units, options)
 
 
 def monte_carlo(
@@ -151,54 +168,25 @@ def monte_carlo(
     names: Sequence[str],
     units: Sequence[str],
     trials: int,
-    *,
-    p: float = 0.95,
-    digits: int = 2,
-    tighten: float = 1.0,
-    keep: int = 200_000,
-    workers: int = 1,
-    rank_tolerance: float = RANK_TOLERANCE,
+    options: MonteCarloOptions | None = None,
 ) -> MonteCarloResult:
     """Propagate a fixed number of ``trials``, rounded up to whole sequences (JCGM 102 7.2); else as above."""
-    return adaptive_monte_carlo(
-        model,
-        sampler,
-        names,
-        units,
-        p=p,
-        digits=digits,
-        tighten=tighten,
-        min_sequences=max(2, math.ceil(trials / sequence_length(p, sampler.block_size))),
-        max_trials=trials,
-        keep=keep,
-        workers=workers,
-        rank_tolerance=rank_tolerance,
-    )
+    options = options or MonteCarloOptions()
+    sequences = max(2, math.ceil(trials / sequence_length(options.p, sampler.block_size)))
+    options = replace(options, min_sequences=sequences, max_trials=trials)
+    return adaptive_monte_carlo(model, sampler, names, units, options)
 
 
-def _check(
-    names: Sequence[str], units: Sequence[str], digits: int, tighten: float, min_sequences: int, keep: int
-) -> None:
-    if not names or len(names) != len(units):
-        raise DataError(f"every output needs a name and a unit, but there are {len(names)} and {len(units)}")
-    if digits < 1 or not tighten > 0.0 or min_sequences < 1 or keep < 1000:
-        raise DataError(
-            f"digits and min_sequences must be at least 1, tighten positive and keep at least 1000, but are "
-            f"{digits}, {min_sequences}, {tighten} and {keep}"
-        )
-
-
-def _tolerances(summary: Summary, digits: int, tighten: float) -> Tolerances:
+def _tolerances(summary: Summary, options: MonteCarloOptions) -> Tolerances:
     rest = [
-        numerical_tolerance(value, digits) / tighten if value > 0.0 else 0.0
+        numerical_tolerance(value, options.digits) / options.tighten if value > 0.0 else 0.0
         for value in (summary.lambda_max, summary.k_p, summary.k_q)
     ]
-    return Tolerances(tolerances_of(summary.u, digits) / tighten, *rest)
+    return Tolerances(tolerances_of(summary.u, options.digits) / options.tighten, *rest)
 
 
-def _stable(total: Accumulator, summary: Summary, digits: int, tighten: float) -> bool:
-    allowed = _tolerances(summary, digits, tighten).as_row()
-    return bool(np.all(2.0 * total.standard_errors() <= allowed))
+def _stable(total: Accumulator, tolerances: Tolerances) -> bool:
+    return bool(np.all(2.0 * total.standard_errors() <= tolerances.as_row()))
 
 
 def _refuse_without_trials(total: Accumulator) -> None:
@@ -213,20 +201,20 @@ def _refuse_where_it_matters(total: Accumulator, summary: Summary, tolerances: T
     """The criterion that ``adaptive_monte_carlo`` states."""
     if not total.not_converged:
         return
-    part = total.not_converged / total.trials
+    share = total.not_converged / total.trials
     covariance = total.moments.covariance
     distances = mahalanobis_distances(total.sample, summary.estimate, covariance, total.tolerance)
     deviations = largest_deviations(total.sample, summary.estimate, covariance)
-    inside = total.p / (1.0 - part)
+    inside = total.p / (1.0 - share)
     why = None
     if inside >= 1.0:
-        why = f"only {100 * (1 - part):.2f} % of the trials gave outputs, less than p"
+        why = f"only {100 * (1 - share):.2f} % of the trials gave outputs, less than p"
     elif (moved := quantile_of(distances, inside) - summary.k_p) > tolerances.k_p:
         why = f"k_p could be {moved:.3g} larger (tolerance {tolerances.k_p:.3g})"
     elif (moved := quantile_of(deviations, inside) - summary.k_q) > tolerances.k_q:
         why = f"k_q could be {moved:.3g} larger (tolerance {tolerances.k_q:.3g})"
     else:
-        grown = summary.u * (math.sqrt(1.0 - part + part * float(np.max(deviations)) ** 2) - 1.0)
+        grown = summary.u * (math.sqrt(1.0 - share + share * float(np.max(deviations)) ** 2) - 1.0)
         if np.any(grown > tolerances.outputs):
             why = "a standard uncertainty could be larger by more than its numerical tolerance"
     if why is not None:
@@ -239,13 +227,10 @@ def _refuse_where_it_matters(total: Accumulator, summary: Summary, tolerances: T
 def _result(
     total: Accumulator,
     tolerances: Tolerances,
-    stable: bool,
     sampler: BlockSampler,
     names: Sequence[str],
     units: Sequence[str],
-    digits: int,
-    tighten: float,
-    started: float,
+    options: MonteCarloOptions,
 ) -> MonteCarloResult:
     outputs = len(names)
     covariance = total.moments.covariance
@@ -264,16 +249,16 @@ def _result(
         k_q_error=quantile_standard_error(deviations, total.p),
         rank=covariance_root(covariance, total.tolerance).rank,
         p=total.p,
-        digits=digits,
-        tighten=tighten,
+        digits=options.digits,
+        tighten=options.tighten,
         tolerances=tolerances,
         standard_errors=Summary(errors[:outputs], errors[outputs : 2 * outputs], *map(float, errors[-3:])),
-        stable=stable,
+        stable=_stable(total, tolerances),
         trials=total.trials,
         sequences=len(total.rows),
         not_converged=total.not_converged,
         sample=total.sample,
         seed=sampler.seed,
         block_size=sampler.block_size,
-        seconds=time.perf_counter() - started,
+        seconds=time.perf_counter() - total.started,
     )

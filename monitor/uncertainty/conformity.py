@@ -79,10 +79,12 @@ def conformity(
     if bounded.sum() == 1:
         return Conformity(single, float(single[bounded][0]), 0.0)
     correlation = (u_y / np.outer(u, u))[np.ix_(bounded, bounded)]
-    found = _box(correlation, a[bounded], b[bounded], dof, rng or np.random.default_rng(_SEED))
+    probability = _box(correlation, a[bounded], b[bounded], dof, rng or np.random.default_rng(_SEED))
     # The least probable limit bounds the joint probability whatever the sampling left open.
-    joint = min(float(np.mean(found)), float(single.min()))
-    return Conformity(single, max(joint, 0.0), float(np.std(found, ddof=1) / math.sqrt(len(found))))
+    joint = min(float(np.mean(probability)), float(single.min()))
+    return Conformity(
+        single, max(joint, 0.0), float(np.std(probability, ddof=1) / math.sqrt(len(probability)))
+    )
 
 
 def _box(correlation: Array, a: Array, b: Array, dof: float, rng: np.random.Generator) -> list[float]:
@@ -94,21 +96,21 @@ def _box(correlation: Array, a: Array, b: Array, dof: float, rng: np.random.Gene
     low, high = a[order], b[order]
     count = len(order)
     finite = math.isfinite(dof)
-    found = []
+    estimates = []
     for _ in range(_SCRAMBLES):
         points = scipy.stats.qmc.Sobol(count - 1 + finite, scramble=True, rng=rng).random(_POINTS)
         points = np.clip(points, 1e-15, 1.0 - 1e-15)
         scale = np.sqrt(scipy.stats.chi2.ppf(points[:, -1], dof) / dof) if finite else np.ones(_POINTS)
         drawn = np.zeros((_POINTS, count))
         inside = np.ones(_POINTS)
-        for place in range(count):
-            before = drawn[:, :place] @ root[place, :place]
-            d = scipy.special.ndtr((low[place] * scale - before) / root[place, place])
-            e = scipy.special.ndtr((high[place] * scale - before) / root[place, place])
+        for index in range(count):
+            before = drawn[:, :index] @ root[index, :index]
+            d = scipy.special.ndtr((low[index] * scale - before) / root[index, index])
+            e = scipy.special.ndtr((high[index] * scale - before) / root[index, index])
             inside *= e - d
-            if place < count - 1:
-                drawn[:, place] = scipy.special.ndtri(
-                    np.clip(d + points[:, place] * (e - d), 1e-300, 1.0 - 1e-16)
+            if index < count - 1:
+                drawn[:, index] = scipy.special.ndtri(
+                    np.clip(d + points[:, index] * (e - d), 1e-300, 1.0 - 1e-16)
                 )
-        found.append(float(inside.mean()))
-    return found
+        estimates.append(float(inside.mean()))
+    return estimates

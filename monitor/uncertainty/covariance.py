@@ -77,10 +77,10 @@ class Inputs:
 
     def indices(self, source: str) -> npt.NDArray[np.int64]:
         """The positions of the inputs of one source."""
-        found = np.array([i for i, name in enumerate(self.sources) if name == source], dtype=np.int64)
-        if not len(found):
+        indices = np.array([i for i, name in enumerate(self.sources) if name == source], dtype=np.int64)
+        if not len(indices):
             raise DataError(f"no source '{source}'; there are {', '.join(self.source_names)}")
-        return found
+        return indices
 
     def degrees_of_freedom(self, source: str) -> float:
         """The degrees of freedom of one source, infinite where none are given."""
@@ -120,12 +120,12 @@ def covariance_of_day(
 ) -> Inputs:
     """Inputs from the runs of one ``day``; ``days`` (runs,) says on which day each run was."""
     labels = _checked_days(values, days)
-    chosen = labels == day
-    if not np.any(chosen):
+    of_day = labels == day
+    if not np.any(of_day):
         raise DataError(f"no run on day {day}; there are days {', '.join(map(str, np.unique(labels)))}")
-    if np.sum(chosen) < 2:
+    if np.sum(of_day) < 2:
         raise DataError(f"day {day} has a single run; a covariance of a day needs at least two")
-    return overall(np.asarray(values)[chosen], names, units, source=source, mean_of=mean_of)
+    return overall(np.asarray(values)[of_day], names, units, source=source, mean_of=mean_of)
 
 
 def pooled_by_day(
@@ -147,8 +147,8 @@ def pooled_by_day(
     centred = values.copy()
     present = np.unique(labels)
     for day in present:
-        chosen = labels == day
-        centred[chosen] -= values[chosen].mean(axis=0)
+        of_day = labels == day
+        centred[of_day] -= values[of_day].mean(axis=0)
     dof = len(values) - len(present)
     if dof < 1:
         raise DataError("pooling by day needs a day with two runs or more, but every day has a single run")

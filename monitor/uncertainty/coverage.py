@@ -99,13 +99,13 @@ def correlated_rectangle_factor(
     _check(outputs, p, dof)
     reaches, rank = _reaches(correlation, rng)
     upper = 2.0 * rectangle_factor(outputs, p, dof)
-    found = [
+    coverages = [
         float(
             scipy.optimize.brentq(lambda k, r=part: float(np.mean(_radial(k / r, rank, dof))) - p, 0.0, upper)
         )
         for part in reaches
     ]
-    return Sampled(float(np.mean(found)), float(np.std(found, ddof=1) / math.sqrt(len(found))))
+    return Sampled(float(np.mean(coverages)), float(np.std(coverages, ddof=1) / math.sqrt(len(coverages))))
 
 
 def joint_coverage(
@@ -119,8 +119,8 @@ def joint_coverage(
         raise DataError(f"k must be positive, but is {k}")
     _check(len(np.atleast_2d(correlation)), 0.5, dof)
     reaches, rank = _reaches(correlation, rng)
-    found = [float(np.mean(_radial(k / part, rank, dof))) for part in reaches]
-    return Sampled(float(np.mean(found)), float(np.std(found, ddof=1) / math.sqrt(len(found))))
+    coverages = [float(np.mean(_radial(k / part, rank, dof))) for part in reaches]
+    return Sampled(float(np.mean(coverages)), float(np.std(coverages, ddof=1) / math.sqrt(len(coverages))))
 
 
 def sample_ellipsoid_factor(

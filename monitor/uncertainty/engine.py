@@ -70,12 +70,12 @@ def in_order(
 
     Raises RefusedResultError where ``MOST_DEATHS`` workers died of one task.
     """
-    left = iter(arguments)
+    waiting = iter(arguments)
     in_hand: deque[tuple[tuple[Any, ...], Any]] = deque()
 
     def refill() -> None:
-        for one in itertools.islice(left, max(0, AHEAD * engine.size - len(in_hand))):
-            in_hand.append((one, engine.submit(task, *one)))
+        for task_arguments in itertools.islice(waiting, max(0, AHEAD * engine.size - len(in_hand))):
+            in_hand.append((task_arguments, engine.submit(task, *task_arguments)))
 
     try:
         refill()
@@ -87,13 +87,15 @@ def in_order(
         engine.cancel(handle for _, handle in in_hand)
 
 
-def _result(engine: Engine, task: Callable[..., Result], one: tuple[Any, ...], handle: Any) -> Result:
+def _result(
+    engine: Engine, task: Callable[..., Result], task_arguments: tuple[Any, ...], handle: Any
+) -> Result:
     for _ in range(MOST_DEATHS):
         try:
-            found: Result = engine.result(handle)
-            return found
+            result: Result = engine.result(handle)
+            return result
         except WorkerLostError:
-            handle = engine.submit(task, *one)
+            handle = engine.submit(task, *task_arguments)
     engine.cancel([handle])
     raise RefusedResultError(
         f"{MOST_DEATHS} workers died one after the other with the same task in hand: it needs more memory than they "

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from monitor.records import Array
-from monitor.uncertainty.row_problem import RowProblem
+from monitor.uncertainty.row_run import RowRun
 
 #: The unknowns are moved by so many steps of the sensitivity (3 µm at the tip): 0.1 mm. The fourth order is below 1e-6
 #: of the second there, and the rounding of a double below 1e-11 of it.
@@ -31,7 +31,7 @@ class Expansion:
     """N whitened rows, each with at most a unknowns: ``at`` (N, a) their places, ``residual`` (N,), ``jacobian``
     (N, a), ``hessian`` (N, a, a); ``gather`` (p, N a) sums what the rows give to each unknown. ``centre`` (p,)."""
 
-    run: RowProblem
+    run: RowRun
     centre: Array
     at: npt.NDArray[np.int64]
     residual: Array
@@ -42,7 +42,7 @@ class Expansion:
 
     def gradient(self, unknowns: Array, inputs: Array) -> Array:
         """J^T r (p, B), whitened, at ``unknowns`` (p, B) and ``inputs`` (N, B)."""
-        found = np.empty(unknowns.shape)
+        expanded = np.empty(unknowns.shape)
         for first in range(0, unknowns.shape[1], _TRIALS):
             these = slice(first, first + _TRIALS)
             moved = (unknowns[:, these] - self.centre[:, None])[self.at]  # (N, a, B)
@@ -53,15 +53,15 @@ class Expansion:
                 change = self.hessian @ moved
                 residual = residual + 0.5 * np.sum(moved * change, axis=1)
                 slope = slope + change
-            given = (slope * residual[:, None]).reshape(self.at.size, -1)
-            found[:, these] = self.gather @ given
-        return found
+            products = (slope * residual[:, None]).reshape(self.at.size, -1)
+            expanded[:, these] = self.gather @ products
+        return expanded
 
 
-def expansion_of(run: RowProblem, unknowns: Array, steps: Array) -> Expansion:
+def expansion_of(run: RowRun, unknowns: Array, steps: Array) -> Expansion:
     """The expansion of a run about ``unknowns`` (p,); ``steps`` (p,) each move the tip by about 3 µm."""
-    here = _linearised(run, unknowns[:, None])
-    jacobian = here[1][0]
+    linearised = _linearised(run, unknowns[:, None])
+    jacobian = linearised[1][0]
     moves = _STEPS * steps
     # Which rows an unknown acts on: at the centre, and away from it in all unknowns, lest a derivative be zero there.
     away = _linearised(run, (unknowns + moves * np.cos(np.arange(len(moves))))[:, None])[1][0]
@@ -82,25 +82,25 @@ def expansion_of(run: RowProblem, unknowns: Array, steps: Array) -> Expansion:
         bend[:, :, colour] = (both[0] - both[1]) / np.where(step > 0.0, 2.0 * step, 1.0)[:, None]
     width = int(acts.sum(axis=1).max(initial=1))
     order = np.argsort(~acts, axis=1, kind="stable")[:, :width]
-    kept = np.take_along_axis(acts, order, axis=1)
+    largest_acts = np.take_along_axis(acts, order, axis=1)
     rows = np.arange(len(jacobian))[:, None]
     hessian = bend[rows[:, :, None], order[:, :, None], colours[order][:, None, :]]
-    hessian = np.where(kept[:, :, None] & kept[:, None, :], hessian, 0.0)
+    hessian = np.where(largest_acts[:, :, None] & largest_acts[:, None, :], hessian, 0.0)
     hessian = 0.5 * (hessian + np.swapaxes(hessian, 1, 2))
-    slope = np.where(kept, jacobian[rows, order], 0.0)
+    slope = np.where(largest_acts, jacobian[rows, order], 0.0)
     # A second derivative that moves nothing over the largest step is rounding: such rows are straight.
-    reach = np.where(kept, moves[order], 0.0)
+    reach = np.where(largest_acts, moves[order], 0.0)
     bent = bool(
         np.any(np.abs(reach[:, :, None] * hessian * reach[:, None, :]) > 1e-9 * np.abs(slope * reach).max())
     )
     gather = csr_array(
-        (np.where(kept, 1.0, 0.0).ravel(), (order.ravel(), np.arange(order.size))),
+        (np.where(largest_acts, 1.0, 0.0).ravel(), (order.ravel(), np.arange(order.size))),
         shape=(len(unknowns), order.size),
     )
-    return Expansion(run, unknowns.copy(), order, here[0][0], slope, hessian, gather, bent)
+    return Expansion(run, unknowns.copy(), order, linearised[0][0], slope, hessian, gather, bent)
 
 
-def _linearised(run: RowProblem, unknowns: Array) -> tuple[Array, Array]:
+def _linearised(run: RowRun, unknowns: Array) -> tuple[Array, Array]:
     """Whitened residuals (B, N) and derivatives (B, N, p) as measured, at unknowns (p, B)."""
     nothing = np.repeat(run.inputs[:, None], unknowns.shape[1], axis=1)
     at = run.repeated(nothing).linearise(np.ascontiguousarray(unknowns.T), run.common)

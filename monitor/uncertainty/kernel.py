@@ -132,9 +132,9 @@ def _load_more(w, row, source, factor):  # type: ignore[no-untyped-def]
 
 
 @_fast
-def _load_product(w, row, one, other, factor):  # type: ignore[no-untyped-def]
+def _load_product(w, row, first, other, factor):  # type: ignore[no-untyped-def]
     for t in range(L):
-        w[row * L + t] += factor * one[t] * other[t]
+        w[row * L + t] += factor * first[t] * other[t]
 
 
 @_fast
@@ -435,11 +435,11 @@ def _step(k, c, i, second, theta, x, gradient, w, steps, entries):  # type: igno
 
 
 @_fast
-def _reading(w, place, x, row, factor):  # type: ignore[no-untyped-def]
+def _reading(w, index, x, row, factor):  # type: ignore[no-untyped-def]
     if row >= 0:
-        _load(w, place, x[row], factor)
+        _load(w, index, x[row], factor)
     else:
-        _fill(w, place, 0.0)
+        _fill(w, index, 0.0)
 
 
 @_jit
@@ -511,17 +511,17 @@ def _lanes(theta, x, gradient, w, g, steps, entries, walk, probings, distances, 
             for k in range(begin[s], end[s]):
                 _step(k, 0, 0, True, theta, x, gradient, w, steps, entries)
     for d in range(len(between)):
-        one = targets_at + 3 * between[d, 0]
+        first = targets_at + 3 * between[d, 0]
         two = targets_at + 3 * between[d, 1]
         for t in range(L):
-            d0 = theta[one, t] - theta[two, t]
-            d1 = theta[one + 1, t] - theta[two + 1, t]
-            d2 = theta[one + 2, t] - theta[two + 2, t]
+            d0 = theta[first, t] - theta[two, t]
+            d1 = theta[first + 1, t] - theta[two + 1, t]
+            d2 = theta[first + 2, t] - theta[two + 2, t]
             length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
             force = length_weight[d] * (length - x[length_row[d], t]) / length
-            gradient[one, t] += force * d0
-            gradient[one + 1, t] += force * d1
-            gradient[one + 2, t] += force * d2
+            gradient[first, t] += force * d0
+            gradient[first + 1, t] += force * d1
+            gradient[first + 2, t] += force * d2
             gradient[two, t] -= force * d0
             gradient[two + 1, t] -= force * d1
             gradient[two + 2, t] -= force * d2
@@ -532,9 +532,9 @@ def _block(theta, x, gradient, held, segments, steps, entries, walk, probings, d
     """All trials of a block: theta (p, B), x (N, B), gradient (p, B)."""
     p, count = theta.shape
     inputs = x.shape[0]
-    own = np.empty((p + len(held), L))
+    unknowns = np.empty((p + len(held), L))
     for i in range(len(held)):
-        own[p + i, :] = held[i]
+        unknowns[p + i, :] = held[i]
     xs = np.empty((inputs, L))
     out = np.empty((p + len(held), L))
     w = np.zeros(_ROWS * L)
@@ -544,14 +544,14 @@ def _block(theta, x, gradient, held, segments, steps, entries, walk, probings, d
         if width < L:
             # A last part that is not full repeats its last trial.
             for i in range(p):
-                own[i, :] = theta[i, count - 1]
+                unknowns[i, :] = theta[i, count - 1]
             for i in range(inputs):
                 xs[i, :] = x[i, count - 1]
         for i in range(p):
-            own[i, :width] = theta[i, begin : begin + width]
+            unknowns[i, :width] = theta[i, begin : begin + width]
         for i in range(inputs):
             xs[i, :width] = x[i, begin : begin + width]
-        _lanes(own, xs, out, w, g, steps, entries, walk, probings, distances, targets_at)
+        _lanes(unknowns, xs, out, w, g, steps, entries, walk, probings, distances, targets_at)
         for i in range(p):
             gradient[i, begin : begin + width] = out[i, :width]
 

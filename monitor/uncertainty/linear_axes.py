@@ -13,58 +13,58 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.machine import COMPONENTS, MOTION, Chain, Joint
 from monitor.records import Array, LinearAxes
-from monitor.uncertainty.run_problem import OneRun
+from monitor.uncertainty.measured_run import MeasuredRun
 
 #: The spacing of the nodes is averaged over so many values: the covariance then is known to some 1e-3 of itself.
 _SPACINGS = 31
 _SHIFTS = "XYZ"
 
 
-def row_covariances(one: OneRun, unknowns: Array, axes: LinearAxes) -> dict[str, Array]:
+def row_covariances(run: MeasuredRun, unknowns: Array, axes: LinearAxes) -> dict[str, Array]:
     """Covariance (N, N) in mm² of the readings of a run at ``unknowns`` (p,), by source; one a kind of error and axis.
 
     Raises InputError for an axis that the machine does not have.
     """
-    problem = one.problem
+    problem = run.problem
     chain = problem.context.chain
-    seen = problem.evaluated(unknowns[None], one.common, jacobian=True)
-    assert seen.by_error is not None
-    found: dict[str, Array] = {}
+    pose = problem.evaluated(unknowns[None], run.common, jacobian=True)
+    assert pose.by_error is not None
+    covariances: dict[str, Array] = {}
 
     def add(source: str, columns: Array) -> None:
         square = columns @ columns.T
-        found[source] = found.get(source, 0.0) + 0.5 * (square + square.T)
+        covariances[source] = covariances.get(source, 0.0) + 0.5 * (square + square.T)
 
     for name, errors in axes.axes.items():
         joint = _linear(chain, name)
-        place = chain.index(name)
-        position = problem.context.positions[:, place]
-        told = problem.observe(seen.by_error[:, :, place, MOTION, :3])  # (n, d, 3)
-        own = int(np.abs(joint.direction).argmax())
-        per_row = np.repeat(position, told.shape[1])
-        rows = told.reshape(-1, 3)
-        symbol = f"E{_SHIFTS[own]}{name}"
+        index = chain.index(name)
+        position = problem.context.positions[:, index]
+        observed = problem.observe(pose.by_error[:, :, index, MOTION, :3])  # (n, d, 3)
+        along = int(np.abs(joint.direction).argmax())
+        per_row = np.repeat(position, observed.shape[1])
+        rows = observed.reshape(-1, 3)
+        symbol = f"E{_SHIFTS[along]}{name}"
         if errors.proportional:
-            add(f"{symbol}, proportional", errors.proportional * (rows[:, own] * per_row)[:, None])
+            add(f"{symbol}, proportional", errors.proportional * (rows[:, along] * per_row)[:, None])
         for component in range(3):
-            size = errors.positioning if component == own else errors.straightness
+            size = errors.positioning if component == along else errors.straightness
             if size:
                 root = _interpolated(per_row, axes.node_spacing)
                 add(f"E{COMPONENTS[component]}{name}", size * rows[:, component, None] * root)
         for other, size in errors.squareness.items():
             across = int(np.abs(_linear(chain, other).direction).argmax())
-            if size and across != own:
+            if size and across != along:
                 add(f"squareness {name} to {other}", size * (rows[:, across] * per_row)[:, None])
-    return found
+    return covariances
 
 
 def _linear(chain: Chain, name: str) -> Joint:
-    known = chain.of_kind("linear")
-    for joint in known:
+    linear = chain.of_kind("linear")
+    for joint in linear:
         if joint.name == name:
             return joint
     raise InputError(
-        f"'{chain.topology}' has no linear axis {name}; it has {', '.join(joint.name for joint in known)}"
+        f"'{chain.topology}' has no linear axis {name}; it has {', '.join(joint.name for joint in linear)}"
     )
 
 
@@ -73,11 +73,11 @@ def _interpolated(position: Array, spacing: tuple[float, float]) -> Array:
     parts = []
     for pitch in np.linspace(*spacing, _SPACINGS):
         lowest = np.floor(position.min() / pitch)
-        place = position / pitch - lowest
-        left = np.floor(place).astype(np.int64)
-        weights = np.zeros((len(position), int(left.max()) + 2))
+        nodes = position / pitch - lowest
+        lower = np.floor(nodes).astype(np.int64)
+        weights = np.zeros((len(position), int(lower.max()) + 2))
         rows = np.arange(len(position))
-        weights[rows, left] = 1.0 - (place - left)
-        weights[rows, left + 1] += place - left
+        weights[rows, lower] = 1.0 - (nodes - lower)
+        weights[rows, lower + 1] += nodes - lower
         parts.append(weights / np.sqrt(_SPACINGS))
     return np.concatenate(parts, axis=1)

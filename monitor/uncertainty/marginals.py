@@ -182,5 +182,5 @@ class Empirical:
 
     def quantile(self, probability: Array) -> Array:
         """Quantiles."""
-        place = probability * (len(self.values) - 1)
-        return np.asarray(np.interp(place, np.arange(len(self.values)), self.values))
+        rank = probability * (len(self.values) - 1)
+        return np.asarray(np.interp(rank, np.arange(len(self.values)), self.values))

@@ -24,9 +24,9 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.uncertainty.covariance import Inputs
+from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.program import LARGEST_ANGLE
 from monitor.uncertainty.roots import covariance_root
-from monitor.uncertainty.run_problem import OneRun
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
 
 #: What a trial may be away from its least-squares point, in standard uncertainties: two and a half
@@ -60,7 +60,7 @@ class RunEstimator:
     Hessian is at most ``worst`` standard uncertainties of any unknown. ``counts`` runs on over all calls.
     """
 
-    run: OneRun
+    run: MeasuredRun
     sensitivity: Sensitivity
     outputs: tuple[str, ...]
     u: Array
@@ -136,24 +136,24 @@ class RunEstimator:
         error: Array,
         moves: int,
     ) -> tuple[Array, npt.NDArray[np.bool_]]:
-        left = np.flatnonzero(~good)
-        if len(left):
-            theta[:, left], solved = self.run.solve(inputs[:, left], self.sensitivity.unknowns)
+        unsolved = np.flatnonzero(~good)
+        if len(unsolved):
+            theta[:, unsolved], solved = self.run.solve(inputs[:, unsolved], self.sensitivity.unknowns)
             good = good.copy()
-            good[left] = solved
+            good[unsolved] = solved
         with self.counts.lock:
             self.counts.trials += len(good)
             self.counts.moves += moves * len(good)
-            self.counts.by_gauss_newton += len(left)
+            self.counts.by_gauss_newton += len(unsolved)
             self.counts.not_converged += int(np.sum(~good))
             self.counts.largest_number = max(self.counts.largest_number, float(np.max(number)))
-            certified = np.delete(error, left)
+            certified = np.delete(error, unsolved)
             self.counts.largest_error = max(self.counts.largest_error, float(np.max(certified, initial=0.0)))
         return theta, good
 
 
 def run_estimator(
-    run: OneRun, inputs: Inputs, outputs: tuple[str, ...] | None = None, *, seed: int = 0
+    run: MeasuredRun, inputs: Inputs, outputs: tuple[str, ...] | None = None, *, seed: int = 0
 ) -> RunEstimator:
     """The Monte Carlo model of one ``run`` whose ``inputs`` are its readings and distances, in that order.
 
@@ -171,7 +171,7 @@ def run_estimator(
     if outputs is None:
         pairs = zip(run.problem.local_names, at.determined, strict=True)
         reported = set(run.problem.base_names)
-        outputs = tuple(name for name, seen in pairs if seen and name in reported)
+        outputs = tuple(name for name, determined in pairs if determined and name in reported)
         if not outputs:
             raise DataError(
                 f"the plan determines none of {', '.join(run.problem.base_names)}: probe more poses"
@@ -199,8 +199,8 @@ def _lipschitz(at: Sensitivity, root: Array, rng: np.random.Generator) -> float:
     for point in range(_POINTS):
         away = at.matrix @ moved[:, point]
         distance = float(np.linalg.norm(at.metric @ away))
-        here = _hessian(at, at.unknowns + away, at.inputs + moved[:, point])
-        change = float(np.linalg.norm(at.half.T @ (here - centre) @ at.half, 2))
+        hessian = _hessian(at, at.unknowns + away, at.inputs + moved[:, point])
+        change = float(np.linalg.norm(at.half.T @ (hessian - centre) @ at.half, 2))
         largest = max(largest, change / distance if distance > 0.0 else 0.0)
     return _MARGIN * largest
 
@@ -208,6 +208,6 @@ def _lipschitz(at: Sensitivity, root: Array, rng: np.random.Generator) -> float:
 def _hessian(at: Sensitivity, theta: Array, x: Array) -> Array:
     count = len(theta)
     moves = np.concatenate([np.diag(at.steps), -np.diag(at.steps)], axis=1)
-    found = at.gradient(theta[:, None] + moves, np.repeat(x[:, None], 2 * count, axis=1))
-    hessian = (found[:, :count] - found[:, count:]) / (2.0 * at.steps)
+    gradients = at.gradient(theta[:, None] + moves, np.repeat(x[:, None], 2 * count, axis=1))
+    hessian = (gradients[:, :count] - gradients[:, count:]) / (2.0 * at.steps)
     return np.asarray(0.5 * (hessian + hessian.T))

@@ -41,12 +41,12 @@ class _Worker:
         """The result of a task, or what it raised. Raises WorkerLostError where the process is gone."""
         try:
             self.connection.send((task, arguments))
-            done, found = self.connection.recv()
+            succeeded, result = self.connection.recv()
         except (EOFError, OSError) as error:
             raise WorkerLostError from error
-        if not done:
-            raise found
-        return found
+        if not succeeded:
+            raise result
+        return result
 
     def end(self) -> None:
         self.process.kill()
@@ -133,13 +133,13 @@ def _deaf_to_ctrl_c() -> Iterator[None]:
     resource_tracker.ensure_running()  # else the start begins it, which unblocks the signal
     # What is blocked here another thread may receive, and Python would raise it here.
     heard: list[int] = []
-    own = threading.current_thread() is threading.main_thread()
-    handler = signal.signal(signal.SIGINT, lambda number, _: heard.append(number)) if own else None
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    handler = signal.signal(signal.SIGINT, lambda number, _: heard.append(number)) if in_main_thread else None
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        if own:
+        if in_main_thread:
             signal.signal(signal.SIGINT, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         if heard:

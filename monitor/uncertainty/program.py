@@ -17,7 +17,7 @@ from monitor.effects import Context, Effect
 from monitor.effects.effect import ChainBasis
 from monitor.machine import LOCATION, MOTION, Joint
 from monitor.records import Array
-from monitor.uncertainty.run_problem import RunProblem
+from monitor.uncertainty.touched_run import TouchedRun
 
 Ints = npt.NDArray[np.int64]
 
@@ -84,7 +84,7 @@ class _Step:
     entries: tuple[tuple[int, int, Array], ...] = ()
 
 
-def compile_program(run: RunProblem) -> Program | None:
+def compile_program(run: TouchedRun) -> Program | None:
     """The program of a run's problem, or None where its model needs the plain way.
 
     That is so for effects of the artefact and for chains with more than three linear axes.
@@ -96,7 +96,7 @@ def compile_program(run: RunProblem) -> Program | None:
     return _assemble(run, steps)
 
 
-def _entries(run: RunProblem) -> dict[tuple[int, int, int], list[tuple[int, int, Array]]] | None:
+def _entries(run: TouchedRun) -> dict[tuple[int, int, int], list[tuple[int, int, Array]]] | None:
     """For every error term its entries: unknown, axis (-1: none) and value at every probing (n,)."""
     problem = run.problem
     context = problem.context
@@ -155,7 +155,7 @@ def _slant(joint: Joint) -> list[tuple[int, float]]:
     return [(main, float(np.arctan2(along[second], -along[third]))), (second, tilt)]
 
 
-def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int, Array]]]) -> list[_Step]:
+def _walk(run: TouchedRun, bases: dict[tuple[int, int, int], list[tuple[int, int, Array]]]) -> list[_Step]:
     chain = run.problem.context.chain
     count = run.probings
     places = {int(a): i for i, a in enumerate(run.linear)}
@@ -170,15 +170,15 @@ def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int
                 steps.append(_Step(kind, component % 3, sign, np.zeros(count), entries=entries))
         return steps
 
-    def motion(place: int, joint: Joint, sign: float) -> list[_Step]:
+    def motion(index: int, joint: Joint, sign: float) -> list[_Step]:
         axis = joint.main
-        move = _Step(SHIFT_READING, axis, sign, np.zeros(count), reading=places.get(place, -1))
+        move = _Step(SHIFT_READING, axis, sign, np.zeros(count), reading=places.get(index, -1))
         if joint.turns:
-            move = _Step(TURN_SET, axis, sign, run.problem.context.positions[:, place])
+            move = _Step(TURN_SET, axis, sign, run.problem.context.positions[:, index])
         # A slanted axis: turned into place, moved, turned back; the inverse of that is the same with the move inverted.
-        there = [_Step(TURN_SET, about, 1.0, np.full(count, angle)) for about, angle in _slant(joint)]
+        slant = [_Step(TURN_SET, about, 1.0, np.full(count, angle)) for about, angle in _slant(joint)]
         back = [_Step(TURN_SET, about, 1.0, np.full(count, -angle)) for about, angle in _slant(joint)[::-1]]
-        return [*there, move, *back]
+        return [*slant, move, *back]
 
     def offset(joint: Joint, sign: float) -> list[_Step]:
         return [
@@ -188,14 +188,14 @@ def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int
         ]
 
     steps: list[_Step] = []
-    for place in range(len(chain.work) - 1, -1, -1):
-        joint = chain.joints[place]
-        steps += small(place, MOTION, -1.0) + motion(place, joint, -1.0)
-        steps += small(place, LOCATION, -1.0) + offset(joint, -1.0)
-    for place in range(len(chain.work), len(chain.joints)):
-        joint = chain.joints[place]
-        steps += offset(joint, 1.0) + small(place, LOCATION, 1.0)
-        steps += motion(place, joint, 1.0) + small(place, MOTION, 1.0)
+    for index in range(len(chain.work) - 1, -1, -1):
+        joint = chain.joints[index]
+        steps += small(index, MOTION, -1.0) + motion(index, joint, -1.0)
+        steps += small(index, LOCATION, -1.0) + offset(joint, -1.0)
+    for index in range(len(chain.work), len(chain.joints)):
+        joint = chain.joints[index]
+        steps += offset(joint, 1.0) + small(index, LOCATION, 1.0)
+        steps += motion(index, joint, 1.0) + small(index, MOTION, 1.0)
     tip = len(run.problem.local_names) - 3
     ones = np.ones(count)
     steps += [
@@ -204,7 +204,7 @@ def _walk(run: RunProblem, bases: dict[tuple[int, int, int], list[tuple[int, int
     return steps
 
 
-def _assemble(run: RunProblem, steps: list[_Step]) -> Program:
+def _assemble(run: TouchedRun, steps: list[_Step]) -> Program:
     count = run.probings
     problem = run.problem
     entries = [entry for step in steps for entry in step.entries]
@@ -278,10 +278,10 @@ def _segments(
         else:
             items.append((-1, k, k + 1))
     moves = np.zeros((len(items), AXES), dtype=np.bool_)
-    for place, (_, begin, end) in enumerate(items):
+    for index, (_, begin, end) in enumerate(items):
         for step in steps[begin:end]:
             acting = {along for _, along, _ in step.entries if along >= 0}
             for axis in acting | ({step.reading} if step.reading >= 0 else set()):
-                moves[place, axis] = True
+                moves[index, axis] = True
     item, begin_of, end_of = (np.array(column, dtype=np.int64) for column in zip(*items, strict=True))
     return item, begin_of, end_of, moves

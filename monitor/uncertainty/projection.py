@@ -25,13 +25,17 @@ def nearest_correlation(matrix: Array, *, tolerance: float = 1e-10, steps: int =
     Higham 2002: alternating projections with Dykstra's correction. A matrix printed with two decimals needs
     this before use. Raises DataError for a matrix that is not symmetric, or when the steps do not suffice.
     """
-    given = np.asarray(matrix, dtype=np.float64)
-    if given.ndim != 2 or given.shape[0] != given.shape[1] or not np.allclose(given, given.T, atol=1e-9):
+    original = np.asarray(matrix, dtype=np.float64)
+    if (
+        original.ndim != 2
+        or original.shape[0] != original.shape[1]
+        or not np.allclose(original, original.T, atol=1e-9)
+    ):
         raise DataError(
-            f"a correlation matrix must be square and symmetric; this one has shape {given.shape}"
+            f"a correlation matrix must be square and symmetric; this one has shape {original.shape}"
         )
-    smallest = float(np.linalg.eigvalsh(given)[0])
-    current, correction = given.copy(), np.zeros_like(given)
+    smallest = float(np.linalg.eigvalsh(original)[0])
+    current, correction = original.copy(), np.zeros_like(original)
     np.fill_diagonal(current, 1.0)
     for _ in range(steps):
         shifted = current - correction
@@ -49,4 +53,4 @@ def nearest_correlation(matrix: Array, *, tolerance: float = 1e-10, steps: int =
     scale = np.sqrt(np.diag(current))
     current = current / np.outer(scale, scale)
     np.fill_diagonal(current, 1.0)
-    return Projection(current, float(np.max(np.abs(current - given))), smallest)
+    return Projection(current, float(np.max(np.abs(current - original))), smallest)

@@ -9,6 +9,7 @@ behind k_p and k_q come from a bounded sample, whose standard error the result s
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -112,10 +113,12 @@ class Trials:
 class Accumulator:
     """All sequences so far: running moments, the summary of each sequence and a bounded sample of outputs.
 
-    The trials are independent and alike, so the first ``keep`` of them are as good a sample as any.
+    The trials are independent and alike, so the first ``keep`` of them are as good a sample as any. ``started`` is the
+    reading of the performance counter when the accumulator was made.
     """
 
     def __init__(self, outputs: int, p: float, keep: int, tolerance: float) -> None:
+        self.started = time.perf_counter()
         self.p = p
         self.tolerance = tolerance
         self.moments = Moments(0, np.zeros(outputs), np.zeros((outputs, outputs)))

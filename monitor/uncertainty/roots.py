@@ -57,9 +57,9 @@ def covariance_root(covariance: Array, tolerance: float = RANK_TOLERANCE) -> Cov
             f"the covariance matrix is not positive semidefinite: its correlation matrix has the eigenvalue "
             f"{values[0]:.3g}; project it first (nearest_correlation)"
         )
-    kept = values > tolerance * largest
-    lengths = np.sqrt(values[kept])
-    basis = vectors[:, kept]
+    significant = values > tolerance * largest
+    lengths = np.sqrt(values[significant])
+    basis = vectors[:, significant]
     return CovarianceRoot(
         root=np.ascontiguousarray(safe[:, None] * basis * lengths),
         whitener=np.ascontiguousarray((basis / lengths).T / safe),

@@ -63,15 +63,17 @@ class JointDistribution:
     @cached_property
     def elliptical(self) -> tuple[Array, Array] | None:
         """Location (n,) and root (n, rank) where the inputs are jointly normal or t, else None."""
-        if self.copula == "gaussian" and all(isinstance(one, Normal) for one in self.marginals):
-            scale = np.array([one.std for one in self.marginals])
+        if self.copula == "gaussian" and all(isinstance(marginal, Normal) for marginal in self.marginals):
+            scale = np.array([marginal.std for marginal in self.marginals])
         elif self.copula == "t" and all(
-            isinstance(one, StudentT) and one.dof == self.copula_dof for one in self.marginals
+            isinstance(marginal, StudentT) and marginal.dof == self.copula_dof for marginal in self.marginals
         ):
-            scale = np.array([one.scale for one in self.marginals if isinstance(one, StudentT)])
+            scale = np.array(
+                [marginal.scale for marginal in self.marginals if isinstance(marginal, StudentT)]
+            )
         else:
             return None
-        return np.array([one.mean for one in self.marginals]), scale[:, None] * self.factor.root
+        return np.array([marginal.mean for marginal in self.marginals]), scale[:, None] * self.factor.root
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """``count`` draws of all inputs, shape (n, count), inputs first."""
@@ -116,10 +118,10 @@ def t_inputs(inputs: Inputs) -> tuple[JointDistribution, ...]:
     Sources must follow one another (not be interleaved) and be uncorrelated; DataError otherwise.
     """
     groups: list[JointDistribution] = []
-    seen: list[int] = []
+    indices: list[int] = []
     for source in inputs.source_names:
         at = inputs.indices(source)
-        seen += [int(i) for i in at]
+        indices += [int(i) for i in at]
         others = np.setdiff1d(np.arange(len(inputs.names)), at)
         if np.any(inputs.covariance[np.ix_(at, others)]):
             raise DataError(
@@ -141,7 +143,7 @@ def t_inputs(inputs: Inputs) -> tuple[JointDistribution, ...]:
                 dof,
             )
         )
-    if seen != sorted(seen):
+    if indices != sorted(indices):
         raise DataError("the inputs of a source must follow one another; order them by source")
     return tuple(groups)
 

@@ -17,9 +17,10 @@ from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import MEMBER_SHARE, RANK_TOLERANCE
 from monitor.records import Array
 from monitor.uncertainty.expansion import expansion_of
+from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.program import compile_program
-from monitor.uncertainty.row_problem import RowProblem
-from monitor.uncertainty.run_problem import OneRun, RunProblem
+from monitor.uncertainty.row_run import RowRun
+from monitor.uncertainty.touched_run import TouchedRun
 
 Gradient = Callable[[Array, Array], Array]
 
@@ -68,7 +69,7 @@ class Sensitivity:
         return np.array([self.names.index(name) for name in names], dtype=np.int64)
 
 
-def sensitivity_of(run: OneRun, inputs: Array | None = None, start: Array | None = None) -> Sensitivity:
+def sensitivity_of(run: MeasuredRun, inputs: Array | None = None, start: Array | None = None) -> Sensitivity:
     """The sensitivity of one run at ``inputs`` (N,), by default the run's own readings.
 
     ``start`` (p,) is where the search for the least-squares point begins. Raises DataError where it fails.
@@ -76,10 +77,10 @@ def sensitivity_of(run: OneRun, inputs: Array | None = None, start: Array | None
     x = run.inputs if inputs is None else np.asarray(inputs, dtype=np.float64)
     if x.shape != (len(run.input_names),):
         raise DataError(f"this run has {len(run.input_names)} inputs, not {x.shape}")
-    found, converged = run.solve(x[:, None], run.problem.start[0] if start is None else start)
+    solved, converged = run.solve(x[:, None], run.problem.start[0] if start is None else start)
     if not converged[0]:
         raise DataError("the identification of this run did not converge")
-    theta = found[:, 0]
+    theta = solved[:, 0]
     space, determined, steps = _space(run, x, theta)
     fast = _fast(run, theta, steps)
     quick = fast is not None and _agree(fast, run.gradient, theta, x, steps)
@@ -107,15 +108,15 @@ def sensitivity_of(run: OneRun, inputs: Array | None = None, start: Array | None
         rank=space.shape[1],
         steps=steps,
         gradient=gradient,
-        compiled=quick and isinstance(run, RunProblem),
+        compiled=quick and isinstance(run, TouchedRun),
     )
 
 
-def _fast(run: OneRun, theta: Array, steps: Array) -> Gradient | None:
+def _fast(run: MeasuredRun, theta: Array, steps: Array) -> Gradient | None:
     """A gradient of many trials, where there is one for such a run: compiled, or expanded to second order."""
-    if isinstance(run, RowProblem):
+    if isinstance(run, RowRun):
         return expansion_of(run, theta, steps).gradient
-    assert isinstance(run, RunProblem)
+    assert isinstance(run, TouchedRun)
     program = compile_program(run)
     if program is None:
         return None
@@ -139,7 +140,7 @@ def _agree(first: Gradient, second: Gradient, theta: Array, x: Array, steps: Arr
     return bool(np.all(np.abs(first(thetas, inputs) - right) <= 1e-7 * size))
 
 
-def _space(run: OneRun, inputs: Array, theta: Array) -> tuple[Array, npt.NDArray[np.bool_], Array]:
+def _space(run: MeasuredRun, inputs: Array, theta: Array) -> tuple[Array, npt.NDArray[np.bool_], Array]:
     """Basis (p, rank) of what the plan determines, which unknowns that is (p,), and steps (p,) of STEP mm."""
     jacobian = run.repeated(inputs[:, None]).linearise(theta[None], run.common).local[0]
     scale = np.linalg.norm(jacobian, axis=0)
@@ -175,5 +176,5 @@ def _differences(gradient: Gradient, theta: Array, x: Array, moves: Array, *, of
         inputs = inputs + both
     else:
         thetas = thetas + both
-    found = gradient(thetas, inputs)
-    return np.asarray(found[:, :count] - found[:, count:])
+    gradients = gradient(thetas, inputs)
+    return np.asarray(gradients[:, :count] - gradients[:, count:])

@@ -1,10 +1,10 @@
-"""Monte Carlo trials and runs on several processes or machines, with the same numbers to the last bit.
+"""Monte Carlo trials on several processes or machines, with the same numbers to the last bit.
 
 ``processes`` starts processes on this machine, ``cluster`` uses a Dask scheduler; either is an ``Engine``. ``spread``
-puts the trials of one Monte Carlo on it, ``monte_carlo_of_runs`` many runs with one task each. Every block of trials
-has a random stream of its own (``BlockSampler``) and results are taken in their order, so the numbers depend neither
-on how many workers there are nor on who dies. Workers use one thread for linear algebra; on machines whose BLAS
-differs the numbers agree to about 3e-15 instead (measured between the kernels of OpenBLAS).
+puts the trials of one Monte Carlo on it. Every block of trials has a random stream of its own (``BlockSampler``) and
+results are taken in their order, so the numbers depend neither on how many workers there are nor on who dies. Workers
+use one thread for linear algebra; on machines whose BLAS differs the numbers agree to about 3e-15 instead (measured
+between the kernels of OpenBLAS).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import itertools
 import pickle
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -24,8 +24,7 @@ from threadpoolctl import threadpool_limits
 
 from monitor.exceptions import InputError
 from monitor.records import Array
-from monitor.uncertainty.adaptive import MonteCarloResult, adaptive_monte_carlo
-from monitor.uncertainty.engine import Engine, in_order, map_in_order
+from monitor.uncertainty.engine import Engine, in_order
 from monitor.uncertainty.propagation import Model
 from monitor.uncertainty.sampling import BlockSampler
 
@@ -91,38 +90,7 @@ def spread(
         model.close()
 
 
-@dataclass(frozen=True)
-class RunTask:
-    """The Monte Carlo of one run, for a worker to do as a whole; the fields are those of ``adaptive_monte_carlo``."""
-
-    recipe: Recipe
-    sampler: BlockSampler
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    p: float = 0.95
-    digits: int = 2
-    tighten: float = 1.0
-
-
-def monte_carlo_of_runs(engine: Engine, tasks: Iterable[RunTask]) -> list[MonteCarloResult]:
-    """The results of many runs, one task a run, in their order: better than ``spread`` where there are many."""
-    return map_in_order(engine, _whole_run, tasks)
-
-
 # In the worker from here on.
-
-
-def _whole_run(task: RunTask) -> MonteCarloResult:
-    threadpool_limits(1, "blas")
-    return adaptive_monte_carlo(
-        task.recipe(),
-        task.sampler,
-        task.names,
-        task.units,
-        p=task.p,
-        digits=task.digits,
-        tighten=task.tighten,
-    )
 
 
 _models: dict[str, tuple[Model, BlockSampler]] = {}

@@ -8,7 +8,7 @@ fifth of these (8.2): where it is not, the verdict is neither yes nor no.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from enum import StrEnum
 
 import numpy as np
 
@@ -17,7 +17,14 @@ from monitor.uncertainty.adaptive import MonteCarloResult
 from monitor.uncertainty.framework import FrameworkResult
 from monitor.uncertainty.tolerance import numerical_tolerance
 
-Verdict = Literal["validated", "not validated", "undecided"]
+
+class Verdict(StrEnum):
+    """Whether Monte Carlo confirms the framework; the value is how documents store it."""
+
+    VALIDATED = "validated"
+    NOT_VALIDATED = "not validated"
+    UNDECIDED = "undecided"
+
 
 #: JCGM 102 8.2: the Monte Carlo tolerance is to be no more than a fifth of that of the comparison.
 STABILITY_FACTOR = 5.0
@@ -48,12 +55,12 @@ class Comparison:
     def verdict(self) -> Verdict:
         """Undecided where the Monte Carlo error could change the answer."""
         if self.stability <= self.tolerance / STABILITY_FACTOR:
-            return "validated" if self.difference <= self.tolerance else "not validated"
+            return Verdict.VALIDATED if self.difference <= self.tolerance else Verdict.NOT_VALIDATED
         if self.difference - self.stability > self.tolerance:
-            return "not validated"
+            return Verdict.NOT_VALIDATED
         if self.difference + self.stability <= self.tolerance:
-            return "validated"
-        return "undecided"
+            return Verdict.VALIDATED
+        return Verdict.UNDECIDED
 
 
 @dataclass(frozen=True)
@@ -67,19 +74,21 @@ class Validation:
     @property
     def verdict(self) -> Verdict:
         """``validated`` only if every quantity is; ``not validated`` as soon as one is not."""
-        verdicts = {one.verdict for one in self.comparisons}
-        if "not validated" in verdicts:
-            return "not validated"
-        return "undecided" if "undecided" in verdicts else "validated"
+        verdicts = {comparison.verdict for comparison in self.comparisons}
+        if Verdict.NOT_VALIDATED in verdicts:
+            return Verdict.NOT_VALIDATED
+        return Verdict.UNDECIDED if Verdict.UNDECIDED in verdicts else Verdict.VALIDATED
 
     @property
     def passed(self) -> bool:
         """Whether the GUM framework may be used for this measurement."""
-        return self.verdict == "validated"
+        return self.verdict is Verdict.VALIDATED
 
     def failed(self) -> tuple[Comparison, ...]:
         """The quantities that are not validated."""
-        return tuple(one for one in self.comparisons if one.verdict != "validated")
+        return tuple(
+            comparison for comparison in self.comparisons if comparison.verdict is not Verdict.VALIDATED
+        )
 
 
 def validate(framework: FrameworkResult, monte_carlo: MonteCarloResult, *, digits: int = 2) -> Validation:

@@ -163,22 +163,22 @@ def grid(
     ``ranges`` are the readings from and to, mm, of every linear axis; without ``turned`` all other axes stand at
     zero. Raises DataError for an axis without a range or fewer than two points.
     """
-    linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
+    linear = [index for index, joint in enumerate(chain.joints) if not joint.turns]
     if not linear:
         raise DataError("a map runs over the strokes of linear axes, and this machine has none")
     if points < 2:
         raise DataError(f"a map needs at least 2 points along every axis, not {points}")
-    lacking = [chain.joints[place].name for place in linear if chain.joints[place].name not in ranges]
+    lacking = [chain.joints[index].name for index in linear if chain.joints[index].name not in ranges]
     if lacking:
         raise DataError(f"the map needs the stroke of axis {', '.join(lacking)}")
     steps = [
-        chain.joints[place].sign * np.linspace(*ranges[chain.joints[place].name], points) for place in linear
+        chain.joints[index].sign * np.linspace(*ranges[chain.joints[index].name], points) for index in linear
     ]
     poses = np.zeros((1, len(chain.joints))) if turned is None else turned
     corners = np.array(list(product(*steps))).reshape(-1, len(linear))
-    found = np.repeat(poses, len(corners), axis=0)
-    found[:, linear] = np.tile(corners, (len(poses), 1))
-    return found
+    positions = np.repeat(poses, len(corners), axis=0)
+    positions[:, linear] = np.tile(corners, (len(poses), 1))
+    return positions
 
 
 def middle(chain: Chain, ranges: Mapping[str, tuple[float, float]]) -> Array:
@@ -186,15 +186,15 @@ def middle(chain: Chain, ranges: Mapping[str, tuple[float, float]]) -> Array:
     return np.asarray(np.mean(grid(chain, ranges, 2), axis=0))
 
 
-def _commanded(known: GeometricErrors, positions: Array, inside: bool) -> Context:
+def _commanded(errors: GeometricErrors, positions: Array, inside: bool) -> Context:
     """The campaign's context with, behind its rows, each point and before it the place that it is reached from.
 
     ``inside`` keeps positions within what the campaign visited, for tables, which end there with a constant.
     """
-    old, chain = known.context, known.chain
+    old, chain = errors.context, errors.chain
     if inside:
         positions = np.clip(positions, old.positions.min(axis=0), old.positions.max(axis=0))
-    own = old.run == known.run
+    of_run = old.run == errors.run
     pairs = np.repeat(positions, 2, axis=0)
     if not inside:
         pairs[::2] -= APPROACH
@@ -207,12 +207,12 @@ def _commanded(known: GeometricErrors, positions: Array, inside: bool) -> Contex
     for name, values in old.columns.items():
         good = np.isfinite(values)
         thermal = name.endswith("_degC")
-        chosen = values[own & good] if thermal and np.any(own & good) else values[good]
-        columns[name] = joined(values, float(np.mean(chosen)) if len(chosen) else float("nan"))
-    for place, joint in enumerate(chain.joints):
+        recorded = values[of_run & good] if thermal and np.any(of_run & good) else values[good]
+        columns[name] = joined(values, float(np.mean(recorded)) if len(recorded) else float("nan"))
+    for index, joint in enumerate(chain.joints):
         name = f"{joint.name.lower()}_{'deg' if joint.turns else 'mm'}"
         if name in columns:
-            readings = joint.sign * pairs[:, place]
+            readings = joint.sign * pairs[:, index]
             columns[name] = np.concatenate(
                 [old.columns[name], np.rad2deg(readings) if joint.turns else readings]
             )
@@ -220,35 +220,35 @@ def _commanded(known: GeometricErrors, positions: Array, inside: bool) -> Contex
         old,
         positions=np.concatenate([old.positions, pairs]),
         expected=None if old.expected is None else np.concatenate([old.expected, pairs]),
-        run=np.concatenate([old.run, np.full(count, known.run)]),
+        run=np.concatenate([old.run, np.full(count, errors.run)]),
         sequence=np.concatenate([old.sequence, np.arange(count) + int(old.sequence.max()) + 1]),
-        time=joined(old.time, float(np.mean(old.time[own]))),
-        day_time=joined(old.day_time, float(np.mean(old.day_time[own]))),
-        run_time=joined(old.run_time, float(np.mean(old.run_time[own]))),
+        time=joined(old.time, float(np.mean(old.time[of_run]))),
+        day_time=joined(old.day_time, float(np.mean(old.day_time[of_run]))),
+        run_time=joined(old.run_time, float(np.mean(old.run_time[of_run]))),
         target=np.concatenate([old.target, np.repeat(old.target[:1], count)]),
         nominal=np.concatenate([old.nominal, np.zeros((count, 3))]),
         columns=columns,
     )
 
 
-def _in_work_frame(known: GeometricErrors, positions: Array, values: Array) -> tuple[Array, Array, Array]:
+def _in_work_frame(geometric: GeometricErrors, positions: Array, values: Array) -> tuple[Array, Array, Array]:
     """Error (n, 3) and its derivatives (n, 3, k) in the workpiece's frame, and the turn (n, 3, 3) to the machine's."""
-    chain, count = known.chain, len(positions)
-    free = _commanded(known, positions, inside=False)
-    held = _commanded(known, positions, inside=True)
+    chain, count = geometric.chain, len(positions)
+    free = _commanded(geometric, positions, inside=False)
+    held = _commanded(geometric, positions, inside=True)
     errors = np.zeros((count, len(chain.joints), 2, 6))
     none, origin = np.zeros_like(errors), np.zeros((count, 3))
     bases = []
-    place = 0
-    for effect in known.effects:
+    first = 0
+    for effect in geometric.effects:
         basis = effect.basis(held if isinstance(effect.shape, Table) else free)
         # The points are the last of every pair behind the campaign's own rows.
         basis = replace(basis, columns=basis.columns[-2 * count + 1 :: 2])
-        basis.apply(values[place : place + basis.size], errors, origin)
+        basis.apply(values[first : first + basis.size], errors, origin)
         bases.append(basis)
-        place += basis.size
-    perfect = evaluate(chain, positions, none, origin, known.tip)
-    real = evaluate(chain, positions, errors, origin, known.tip, jacobian=True)
+        first += basis.size
+    perfect = evaluate(chain, positions, none, origin, geometric.tip)
+    real = evaluate(chain, positions, errors, origin, geometric.tip, jacobian=True)
     assert real.by_error is not None
     slopes = [basis.displacement(real.by_error) for basis in bases]
     return (
@@ -259,32 +259,35 @@ def _in_work_frame(known: GeometricErrors, positions: Array, values: Array) -> t
 
 
 def volumetric_error(
-    known: GeometricErrors, positions: Array, datum: Array | None = None, coefficients: Array | None = None
+    geometric: GeometricErrors,
+    positions: Array,
+    datum: Array | None = None,
+    coefficients: Array | None = None,
 ) -> VolumetricError:
     """The error at commanded ``positions`` (n, J), physical displacements in mm and rad.
 
     ``datum`` (J,) is where the workpiece's zero is set; ``coefficients`` (k,) take the place of the estimate, for
     Monte Carlo. Raises DataError for positions of another chain.
     """
-    joints = len(known.chain.joints)
+    joints = len(geometric.chain.joints)
     positions = np.asarray(positions, dtype=np.float64)
     if positions.ndim != 2 or positions.shape[1] != joints or not np.all(np.isfinite(positions)):
         raise DataError(
             f"positions must be finite numbers of shape (points, {joints}), one column each for "
-            f"{', '.join(joint.name for joint in known.chain.joints)}; their shape is {positions.shape}"
+            f"{', '.join(joint.name for joint in geometric.chain.joints)}; their shape is {positions.shape}"
         )
-    values = known.estimate if coefficients is None else np.asarray(coefficients, dtype=np.float64)
+    values = geometric.estimate if coefficients is None else np.asarray(coefficients, dtype=np.float64)
     asked = positions if datum is None else np.concatenate([positions, np.asarray(datum)[None]])
-    vectors, slopes, turns = _in_work_frame(known, asked, values)
+    vectors, slopes, turns = _in_work_frame(geometric, asked, values)
     if datum is not None:
         vectors, slopes, turns = vectors[:-1] - vectors[-1], slopes[:-1] - slopes[-1], turns[:-1]
     return VolumetricError(
         positions=positions,
         vectors=np.einsum("nij,nj->ni", turns, vectors),
         sensitivity=turns @ slopes,
-        names=known.names,
+        names=geometric.names,
         coefficients=values,
-        parameter_covariance=known.covariance,
-        degrees_of_freedom=known.degrees_of_freedom,
+        parameter_covariance=geometric.covariance,
+        degrees_of_freedom=geometric.degrees_of_freedom,
         datum=None if datum is None else np.asarray(datum, dtype=np.float64),
     )

@@ -17,15 +17,16 @@ from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
 from monitor.uncertainty import (
     BlockSampler,
+    MonteCarloOptions,
     block_generator,
     joined,
+    measured_run,
     monte_carlo,
     normal_inputs,
     overall,
     pooled_by_day,
     repeated_readings,
     run_estimator,
-    run_problem,
     sensitivity_of,
     uncorrelated,
 )
@@ -47,7 +48,7 @@ def problem():
 
 
 def set_up(problem, covariance):
-    run = run_problem(problem, 1)
+    run = measured_run(problem, 1)
     if covariance == "full rank":
         probing = full_rank(run)
     else:
@@ -119,7 +120,7 @@ def test_beside_solving_trial_by_trial_with_a_fresh_jacobian(benchmark, problem)
 
 
 def test_sensitivity_beside_one_identification(benchmark, problem):
-    run = run_problem(problem, 1)
+    run = measured_run(problem, 1)
     start = run.problem.start[0]
     times = []
     for _ in range(ROUNDS):
@@ -141,7 +142,9 @@ def test_peak_memory_does_not_grow_with_the_trials(benchmark, problem):
 
     def run(trials):
         tracemalloc.start()
-        monte_carlo(estimator, sampler, estimator.outputs, ("",) * 34, trials, workers=WORKERS)
+        monte_carlo(
+            estimator, sampler, estimator.outputs, ("",) * 34, trials, MonteCarloOptions(workers=WORKERS)
+        )
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
 

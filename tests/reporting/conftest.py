@@ -10,10 +10,18 @@ import numpy as np
 import pytest
 
 from monitor.records import Artefact, Ball, Campaign, Machine, Probe, Probings, Run, ScaleBar
-from monitor.reporting.certificate.assembly import certificate_record
+from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.laboratory import LaboratoryFile
 from monitor.reporting.certificate.record import CertificateRecord, NotApplicable, Party, Person
-from monitor.reporting.certificate.results import RefusedParameters, ResidualSummary, ResultSet, result_set
+from monitor.reporting.certificate.results import (
+    CoverageFactors,
+    JointEstimate,
+    RefusedParameters,
+    ResidualSummary,
+    ResultSet,
+    ResultStatements,
+    result_set,
+)
 from monitor.reporting.certificate.volumetric_result import Length, VolumetricResult
 from monitor.reporting.texts import texts_of
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
@@ -59,19 +67,15 @@ def make_result() -> Callable[..., ResultSet]:
                 estimate[place] = np.nan
                 covariance[place, :] = covariance[:, place] = np.nan
         return result_set(
-            names,
-            units,
-            estimate,
-            covariance,
-            state=texts_of(language)("record.as_found"),
-            p=0.95,
-            k_p=4.73,
-            k_q=2.95,
-            rank=m - len(without),
-            evaluation="GUM uncertainty framework (JCGM 102:2011, clause 6)",
-            refused=refused,
-            residuals=ResidualSummary("target", ("1", "2", "S1"), (1.12, 0.93, 2.41), 1.0),
-            texts=texts_of(language),
+            JointEstimate(names, units, estimate, covariance),
+            CoverageFactors(p=0.95, k_p=4.73, k_q=2.95, rank=m - len(without)),
+            ResultStatements(
+                state=texts_of(language)("record.as_found"),
+                evaluation="GUM uncertainty framework (JCGM 102:2011, clause 6)",
+                refused=refused,
+                residuals=ResidualSummary("target", ("1", "2", "S1"), (1.12, 0.93, 2.41), 1.0),
+            ),
+            texts_of(language),
         )
 
     return make
@@ -174,10 +178,8 @@ def make_record(
             campaign,
             1,
             [make_result(m, refused, language)],
-            number="K-2026-0042",
-            issued_on=date(2026, 3, 3),
-            model="samba, version 1",
-            volumetric=[_map(language)] * maps,
+            CertificateIdentity("K-2026-0042", date(2026, 3, 3), "samba, version 1"),
+            [_map(language)] * maps,
         )
 
     return make

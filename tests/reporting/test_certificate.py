@@ -11,7 +11,7 @@ import pytest
 
 from monitor.exceptions import DataError, NotFoundError
 from monitor.records import Campaign
-from monitor.reporting.certificate.assembly import certificate_record
+from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.completeness import (
     IncompleteCertificateError,
     check_complete,
@@ -24,7 +24,14 @@ from monitor.reporting.certificate.record import (
     NotApplicable,
     Replaced,
 )
-from monitor.reporting.certificate.results import RefusedParameters, ResultSet, result_set
+from monitor.reporting.certificate.results import (
+    CoverageFactors,
+    JointEstimate,
+    RefusedParameters,
+    ResultSet,
+    ResultStatements,
+    result_set,
+)
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.units import MICROMETRE, MICRORADIAN
 
@@ -131,9 +138,7 @@ def test_assembly_takes_each_item_from_its_one_origin(
         campaign,
         1,
         [make_result()],
-        number="N",
-        issued_on=date(2026, 3, 3),
-        model="samba, version 1",
+        CertificateIdentity("N", date(2026, 3, 3), "samba, version 1"),
     )
     assert record.item is not None
     assert record.conditions is not None
@@ -155,7 +160,7 @@ def test_assembly_invents_nothing_that_neither_file_nor_campaign_knows(
     laboratory: LaboratoryFile, campaign: Campaign, make_result: Callable[..., ResultSet]
 ) -> None:
     silent = LaboratoryFile(**dict.fromkeys(laboratory.__dataclass_fields__))
-    record = certificate_record(silent, campaign, 1, [make_result()], number=None, issued_on=None, model=None)
+    record = certificate_record(silent, campaign, 1, [make_result()], CertificateIdentity(None, None, None))
     missing = {(one.clause, one.part) for one in missing_items(record)}
     assert missing == {
         *((f"7.8.2.1 {letter}", "") for letter in "abcdehjklnop"),
@@ -173,24 +178,20 @@ def test_assembly_of_an_unknown_run_says_which_there_are(
     laboratory: LaboratoryFile, campaign: Campaign
 ) -> None:
     with pytest.raises(NotFoundError, match="campaign five-days has no run 7; it has 1"):
-        certificate_record(laboratory, campaign, 7, [], number=None, issued_on=None, model=None)
+        certificate_record(laboratory, campaign, 7, [], CertificateIdentity(None, None, None))
 
 
 def test_result_set_converts_to_display_units_and_leaves_refused_parameters_out() -> None:
     refusal = RefusedParameters(("EX0C1",), "the spindle stood still")
     result = result_set(
-        ["EA0B", "EX0C1", "EX0C"],
-        [MICRORADIAN, MICROMETRE, MICROMETRE],
-        [4e-6, np.nan, 2e-3],
-        [[4e-12, np.nan, 1e-9], [np.nan] * 3, [1e-9, np.nan, 1e-6]],
-        state="as found",
-        p=0.95,
-        k_p=2.45,
-        k_q=2.24,
-        rank=2,
-        evaluation="GUM",
-        refused=[refusal],
-        tolerances={"EX0C": 20.0},
+        JointEstimate(
+            ["EA0B", "EX0C1", "EX0C"],
+            [MICRORADIAN, MICROMETRE, MICROMETRE],
+            [4e-6, np.nan, 2e-3],
+            [[4e-12, np.nan, 1e-9], [np.nan] * 3, [1e-9, np.nan, 1e-6]],
+        ),
+        CoverageFactors(p=0.95, k_p=2.45, k_q=2.24, rank=2),
+        ResultStatements(state="as found", evaluation="GUM", refused=[refusal], tolerances={"EX0C": 20.0}),
     )
     assert result.names == ("EA0B", "EX0C")
     np.testing.assert_allclose(result.estimate, [4.0, 2.0])
@@ -204,16 +205,9 @@ def test_result_set_converts_to_display_units_and_leaves_refused_parameters_out(
 def test_result_set_that_cannot_be_certified_is_refused() -> None:
     def make(estimate: float = 1.0, variance: float = 1.0, k_p: float = 2.0, p: float = 0.95) -> ResultSet:
         return result_set(
-            ["EX0C"],
-            [MICROMETRE],
-            [estimate],
-            [[variance]],
-            state="as found",
-            p=p,
-            k_p=k_p,
-            k_q=2.0,
-            rank=1,
-            evaluation="GUM",
+            JointEstimate(["EX0C"], [MICROMETRE], [estimate], [[variance]]),
+            CoverageFactors(p=p, k_p=k_p, k_q=2.0, rank=1),
+            ResultStatements(state="as found", evaluation="GUM"),
         )
 
     with pytest.raises(DataError, match="parameter EX0C has no finite number; name it among the refused"):
@@ -226,5 +220,7 @@ def test_result_set_that_cannot_be_certified_is_refused() -> None:
         make(p=95.0)
     with pytest.raises(DataError, match=r"1 parameters need as many units and estimates"):
         result_set(
-            ["EX0C"], [], [1.0], [[1.0]], state="as found", p=0.95, k_p=2.0, k_q=2.0, rank=1, evaluation="GUM"
+            JointEstimate(["EX0C"], [], [1.0], [[1.0]]),
+            CoverageFactors(p=0.95, k_p=2.0, k_q=2.0, rank=1),
+            ResultStatements(state="as found", evaluation="GUM"),
         )

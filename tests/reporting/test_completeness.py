@@ -12,7 +12,7 @@ import pytest
 
 from monitor.exceptions import InputError
 from monitor.records import Campaign
-from monitor.reporting.certificate.assembly import certificate_record
+from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.completeness import check_complete, date_faults, missing_items
 from monitor.reporting.certificate.laboratory import read_laboratory
 from monitor.reporting.certificate.record import ITEMS, CertificateRecord, NotApplicable, Replaced
@@ -88,9 +88,7 @@ def lacking(
             campaign,
             1,
             [make_result(2)],
-            number="N",
-            issued_on=date(2026, 3, 3),
-            model="samba",
+            CertificateIdentity("N", date(2026, 3, 3), "samba"),
         )
         return {(one.clause, one.part) for one in missing_items(record)}
 
@@ -181,7 +179,7 @@ def test_17025_7_8_4_1_d_two_states_have_their_conditions_apart(
         for one in ("as_found", "as_left")
     ]
     record = certificate_record(
-        read_laboratory(place), both, [1, 2], results, number="N", issued_on=date(2026, 3, 9), model="samba"
+        read_laboratory(place), both, [1, 2], results, CertificateIdentity("N", date(2026, 3, 9), "samba")
     )
     assert record.performed_on == (date(2026, 3, 2), date(2026, 3, 4))
     assert record.conditions is not None

@@ -26,6 +26,7 @@ from monitor.reporting.certificate.record import (
     ConformityStatement,
     ConformityVerdict,
     Replaced,
+    Verdict,
 )
 from monitor.reporting.certificate.results import RefusedParameters
 from monitor.reporting.pdf.render import certificate_pdf
@@ -50,8 +51,7 @@ def record(make_record: Make) -> CertificateRecord:
     """A record with everything that a digital certificate can hold."""
     made = make_record(13, (RefusedParameters(("EX0C1", "EY0C1"), "C1 stands at one angle"),))
     verdicts = tuple(
-        ConformityVerdict(f"EA0{place}", "µrad", 40.0, verdict, 0.5)
-        for place, verdict in enumerate(("pass", "fail", "conditional pass", "conditional fail", "undecided"))
+        ConformityVerdict(f"EA0{place}", "µrad", 40.0, verdict, 0.5) for place, verdict in enumerate(Verdict)
     )
     return dataclasses.replace(
         made,

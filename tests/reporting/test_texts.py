@@ -91,18 +91,6 @@ def test_what_a_page_marks_stays_and_what_a_user_writes_is_escaped() -> None:
     ("english", "german"),
     [
         (
-            "repeated runs, pooled by day, 15 degrees of freedom",
-            "Wiederholungsläufe, tageweise zusammengefasst, 15 Freiheitsgrade",
-        ),
-        (
-            "selection warm: all 12 runs, 11 degrees of freedom",
-            "Auswahl warm: alle 12 Läufe, 11 Freiheitsgrade",
-        ),
-        (
-            "the repeatability of 1.8 µm, which exceeds the probe's statement; too few runs for more",
-            "Wiederholbarkeit von 1,8 µm, die die Angabe für den Messtaster überschreitet; zu wenige Läufe für mehr",
-        ),
-        (
             "with this plan EX0C1 cannot be told apart from tip x: C1 stands at one angle throughout; probe also with "
             "C1 at 90, 180 and 270 degrees",
             "mit diesem Messplan nicht zu trennen: EX0C1 von Tasterspitze x: C1 steht durchweg bei einem Winkel; auch "
@@ -122,12 +110,6 @@ def test_what_a_page_marks_stays_and_what_a_user_writes_is_escaped() -> None:
             "with this plan EX0J1 cannot be told apart from tip z: J1, J2 stood still throughout; move them too",
             "mit diesem Messplan nicht zu trennen: EX0J1 von Tasterspitze z: J1, J2 standen durchweg still; auch diese "
             "Achsen bewegen",
-        ),
-        (
-            "all 9 runs, 8 degrees of freedom; errors of the linear axes and the stylus tip are no part of u: the "
-            "method takes them as known",
-            "alle 9 Läufe, 8 Freiheitsgrade; nicht in u enthalten sind Abweichungen von Linearachsen und Tasterspitze: "
-            "das Verfahren nimmt sie als bekannt an",
         ),
         ("a sentence that nobody translated", "a sentence that nobody translated"),
     ],

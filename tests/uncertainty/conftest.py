@@ -12,7 +12,7 @@ from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.touch import Distance, TouchProblem
 from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
-from monitor.uncertainty import run_problem
+from monitor.uncertainty import measured_run
 
 REFERENCES = Path(__file__).parents[1] / "references"
 
@@ -91,7 +91,7 @@ def make_run():
             distances=(Distance(("b0", "b3"), np.array([length]), 1.2e-3),),
             tip=tuple(tip),
         )
-        return run_problem(problem, 1, held[:place])
+        return measured_run(problem, 1, held[:place])
 
     return make
 

@@ -10,6 +10,7 @@ from monitor.exceptions import DataError, RefusedResultError
 from monitor.uncertainty import (
     BlockSampler,
     Inputs,
+    MonteCarloOptions,
     Normal,
     adaptive_monte_carlo,
     ellipsoid_factor,
@@ -44,14 +45,14 @@ def test_jcgm102_7_8_3_length_of_a_sequence(gum):
 
 
 def test_jcgm102_7_8_3_starts_with_ten_sequences_and_stops_when_stable(gum):
-    result = adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, digits=1)
+    result = adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, MonteCarloOptions(digits=1))
     assert result.trials == gum("jcgm102_adaptive_procedure")["p095_values"]["initial_total"]
     assert result.sequences == 10
     assert result.stable
 
 
 def test_jcgm102_7_8_3_goes_on_until_twice_every_standard_error_is_below_its_tolerance():
-    result = adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, digits=3)
+    result = adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, MonteCarloOptions(digits=3))
     assert result.sequences > 10
     allowed = [numerical_tolerance(u, 3) for u in result.u]
     assert np.all(2 * result.standard_errors.estimate <= allowed)
@@ -75,7 +76,9 @@ def test_standard_errors_are_those_of_the_sequences_one_by_one():
 
 
 def test_tolerances_that_cannot_be_reached_end_at_max_trials_and_say_so():
-    result = adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, digits=5, max_trials=150_000)
+    result = adaptive_monte_carlo(
+        linear, sampler(), NAMES, UNITS, MonteCarloOptions(digits=5, max_trials=150_000)
+    )
     assert result.trials == 150_000
     assert not result.stable
 
@@ -83,7 +86,9 @@ def test_tolerances_that_cannot_be_reached_end_at_max_trials_and_say_so():
 def test_closed_form_linear_case():
     inputs = Inputs(tuple("abcd"), ("mm",) * 4, np.zeros(4), np.eye(4), tuple("abcd"))
     framework = gum_framework(inputs, MIX, np.zeros(3), NAMES, UNITS)
-    result = adaptive_monte_carlo(linear, sampler(2), NAMES, UNITS, tighten=5.0, keep=1_000_000)
+    result = adaptive_monte_carlo(
+        linear, sampler(2), NAMES, UNITS, MonteCarloOptions(tighten=5.0, keep=1_000_000)
+    )
     assert result.u == pytest.approx(np.sqrt(np.diag(MIX @ MIX.T)), rel=3e-3)
     assert result.k_p == pytest.approx(ellipsoid_factor(3), abs=4 * result.k_p_error)
     validation = validate(framework, result)
@@ -95,7 +100,9 @@ def test_standard_errors_are_honest_over_many_seeds():
     truth = np.concatenate([np.zeros(3), np.sqrt(np.diag(MIX @ MIX.T))])
     pulls = []
     for seed in range(60):
-        result = monte_carlo(linear, sampler(seed, 10_000), NAMES, UNITS, 100_000, keep=1000)
+        result = monte_carlo(
+            linear, sampler(seed, 10_000), NAMES, UNITS, 100_000, MonteCarloOptions(keep=1000)
+        )
         found = np.concatenate([result.estimate, result.u])
         errors = np.concatenate([result.standard_errors.estimate, result.standard_errors.u])
         pulls.append((found - truth) / errors)
@@ -105,15 +112,15 @@ def test_standard_errors_are_honest_over_many_seeds():
 
 
 def test_numbers_do_not_depend_on_the_number_of_workers():
-    one = monte_carlo(linear, sampler(), NAMES, UNITS, 50_000, workers=1)
-    three = monte_carlo(linear, sampler(), NAMES, UNITS, 50_000, workers=3)
+    one = monte_carlo(linear, sampler(), NAMES, UNITS, 50_000, MonteCarloOptions(workers=1))
+    three = monte_carlo(linear, sampler(), NAMES, UNITS, 50_000, MonteCarloOptions(workers=3))
     assert np.array_equal(one.covariance, three.covariance)
     assert np.array_equal(one.sample, three.sample)
     assert (one.k_p, one.k_q) == (three.k_p, three.k_q)
 
 
 def test_sample_is_bounded_and_moments_are_not():
-    result = monte_carlo(linear, sampler(), NAMES, UNITS, 60_000, keep=7000)
+    result = monte_carlo(linear, sampler(), NAMES, UNITS, 60_000, MonteCarloOptions(keep=7000))
     assert result.sample.shape == (7000, 3)
     every = np.concatenate([linear(sampler().draw(i))[0] for i in range(60)])
     assert result.u == pytest.approx(every.std(axis=0, ddof=1), rel=1e-12)
@@ -181,9 +188,9 @@ def test_model_of_the_wrong_shape_is_named():
     with pytest.raises(DataError, match=r"must return outputs \(1000, 2\).*but returned \(1000, 3\)"):
         monte_carlo(linear, sampler(), NAMES[:2], UNITS[:2], 10_000)
     with pytest.raises(DataError, match=r"keep at least 1000, but are 2, 10, 1.0 and 10"):
-        adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, keep=10)
+        adaptive_monte_carlo(linear, sampler(), NAMES, UNITS, MonteCarloOptions(keep=10))
     with pytest.raises(DataError, match=r"workers must be at least 1, but is 0"):
-        monte_carlo(linear, sampler(), NAMES, UNITS, 10_000, workers=0)
+        monte_carlo(linear, sampler(), NAMES, UNITS, 10_000, MonteCarloOptions(workers=0))
 
 
 def test_validation_needs_the_same_outputs():

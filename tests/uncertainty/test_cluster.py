@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from monitor.exceptions import InputError, RefusedResultError
 from monitor.uncertainty import (
     BlockSampler,
+    MonteCarloOptions,
     adaptive_monte_carlo,
     monte_carlo,
     normal_inputs,
@@ -23,10 +24,11 @@ from monitor.uncertainty import (
 from monitor.uncertainty.cluster import cluster
 from monitor.uncertainty.engine import MOST_DEATHS, WorkerLostError, in_order, map_in_order
 from monitor.uncertainty.processes import processes
-from monitor.uncertainty.spread import NumberedBlocks, RunTask, monte_carlo_of_runs, spread
+from monitor.uncertainty.spread import NumberedBlocks, spread
 
 TRIALS = 80_000
 NAMES = ("EC0Y", "EXX", "EYY", "EZZ")
+UNITS = ("µrad", "µm/m", "µm/m", "µm/m")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +45,7 @@ def evaluation(make_run):
 
 
 def _evaluate(model, sampler):
-    return monte_carlo(model, sampler, NAMES, ("µrad", "µm/m", "µm/m", "µm/m"), TRIALS)
+    return monte_carlo(model, sampler, NAMES, UNITS, TRIALS)
 
 
 def _same(one, other):
@@ -56,19 +58,20 @@ def _same(one, other):
     )
 
 
-def _two_runs(recipe, sampler):
-    """Two runs that differ in their seed."""
-    units = ("µrad", "µm/m", "µm/m", "µm/m")
-    return [RunTask(recipe, replace(sampler, seed=seed), NAMES, units, digits=1) for seed in (7, 8)]
-
-
-def _in_this_process(recipe, sampler):
+def _whole_run(recipe, sampler):
+    """The Monte Carlo of one run, for a worker to do as a whole."""
     with threadpool_limits(1, "blas"):
         model = recipe()
-    return [
-        adaptive_monte_carlo(model, task.sampler, task.names, task.units, digits=task.digits)
-        for task in _two_runs(recipe, sampler)
-    ]
+        return adaptive_monte_carlo(model, sampler, NAMES, UNITS, MonteCarloOptions(digits=1))
+
+
+def _two_runs(recipe, sampler):
+    """Two runs that differ in their seed, as tasks of a worker."""
+    return [partial(_whole_run, recipe, replace(sampler, seed=seed)) for seed in (7, 8)]
+
+
+def _called(task):
+    return task()
 
 
 def _killing(model, victim, at):
@@ -110,10 +113,12 @@ def test_jcgm102_7_2_same_bits_on_a_dask_cluster_of_which_one_worker_is_killed_i
         with spread(engine, recipe, sampler) as (model, blocks):
             called, killed = _killing(model, lambda: next(iter(pids.values())), at=25)
             found = _evaluate(called, blocks)
-        runs = monte_carlo_of_runs(engine, _two_runs(recipe, sampler))
+        runs = map_in_order(engine, _called, _two_runs(recipe, sampler))
     assert len(killed) == 1
     assert _same(found, alone)
-    assert all(_same(one, other) for one, other in zip(runs, _in_this_process(recipe, sampler), strict=True))
+    assert all(
+        _same(one, other) for one, other in zip(runs, map(_called, _two_runs(recipe, sampler)), strict=True)
+    )
 
 
 def test_runs_on_processes_come_back_in_their_order():

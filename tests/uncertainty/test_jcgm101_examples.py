@@ -8,6 +8,7 @@ from monitor.uncertainty import (
     BlockSampler,
     Empirical,
     JointDistribution,
+    MonteCarloOptions,
     Normal,
     Rectangular,
     StudentT,
@@ -28,7 +29,7 @@ def run(marginals, function, trials=500_000, correlation=None, seed=7, p=0.95):
         return function(block)[:, None], np.ones(len(block), dtype=bool)
 
     sampler = BlockSampler((joint,), seed, 10_000)
-    return monte_carlo(model, sampler, ("Y",), ("1",), trials, p=p, keep=trials)
+    return monte_carlo(model, sampler, ("Y",), ("1",), trials, MonteCarloOptions(p=p, keep=trials))
 
 
 def total(block):

@@ -9,6 +9,7 @@ from monitor.uncertainty import (
     BlockSampler,
     Inputs,
     JointDistribution,
+    MonteCarloOptions,
     Normal,
     Rectangular,
     adaptive_monte_carlo,
@@ -31,7 +32,7 @@ def additive(block):
 def additive_run(marginals, seed=3, trials=400_000):
     joint = independent(("X1", "X2", "X3"), ("1",) * 3, marginals)
     sampler = BlockSampler((joint,), seed, 10_000)
-    return monte_carlo(additive, sampler, ("Y1", "Y2"), ("1", "1"), trials, keep=trials)
+    return monte_carlo(additive, sampler, ("Y1", "Y2"), ("1", "1"), trials, MonteCarloOptions(keep=trials))
 
 
 @pytest.mark.parametrize(
@@ -65,8 +66,7 @@ def test_jcgm102_9_2_framework_is_validated_for_normal_inputs_but_for_k_q():
         BlockSampler(normal_inputs(inputs), 8, 10_000),
         ("Y1", "Y2"),
         ("1", "1"),
-        tighten=5.0,
-        keep=2_000_000,
+        MonteCarloOptions(tighten=5.0, keep=2_000_000),
     )
     assert result.stable
     validation = validate(framework, result)
@@ -146,7 +146,7 @@ def test_jcgm102_9_4_resistance_and_reactance_have_rank_2(references):
         ("R", "X", "Z"),
         ("ohm",) * 3,
         200_000,
-        rank_tolerance=1e-5,
+        MonteCarloOptions(rank_tolerance=1e-5),
     )
     assert result.rank == 2
     assert result.k_p == pytest.approx(math.sqrt(-2 * math.log(0.05)), abs=4 * result.k_p_error)

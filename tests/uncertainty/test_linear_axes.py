@@ -14,7 +14,7 @@ from by_path import load
 from monitor.exceptions import InputError
 from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 from monitor.records import LinearAxes, LinearAxisErrors
-from monitor.uncertainty import run_problem, sensitivity_of
+from monitor.uncertainty import measured_run, sensitivity_of
 from monitor.uncertainty.linear_axes import row_covariances
 
 TESTS = Path(__file__).resolve().parents[1]
@@ -37,7 +37,7 @@ def problem(tools):
 
 def spread(problem, axes: LinearAxes) -> dict[str, np.ndarray]:
     """Standard uncertainties of the eight errors by source."""
-    one = run_problem(problem, 1)
+    one = measured_run(problem, 1)
     at = sensitivity_of(one)
     rows = at.rows(problem.base_names)
     return {

@@ -8,16 +8,17 @@ import pytest
 from monitor.exceptions import DataError
 from monitor.uncertainty import (
     BlockSampler,
+    MonteCarloOptions,
     adaptive_monte_carlo,
     gum_framework,
     joined,
+    measured_run,
     monte_carlo,
     normal_inputs,
     overall,
     pooled_by_day,
     repeated_readings,
     run_estimator,
-    run_problem,
     uncorrelated,
     validate,
 )
@@ -36,7 +37,7 @@ def inputs_of(run, spread=1e-3, correlated=0.5, seed=3):
 
 @pytest.fixture(scope="module")
 def samba(campaign):
-    run = run_problem(campaign("five-days"), 1)
+    run = measured_run(campaign("five-days"), 1)
     inputs = inputs_of(run)
     return run, inputs, run_estimator(run, inputs)
 
@@ -107,8 +108,8 @@ def test_numbers_are_the_same_for_any_number_of_workers(samba):
     _, inputs, estimator = samba
     sampler = BlockSampler(normal_inputs(inputs), 9, 500)
     units = ("",) * len(estimator.outputs)
-    one = monte_carlo(estimator, sampler, estimator.outputs, units, 20_000, workers=1)
-    two = monte_carlo(estimator, sampler, estimator.outputs, units, 20_000, workers=2)
+    one = monte_carlo(estimator, sampler, estimator.outputs, units, 20_000, MonteCarloOptions(workers=1))
+    two = monte_carlo(estimator, sampler, estimator.outputs, units, 20_000, MonteCarloOptions(workers=2))
     assert np.array_equal(one.covariance, two.covariance)
     assert np.array_equal(one.estimate, two.estimate)
     assert (one.k_p, one.k_q) == (two.k_p, two.k_q)
@@ -116,7 +117,7 @@ def test_numbers_are_the_same_for_any_number_of_workers(samba):
 
 def test_los_2017_chapter_7_framework_is_validated_by_monte_carlo(campaign):
     problem = campaign("five-days")
-    run = run_problem(problem, 1)
+    run = measured_run(problem, 1)
     days = np.repeat(np.arange(5), 4)
     readings = repeated_readings(problem)
     probing = pooled_by_day(readings, days, run.input_names[:-1], ("mm",) * 186, source="probing")
@@ -137,7 +138,7 @@ def test_los_2017_chapter_7_framework_is_validated_by_monte_carlo(campaign):
     assert framework.rank == 13
     sampler = BlockSampler(normal_inputs(inputs), 10, 1000)
     result = adaptive_monte_carlo(
-        estimator, sampler, estimator.outputs, units, digits=1, tighten=5.0, workers=2
+        estimator, sampler, estimator.outputs, units, MonteCarloOptions(digits=1, tighten=5.0, workers=2)
     )
     assert result.stable
     assert result.not_converged == 0

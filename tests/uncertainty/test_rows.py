@@ -15,11 +15,11 @@ from by_path import load
 from monitor.exceptions import DataError
 from monitor.methods.rotary_probing.method import METHOD as rotary_probing
 from monitor.uncertainty import (
-    RowProblem,
+    RowRun,
     gum_framework,
+    measured_run,
     repeated_readings,
     run_estimator,
-    run_problem,
     sensitivity_of,
     uncorrelated,
 )
@@ -43,13 +43,13 @@ def problem(simulator):
 
 
 @pytest.fixture(scope="module")
-def one(problem) -> RowProblem:
-    found = run_problem(problem, 2)
-    assert isinstance(found, RowProblem)
+def one(problem) -> RowRun:
+    found = measured_run(problem, 2)
+    assert isinstance(found, RowRun)
     return found
 
 
-def inputs_of(one: RowProblem):
+def inputs_of(one: RowRun):
     u = np.concatenate([one.stated, one.calibrated[2]])
     return uncorrelated(one.input_names, ("mm",) * len(u), one.inputs, u, source="readings")
 
@@ -130,7 +130,7 @@ def test_another_plan_is_refused(problem):
 def test_a_row_without_weight_counts_for_nothing(problem):
     sigma = problem.sigma.copy()
     sigma[3] = np.inf
-    one = run_problem(replace(problem, sigma=sigma), 1)
+    one = measured_run(replace(problem, sigma=sigma), 1)
     at = sensitivity_of(one)
     assert np.all(at.matrix[:, 3] == 0.0)
     assert one.stated[3] == 0.0
@@ -138,4 +138,4 @@ def test_a_row_without_weight_counts_for_nothing(problem):
 
 def test_an_unknown_run_is_refused(problem):
     with pytest.raises(DataError, match="no run 9; there are runs 1, 2, 3"):
-        run_problem(problem, 9)
+        measured_run(problem, 9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.uncertainty import run_problem, sensitivity_of
+from monitor.uncertainty import measured_run, sensitivity_of
 
 
 def differences_of_the_solve(run, at, columns, step):
@@ -22,7 +22,7 @@ def differences_of_the_solve(run, at, columns, step):
 
 @pytest.mark.parametrize("name", ["five-days", "cold-cold"])
 def test_samba_sensitivity_equals_differences_of_the_whole_solve(campaign, name):
-    run = run_problem(campaign(name), 1)
+    run = measured_run(campaign(name), 1)
     at = sensitivity_of(run)
     columns = np.array([0, 7, 50, len(at.inputs) // 2, len(at.inputs) - 2, len(at.inputs) - 1])
     numeric = differences_of_the_solve(run, at, columns, 2e-3)
@@ -49,7 +49,7 @@ def test_residual_curvature_is_in_it(make_run):
 
 
 def test_gradient_vanishes_at_the_least_squares_point(campaign):
-    at = sensitivity_of(run_problem(campaign("five-days"), 3))
+    at = sensitivity_of(measured_run(campaign("five-days"), 3))
     left = at.inverse @ at.gradient(at.unknowns[:, None], at.inputs[:, None])[:, 0]
     assert np.max(np.abs(left) / np.sqrt(np.diag(at.inverse))) < 1e-9
 
@@ -60,7 +60,7 @@ def test_standard_uncertainties_of_five_days_are_those_of_the_conventions(campai
         "EA0B": 1.9, "EC0B": 1.7, "EA0C": 2.0, "EB0C": 1.7, "EB0Z": 2.3, "EA0Y": 2.7, "EC0Y": 2.2,
         "EX0C": 0.28, "EX0C1": 0.33, "EY0C1": 0.36, "EXX": 6.2, "EYY": 5.7, "EZZ": 6.3,
     }  # fmt: skip
-    at = sensitivity_of(run_problem(campaign("five-days"), 1))
+    at = sensitivity_of(measured_run(campaign("five-days"), 1))
     white = np.full(len(at.inputs), 1e-3)
     white[-1] = 1.2e-3
     u = dict(zip(at.names, np.sqrt(np.sum((at.matrix * white) ** 2, axis=1)), strict=True))
@@ -70,7 +70,7 @@ def test_standard_uncertainties_of_five_days_are_those_of_the_conventions(campai
 
 
 def test_what_the_plan_does_not_determine_is_refused_by_name(campaign):
-    at = sensitivity_of(run_problem(campaign("cold-cold"), 1))
+    at = sensitivity_of(measured_run(campaign("cold-cold"), 1))
     assert not at.determined[at.names.index("EX0C1")]
     assert at.determined[at.names.index("EB0C")]
     with pytest.raises(DataError, match=r"the plan does not determine EX0C1"):
@@ -82,6 +82,6 @@ def test_what_the_plan_does_not_determine_is_refused_by_name(campaign):
 def test_runs_and_inputs_are_checked(campaign):
     problem = campaign("five-days")
     with pytest.raises(DataError, match=r"no run 99; there are runs 1, 2"):
-        run_problem(problem, 99)
+        measured_run(problem, 99)
     with pytest.raises(DataError, match=r"this run has 187 inputs, not \(3,\)"):
-        sensitivity_of(run_problem(problem, 1), np.zeros(3))
+        sensitivity_of(measured_run(problem, 1), np.zeros(3))

@@ -13,7 +13,8 @@ from monitor.exceptions import InputError
 from monitor.store import Database
 from monitor.workflow.certificate.files import prepared, why_not
 from monitor.workflow.certificate.issue import issue
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.certificate.request import CertificateRequest
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -22,19 +23,41 @@ DAY = date(2026, 3, 12)
 
 def test_the_run_may_be_left_out_where_there_is_one_only(tmp_path: Path) -> None:
     with Database(tmp_path / "c.duckdb") as db:
-        import_folders(db, [EXAMPLES / "tilting-table-compensated", EXAMPLES / "five-days"])
-        made = issue(db, "tilting-table-compensated", None, LABORATORY, out=tmp_path, issued_on=DAY)
-        assert made["runs"] == [1]
+        import_folders(db, ImportRequest([EXAMPLES / "tilting-table-compensated", EXAMPLES / "five-days"]))
+        made = issue(
+            db,
+            CertificateRequest(
+                "tilting-table-compensated", None, laboratory=LABORATORY, out=tmp_path, issued_on=DAY
+            ),
+        )
+        assert made.certificate.runs == (1,)
         with pytest.raises(InputError, match=r"five-days has 20 runs \(1 to 20\): --run N says which one"):
-            issue(db, "five-days", None, LABORATORY, out=tmp_path, issued_on=DAY)
+            issue(
+                db, CertificateRequest("five-days", None, laboratory=LABORATORY, out=tmp_path, issued_on=DAY)
+            )
         with pytest.raises(
-            InputError, match=f"the number {made['number']} is taken, by the issued certificate"
+            InputError, match=f"the number {made.certificate.number} is taken, by the issued certificate"
         ):
-            issue(db, "five-days", 20, LABORATORY, out=tmp_path, number=made["number"], issued_on=DAY)
+            issue(
+                db,
+                CertificateRequest(
+                    "five-days",
+                    20,
+                    laboratory=LABORATORY,
+                    out=tmp_path,
+                    number=made.certificate.number,
+                    issued_on=DAY,
+                ),
+            )
         in_the_way = tmp_path / "file"
         in_the_way.write_text("x")
         with pytest.raises(InputError, match="file is a file, not a folder"):
-            issue(db, "tilting-table-compensated", 1, LABORATORY, out=in_the_way, issued_on=DAY)
+            issue(
+                db,
+                CertificateRequest(
+                    "tilting-table-compensated", 1, laboratory=LABORATORY, out=in_the_way, issued_on=DAY
+                ),
+            )
 
 
 def test_why_not_says_what_stands_in_the_way(tmp_path: Path) -> None:

@@ -24,8 +24,18 @@ from monitor.reporting.signature.signature import SignatureFinding, check_signat
 from monitor.reporting.signature.signing import FileKey, sign
 from monitor.store import Database, import_campaign, list_certificates, load_certificate
 from monitor.workflow.certificate import issue as certificates
-from monitor.workflow.certificate.checks import remake, stored_file, verify
+from monitor.workflow.certificate.answer import CertificateChecks
 from monitor.workflow.certificate.issue import issue, withdraw
+from monitor.workflow.certificate.remaking import remake
+from monitor.workflow.certificate.request import (
+    CertificateFileRequest,
+    CertificateRequest,
+    RemakeRequest,
+    VerificationRequest,
+    WithdrawalRequest,
+)
+from monitor.workflow.certificate.states import write_issued
+from monitor.workflow.certificate.verification import verify_file
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -70,83 +80,144 @@ def key(tmp_path_factory: pytest.TempPathFactory) -> FileKey:
 def test_one_byte_changed_at_200_random_places_is_found_by_the_hash_and_by_the_signature(
     db: Database, key: FileKey, tmp_path: Path, seeds: Callable[[int, int], range]
 ) -> None:
-    made = issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="B-1", issued_on=DAY, key=key)
-    genuine = Path(made["file"]).read_bytes()
+    made = issue(
+        db,
+        CertificateRequest(
+            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="B-1", issued_on=DAY, key=key
+        ),
+    )
+    genuine = Path(made.file).read_bytes()
     rng = np.random.default_rng(200)
     file = tmp_path / "altered.pdf"
     for place in rng.choice(len(genuine), 200, replace=False)[seeds(200, 40)]:
         altered = bytearray(genuine)
         altered[place] ^= 1 << int(rng.integers(0, 8))
         file.write_bytes(altered)
-        found = verify(db, file)
-        where = f"byte {place}: {found['faults']}"
+        found = verify_file(db, VerificationRequest(file))
+        where = f"byte {place}: {found.faults}"
         # What fails is the file, by both of its seals; the database and its chain of entries are as they were.
-        assert found["checks"] == {"hash": False, "chain": True, "signature": False, "database": False}, where
-        assert found["ok"] is False
-        assert any("no certificate of this database has the content" in fault for fault in found["faults"]), (
+        assert found.checks == CertificateChecks(hash=False, chain=True, signature=False, database=False), (
             where
         )
-        assert any("altered" in fault or "does not" in fault for fault in found["faults"][1:]), where
+        assert found.ok is False
+        assert any("no certificate of this database has the content" in fault for fault in found.faults), (
+            where
+        )
+        assert any("altered" in fault or "does not" in fault for fault in found.faults[1:]), where
 
 
 def test_a_signed_certificate_is_verified_check_by_check(db: Database, key: FileKey, tmp_path: Path) -> None:
-    made = issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="S-1", issued_on=DAY, key=key)
-    file = Path(made["file"])
-    good = verify(db, file)
-    assert good["ok"] is True
-    assert good["checks"] == {"hash": True, "chain": True, "signature": True, "database": True}
-    assert good["signer"] == "Common Name: Made-up Laboratory"
-    assert remake(db, "S-1")["identical"] is True
+    made = issue(
+        db,
+        CertificateRequest(
+            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="S-1", issued_on=DAY, key=key
+        ),
+    )
+    file = Path(made.file)
+    good = verify_file(db, VerificationRequest(file))
+    assert good.ok is True
+    assert good.checks == CertificateChecks(hash=True, chain=True, signature=True, database=True)
+    assert good.signer == "Common Name: Made-up Laboratory"
+    assert remake(db, RemakeRequest("S-1")).identical is True
     whole = file.read_bytes()
     altered = bytearray(whole)
     altered[whole.index(b"stream", whole.index(b"/EmbeddedFile")) + 40] ^= 1
     file.write_bytes(bytes(altered))
-    bad = verify(db, file)
-    assert bad["ok"] is False
-    assert bad["checks"] == {"hash": False, "chain": True, "signature": False, "database": False}
-    assert any("altered after it was signed" in fault for fault in bad["faults"])
-    assert any("it bears the number S-1, but differs" in fault for fault in bad["faults"])
+    bad = verify_file(db, VerificationRequest(file))
+    assert bad.ok is False
+    assert bad.checks == CertificateChecks(hash=False, chain=True, signature=False, database=False)
+    assert any("altered after it was signed" in fault for fault in bad.faults)
+    assert any("it bears the number S-1, but differs" in fault for fault in bad.faults)
     # A forged copy with another good signature: the signature holds, the database does not know it.
     forged = tmp_path / "forged.pdf"
     record = from_document(CertificateRecord, load_certificate(db, "S-1").record)
     forged.write_bytes(sign(certificate_pdf(record), key))
-    assert verify(db, forged)["checks"] == {
-        "hash": False, "chain": True, "signature": True, "database": False
-    }  # fmt: skip
+    assert verify_file(db, VerificationRequest(forged)).checks == CertificateChecks(
+        hash=False, chain=True, signature=True, database=False
+    )
     # What no hash says: a genuine file that was withdrawn.
     file.write_bytes(whole)
-    withdraw(db, "S-1", "the bar was damaged")
-    late = verify(db, file)
-    assert late["checks"] == {"hash": True, "chain": True, "signature": True, "database": False}
-    assert late["ok"] is False
+    withdraw(db, WithdrawalRequest("S-1", "the bar was damaged"))
+    late = verify_file(db, VerificationRequest(file))
+    assert late.checks == CertificateChecks(hash=True, chain=True, signature=True, database=False)
+    assert late.ok is False
 
 
 def test_17025_7_8_8_a_withdrawn_draft_and_a_withdrawn_certificate_stay_what_they_are(
     db: Database, tmp_path: Path
 ) -> None:
-    issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="W-1", issued_on=DAY, draft=True)
-    withdraw(db, "W-1", "was only a try")
+    issue(
+        db,
+        CertificateRequest(
+            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="W-1", issued_on=DAY, draft=True
+        ),
+    )
+    withdraw(db, WithdrawalRequest("W-1", "was only a try"))
     for number in ("W-1",):
         with pytest.raises(InputError, match=f"certificate {number} is withdrawn; that is final"):
-            withdraw(db, number, "again")
+            withdraw(db, WithdrawalRequest(number, "again"))
         with pytest.raises(InputError, match="is withdrawn; only an issued one can be replaced"):
-            issue(db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY, replaces=number, reason="x")
+            issue(
+                db,
+                CertificateRequest(
+                    "five-days",
+                    20,
+                    laboratory=LABORATORY,
+                    out=tmp_path,
+                    issued_on=DAY,
+                    replaces=number,
+                    reason="x",
+                ),
+            )
 
 
 def test_17025_7_8_8_3_an_amended_certificate_has_a_new_number_the_reason_and_names_the_old(
     db: Database, tmp_path: Path
 ) -> None:
-    issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="A-1", issued_on=DAY)
+    issue(
+        db,
+        CertificateRequest("five-days", 20, laboratory=LABORATORY, out=tmp_path, number="A-1", issued_on=DAY),
+    )
     with pytest.raises(InputError, match="say why certificate A-1 is replaced"):
-        issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="A-2", issued_on=DAY, replaces="A-1")
+        issue(
+            db,
+            CertificateRequest(
+                "five-days",
+                20,
+                laboratory=LABORATORY,
+                out=tmp_path,
+                number="A-2",
+                issued_on=DAY,
+                replaces="A-1",
+            ),
+        )
     with pytest.raises(InputError, match="a draft replaces nothing"):
         issue(
-            db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY, draft=True, replaces="A-1", reason="x"
-        )  # fmt: skip
+            db,
+            CertificateRequest(
+                "five-days",
+                20,
+                laboratory=LABORATORY,
+                out=tmp_path,
+                issued_on=DAY,
+                draft=True,
+                replaces="A-1",
+                reason="x",
+            ),
+        )
     made = issue(
-        db, "five-days", 20, LABORATORY, out=tmp_path, number="A-2", issued_on=DAY, replaces="A-1",
-        reason="the customer's address was wrong",
-    )  # fmt: skip
+        db,
+        CertificateRequest(
+            "five-days",
+            20,
+            laboratory=LABORATORY,
+            out=tmp_path,
+            number="A-2",
+            issued_on=DAY,
+            replaces="A-1",
+            reason="the customer's address was wrong",
+        ),
+    )
     record = from_document(CertificateRecord, load_certificate(db, "A-2").record)
     assert record.replaces == Replaced(
         "A-1", DAY, "the customer's address was wrong", load_certificate(db, "A-1").pdf_sha256
@@ -162,40 +233,60 @@ def test_17025_7_8_8_3_an_amended_certificate_has_a_new_number_the_reason_and_na
         core.findtext("dcc:previousReport/dcc:value", None, {"dcc": DCC})
         == load_certificate(db, "A-1").pdf_sha256
     )
-    page = " ".join(pypdf.PdfReader(made["file"]).pages[0].extract_text().split())
+    page = " ".join(pypdf.PdfReader(made.file).pages[0].extract_text().split())
     assert "replaces certificate A-1 of 2026-03-12. Reason: the customer's address was wrong" in page
     old = load_certificate(db, "A-1")
     assert (old.state, old.replaced_by, old.reason) == ("amended", "A-2", "the customer's address was wrong")
-    assert verify(db, tmp_path / "certificate-A-1.pdf")["ok"] is False
-    assert verify(db, tmp_path / "certificate-A-2.pdf")["ok"] is True
-    assert remake(db, "A-2")["identical"] is True
+    assert verify_file(db, VerificationRequest(tmp_path / "certificate-A-1.pdf")).ok is False
+    assert verify_file(db, VerificationRequest(tmp_path / "certificate-A-2.pdf")).ok is True
+    assert remake(db, RemakeRequest("A-2")).identical is True
     with pytest.raises(InputError, match="certificate A-1 is amended; only an issued one can be replaced"):
         issue(
-            db, "five-days", 20, LABORATORY, out=tmp_path, number="A-3", issued_on=DAY, replaces="A-1", reason="x"
-        )  # fmt: skip
+            db,
+            CertificateRequest(
+                "five-days",
+                20,
+                laboratory=LABORATORY,
+                out=tmp_path,
+                number="A-3",
+                issued_on=DAY,
+                replaces="A-1",
+                reason="x",
+            ),
+        )
     assert not (tmp_path / "certificate-A-3.pdf").exists()
     import_campaign(db, other_machine())
     with pytest.raises(
         InputError, match="campaign other is of machine M, certificate A-2 of HU40-T: it cannot"
     ):
-        issue(db, "other", 20, LABORATORY, out=tmp_path, issued_on=DAY, replaces="A-2", reason="x")
+        issue(
+            db,
+            CertificateRequest(
+                "other", 20, laboratory=LABORATORY, out=tmp_path, issued_on=DAY, replaces="A-2", reason="x"
+            ),
+        )
 
 
 def test_a_signature_is_judged_on_the_day_on_which_the_database_received_it(
     db: Database, key: FileKey, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="S-2", issued_on=DAY, key=key)
-    file = Path(made["file"])
+    made = issue(
+        db,
+        CertificateRequest(
+            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="S-2", issued_on=DAY, key=key
+        ),
+    )
+    file = Path(made.file)
     asked: list[datetime | None] = []
 
     def noted(pdf: bytes, trusted: Path | None, at: datetime | None) -> SignatureFinding:
         asked.append(at)
         return check_signature(pdf, trusted, at)
 
-    monkeypatch.setattr("monitor.workflow.certificate.checks.check_signature", noted)
-    assert verify(db, file)["ok"] is True
+    monkeypatch.setattr("monitor.workflow.certificate.verification.check_signature", noted)
+    assert verify_file(db, VerificationRequest(file)).ok is True
     file.write_bytes(file.read_bytes() + b"x")
-    assert verify(db, file)["ok"] is False
+    assert verify_file(db, VerificationRequest(file)).ok is False
     # A file that is not the stored one was never seen here: it is judged as of now.
     assert asked == [load_certificate(db, "S-2").made_at.replace(tzinfo=UTC), None]
 
@@ -214,7 +305,12 @@ def test_stopped_before_the_entry_no_file_bears_the_name_of_a_certificate(
     before = set(list_certificates(db)["number"])
     monkeypatch.setattr(certificates, "save_certificate", killed)
     with pytest.raises(Killed, match="here"):
-        issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="K-1", issued_on=DAY)
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="K-1", issued_on=DAY
+            ),
+        )
     assert set(list_certificates(db)["number"]) == before
     assert list(tmp_path.iterdir()) == []
 
@@ -224,11 +320,16 @@ def test_stopped_behind_the_entry_the_database_gives_the_document_back(
 ) -> None:
     monkeypatch.setattr(certificates, "publish", killed)
     with pytest.raises(Killed, match="here"):
-        issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="K-2", issued_on=DAY)
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="K-2", issued_on=DAY
+            ),
+        )
     assert list(tmp_path.glob("*.pdf")) == []
-    made = stored_file(db, "K-2", tmp_path)
-    assert verify(db, Path(made["file"]))["ok"] is True
-    assert Path(made["file"]).read_bytes() == load_certificate(db, "K-2").pdf
+    made = write_issued(db, CertificateFileRequest("K-2", tmp_path))
+    assert verify_file(db, VerificationRequest(Path(made.file))).ok is True
+    assert Path(made.file).read_bytes() == load_certificate(db, "K-2").pdf
 
 
 def test_a_file_that_cannot_get_its_name_says_where_the_certificate_is(
@@ -241,5 +342,10 @@ def test_a_file_that_cannot_get_its_name_says_where_the_certificate_is(
     with pytest.raises(
         InputError, match=r"certificate K-3 is in the database, .*`monitor certificate show K-3 --pdf"
     ):
-        issue(db, "five-days", 20, LABORATORY, out=tmp_path, number="K-3", issued_on=DAY)
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="K-3", issued_on=DAY
+            ),
+        )
     assert load_certificate(db, "K-3").state == "issued"

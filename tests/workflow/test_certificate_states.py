@@ -16,8 +16,15 @@ from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.store import Database, import_campaign, load_certificate
-from monitor.workflow.certificate.checks import remake, verify
 from monitor.workflow.certificate.issue import amend, issue
+from monitor.workflow.certificate.remaking import remake
+from monitor.workflow.certificate.request import (
+    AmendmentRequest,
+    CertificateRequest,
+    RemakeRequest,
+    VerificationRequest,
+)
+from monitor.workflow.certificate.verification import verify_file
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -45,9 +52,11 @@ def adjusted(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 
 def test_17025_7_8_4_1_d_results_as_found_and_as_left(db: Database, adjusted: Path, tmp_path: Path) -> None:
     german = adjusted.name == "laboratory-de.toml"
-    made = issue(db, "five-days", 10, adjusted, out=tmp_path, issued_on=DAY, as_left=20)
-    assert made["runs"] == [10, 20]
-    stored = load_certificate(db, made["number"])
+    made = issue(
+        db, CertificateRequest("five-days", 10, laboratory=adjusted, out=tmp_path, issued_on=DAY, as_left=20)
+    )
+    assert made.certificate.runs == (10, 20)
+    stored = load_certificate(db, made.certificate.number)
     record = from_document(CertificateRecord, stored.record)
     assert record.results is not None
     found, left = record.results
@@ -57,14 +66,18 @@ def test_17025_7_8_4_1_d_results_as_found_and_as_left(db: Database, adjusted: Pa
     assert record.performed_on == (date(2026, 3, 4), date(2026, 3, 9))
     # Each state has its own numbers, those of a certificate of its run alone.
     for run, part in ((10, found), (20, left)):
-        alone = issue(db, "five-days", run, adjusted, out=tmp_path, issued_on=DAY)
-        single = from_document(CertificateRecord, load_certificate(db, alone["number"]).record).results
+        alone = issue(
+            db, CertificateRequest("five-days", run, laboratory=adjusted, out=tmp_path, issued_on=DAY)
+        )
+        single = from_document(
+            CertificateRecord, load_certificate(db, alone.certificate.number).record
+        ).results
         assert single is not None
         assert np.array_equal(single[0].estimate, part.estimate)
         assert np.array_equal(single[0].covariance, part.covariance)
     inputs = json.loads(json.dumps(stored.record["inputs"]))
     assert (inputs["run"], inputs["as_left"]["run"]) == (10, 20)
-    pages = pypdf.PdfReader(made["file"])
+    pages = pypdf.PdfReader(made.file)
     text = " ".join(" ".join(page.extract_text().split()) for page in pages.pages)
     assert f"{'Ergebnisse' if german else 'Results'}, {found.state}" in text
     assert f"{'Ergebnisse' if german else 'Results'}, {left.state}" in text
@@ -73,20 +86,33 @@ def test_17025_7_8_4_1_d_results_as_found_and_as_left(db: Database, adjusted: Pa
         "certificate.dcc.xml", "certificate.json", "covariance-1.csv", "covariance-2.csv", "results-1.csv",
         "results-2.csv",
     ]  # fmt: skip
-    assert remake(db, made["number"])["identical"] is True
+    assert remake(db, RemakeRequest(made.certificate.number)).identical is True
     # An amendment is of the same runs in the same states unless it says otherwise.
-    again = amend(db, made["number"], adjusted, "wrong customer", out=tmp_path, issued_on=DAY)
-    assert again["runs"] == [10, 20]
-    assert verify(db, Path(again["file"]))["ok"] is True
+    again = amend(
+        db,
+        AmendmentRequest(
+            made.certificate.number, "wrong customer", laboratory=adjusted, out=tmp_path, issued_on=DAY
+        ),
+    )
+    assert again.certificate.runs == (10, 20)
+    assert verify_file(db, VerificationRequest(Path(again.file))).ok is True
 
 
 def test_results_as_left_may_stand_alone(db: Database, adjusted: Path, tmp_path: Path) -> None:
-    made = issue(db, "five-days", None, adjusted, out=tmp_path, issued_on=DAY, as_left=20)
-    record = from_document(CertificateRecord, load_certificate(db, made["number"]).record)
+    made = issue(
+        db,
+        CertificateRequest("five-days", None, laboratory=adjusted, out=tmp_path, issued_on=DAY, as_left=20),
+    )
+    record = from_document(CertificateRecord, load_certificate(db, made.certificate.number).record)
     assert record.results is not None
     assert [one.state for one in record.results] in (["as left"], ["wie hinterlassen"])
-    again = amend(db, made["number"], adjusted, "wrong customer", out=tmp_path, issued_on=DAY)
-    record = from_document(CertificateRecord, load_certificate(db, again["number"]).record)
+    again = amend(
+        db,
+        AmendmentRequest(
+            made.certificate.number, "wrong customer", laboratory=adjusted, out=tmp_path, issued_on=DAY
+        ),
+    )
+    record = from_document(CertificateRecord, load_certificate(db, again.certificate.number).record)
     assert record.results is not None
     assert [one.state for one in record.results] in (["as left"], ["wie hinterlassen"])
 
@@ -101,15 +127,38 @@ def test_what_cannot_be_as_left_is_refused(db: Database, tmp_path: Path) -> None
         encoding="utf-8",
     )
     with pytest.raises(InputError, match="say in words what was adjusted or repaired between"):
-        issue(db, "five-days", 10, silent, out=tmp_path, issued_on=DAY, as_left=20)
+        issue(
+            db,
+            CertificateRequest("five-days", 10, laboratory=silent, out=tmp_path, issued_on=DAY, as_left=20),
+        )
     with pytest.raises(InputError, match="results as left are measured after those as found"):
-        issue(db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY, as_left=10)
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 20, laboratory=LABORATORY, out=tmp_path, issued_on=DAY, as_left=10
+            ),
+        )
     with pytest.raises(InputError, match="results as left are measured after those as found"):
-        issue(db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY, as_left=20)
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 20, laboratory=LABORATORY, out=tmp_path, issued_on=DAY, as_left=20
+            ),
+        )
     with pytest.raises(NotFoundError, match="campaign five-days has no run 99; it has 1, 2, 3"):
-        issue(db, "five-days", 10, LABORATORY, out=tmp_path, issued_on=DAY, as_left=99)
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 10, laboratory=LABORATORY, out=tmp_path, issued_on=DAY, as_left=99
+            ),
+        )
     with pytest.raises(
         InputError, match="run 20 was measured on 2026-03-09; no certificate was issued of it on"
     ):
-        issue(db, "five-days", 10, LABORATORY, out=tmp_path, issued_on=date(2026, 3, 8), as_left=20)
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 10, laboratory=LABORATORY, out=tmp_path, issued_on=date(2026, 3, 8), as_left=20
+            ),
+        )
     assert list(tmp_path.glob("*.pdf*")) == []

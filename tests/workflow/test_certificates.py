@@ -23,13 +23,17 @@ from monitor.reporting.certificate.record import CertificateRecord, ConformitySt
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
-from monitor.workflow.certificate.checks import digital, remake
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.issue import issue
+from monitor.workflow.certificate.remaking import remake
+from monitor.workflow.certificate.request import CertificateFileRequest, CertificateRequest, RemakeRequest
 from monitor.workflow.certificate.results import results_of
-from monitor.workflow.uncertainty.documents import document
-from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate
-from monitor.workflow.uncertainty.evaluations import Evaluation, evaluation_of
+from monitor.workflow.certificate.states import write_digital
+from monitor.workflow.uncertainty.evaluation import evaluate
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.result import RunUncertainty
+from monitor.workflow.uncertainty.stating import answer_of
+from monitor.workflow.uncertainty.stored import StatedUncertainty
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -38,8 +42,8 @@ LIMITS = {"EX0C": 20.0, "EXX": 60.0, "EA0B": 60.0}
 DAY = date(2026, 3, 12)
 
 
-def as_stated(found: Evaluated) -> Evaluation:
-    return evaluation_of(document(found), found.campaign, found.model)
+def as_stated(found: RunUncertainty) -> StatedUncertainty:
+    return StatedUncertainty(found.campaign, found.model, answer_of(found))
 
 
 @pytest.fixture(scope="module")
@@ -61,23 +65,28 @@ def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
 
 
 @pytest.fixture(scope="module")
-def found(db: Database) -> Evaluated:
-    return evaluate(db, "limited", 20, method="guf")
+def found(db: Database) -> RunUncertainty:
+    return evaluate(db, UncertaintyRequest("limited", 20, method="guf"))
 
 
 @pytest.fixture(scope="module")
 def guarded(db: Database, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("out")
-    made = issue(db, "limited", 20, LABORATORY, out=out, number="G-1", issued_on=DAY, conformity="guard")
-    return Path(made["file"])
+    made = issue(
+        db,
+        CertificateRequest(
+            "limited", 20, laboratory=LABORATORY, out=out, number="G-1", issued_on=DAY, conformity="guard"
+        ),
+    )
+    return Path(made.file)
 
 
 def test_an_issued_certificate_is_made_again_byte_for_byte(
     db: Database, guarded: Path, tmp_path: Path
 ) -> None:
-    again = remake(db, "G-1", tmp_path)
-    assert again["identical"] is True
-    assert Path(again["file"]).read_bytes() == guarded.read_bytes()
+    again = remake(db, RemakeRequest("G-1", tmp_path))
+    assert again.identical is True
+    assert Path(again.file).read_bytes() == guarded.read_bytes()
 
 
 def test_a_record_comes_back_from_its_json_to_the_last_bit(db: Database, guarded: Path) -> None:
@@ -90,7 +99,7 @@ def test_a_record_comes_back_from_its_json_to_the_last_bit(db: Database, guarded
 
 
 def test_the_inputs_are_stored_with_it_and_travel_inside_it(
-    db: Database, guarded: Path, found: Evaluated
+    db: Database, guarded: Path, found: RunUncertainty
 ) -> None:
     reader = pypdf.PdfReader(guarded)
     files = {name: content[0] for name, content in reader.attachments.items()}
@@ -114,7 +123,7 @@ def test_iso_19005_3_6_8_every_attached_file_stands_once_in_af_with_its_relation
     assert relations["results-1.csv"] == relations["covariance-1.csv"] == "/Data"
 
 
-def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, found: Evaluated) -> None:
+def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, found: RunUncertainty) -> None:
     attached = pypdf.PdfReader(guarded).attachments
     rows = list(csv.DictReader(io.StringIO(attached["results-1.csv"][0].decode())))
     result = results_of(as_stated(found), texts_of())
@@ -130,13 +139,13 @@ def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, fou
 def test_the_digital_certificate_of_a_stored_record_is_the_attached_one(
     db: Database, guarded: Path, tmp_path: Path
 ) -> None:
-    made = digital(db, "G-1", tmp_path)
-    assert Path(made["file"]).name == "certificate-G-1.dcc.xml"
+    made = write_digital(db, CertificateFileRequest("G-1", tmp_path))
+    assert Path(made.file).name == "certificate-G-1.dcc.xml"
     attached = pypdf.PdfReader(guarded).attachments["certificate.dcc.xml"][0]
-    assert Path(made["file"]).read_bytes() == attached
+    assert Path(made.file).read_bytes() == attached
 
 
-def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: Evaluated) -> None:
+def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: RunUncertainty) -> None:
     guf = found.framework
     places = [guf.names.index(name) for name in LIMITS]
     units = [found.units[place] for place in places]
@@ -183,7 +192,12 @@ def test_no_tolerance_no_statement(db: Database, tmp_path: Path) -> None:
     with pytest.raises(
         InputError, match=r"campaign five-days states no tolerance of EA0B.*\[machine\.tolerances\]"
     ):
-        issue(db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY, conformity="simple")
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 20, laboratory=LABORATORY, out=tmp_path, issued_on=DAY, conformity="simple"
+            ),
+        )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -195,14 +209,17 @@ def test_remake_says_when_the_stored_document_is_another(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        "monitor.workflow.certificate.checks.certificate_pdf", lambda record, fonts, inputs: b"other"
+        "monitor.workflow.certificate.remaking.certificate_pdf", lambda record, fonts, inputs: b"other"
     )
-    again = remake(db, "G-1")
-    assert again["identical"] is False
-    assert "it was made with the same" in again["why"]
+    again = remake(db, RemakeRequest("G-1"))
+    assert again.identical is False
+    assert "it was made with the same" in again.why
     made_with = {**engine_versions(), "pango": "1.0.0"}
-    monkeypatch.setattr("monitor.workflow.certificate.checks.engine_versions", lambda: made_with)
-    assert f"it was made with pango {engine_versions()['pango']} (here 1.0.0);" in remake(db, "G-1")["why"]
+    monkeypatch.setattr("monitor.workflow.certificate.remaking.engine_versions", lambda: made_with)
+    assert (
+        f"it was made with pango {engine_versions()['pango']} (here 1.0.0);"
+        in remake(db, RemakeRequest("G-1")).why
+    )
     with Database(tmp_path / "empty.duckdb"):
         pass
     assert main(["--db", str(tmp_path / "empty.duckdb"), "certificate", "show", "--remake", "x.pdf"]) == 2

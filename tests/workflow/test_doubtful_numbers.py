@@ -13,11 +13,13 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.store import Database, import_campaign
 from monitor.workflow.certificate.issue import issue
+from monitor.workflow.certificate.request import CertificateRequest
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.model.change import add_effect, version_with
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.uncertainty.evaluation import evaluate
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -37,21 +39,23 @@ def test_swapped_columns_are_refused_by_every_step_and_get_no_certificate(tmp_pa
     with Database(tmp_path / "x.duckdb") as db:
         import_campaign(db, swapped)
         with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
-            evaluate(db, "five-days", 1, method="guf")
+            evaluate(db, UncertaintyRequest("five-days", 1, method="guf"))
         with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
             compare(db, CompareRequest("five-days"))
         with pytest.raises(DataError, match=r"no error of a machine|did not converge"):
-            issue(db, "five-days", 1, LABORATORY, out=tmp_path)
+            issue(db, CertificateRequest("five-days", 1, laboratory=LABORATORY, out=tmp_path))
     assert list(tmp_path.glob("*.pdf")) == []
 
 
 def test_a_single_run_with_a_hidden_effect_counts_it_in_the_uncertainty(tmp_path: Path) -> None:
     with Database(tmp_path / "x.duckdb") as db:
         import_campaign(db, first_runs("hidden-reversal-x", 1))
-        plain = evaluate(db, "hidden-reversal-x", 1, method="guf", model_uncertainty=False)
-        counted = evaluate(db, "hidden-reversal-x", 1, method="guf")
+        plain = evaluate(
+            db, UncertaintyRequest("hidden-reversal-x", 1, method="guf", model_uncertainty=False)
+        )
+        counted = evaluate(db, UncertaintyRequest("hidden-reversal-x", 1, method="guf"))
         add_effect(db, AddEffectRequest("EXX:reversal", "samba", "with-reversal"))
-        right = evaluate(db, "hidden-reversal-x", 1, method="guf", model="with-reversal")
+        right = evaluate(db, UncertaintyRequest("hidden-reversal-x", 1, method="guf", model="with-reversal"))
     assert "lack of fit of the model" in {line.source for line in counted.framework.budget}
     apart = np.abs(counted.framework.estimate - right.framework.estimate)
     assert np.max(apart / plain.framework.u) > 5.0
@@ -61,8 +65,8 @@ def test_a_single_run_with_a_hidden_effect_counts_it_in_the_uncertainty(tmp_path
 def test_a_certificate_says_how_the_model_fits(tmp_path: Path) -> None:
     with Database(tmp_path / "x.duckdb") as db:
         import_campaign(db, first_runs("hidden-reversal-x", 1))
-        found = issue(db, "hidden-reversal-x", 1, LABORATORY, out=tmp_path)
-    text = "".join((page.extract_text() or "") for page in _pages(Path(found["file"])))
+        found = issue(db, CertificateRequest("hidden-reversal-x", 1, laboratory=LABORATORY, out=tmp_path))
+    text = "".join((page.extract_text() or "") for page in _pages(Path(found.file)))
     assert "the model leaves 1.57" in " ".join(text.split())
     assert "part of u" in " ".join(text.split())
 

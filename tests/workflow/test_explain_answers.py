@@ -19,7 +19,7 @@ from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 KINDS = {
@@ -31,7 +31,7 @@ KINDS = {
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     with Database(tmp_path_factory.mktemp("answers") / "x.duckdb") as db:
-        import_folders(db, [EXAMPLES / name for name in KINDS])
+        import_folders(db, ImportRequest([EXAMPLES / name for name in KINDS]))
         yield db
 
 

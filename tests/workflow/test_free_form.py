@@ -20,7 +20,10 @@ from monitor.workflow.plan.answer import AnglePlanAnswer
 from monitor.workflow.plan.plan import plan
 from monitor.workflow.plan.request import PlanRequest
 from monitor.workflow.uncertainty.evaluation import uncertainty
-from monitor.workflow.volumetric.volumetric import volumetric_map
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.volumetric.request import VolumetricRequest
+from monitor.workflow.volumetric.stating import map_answer
+from monitor.workflow.volumetric.volumetric import map_run
 
 POCKET = Path(__file__).parents[2] / "examples" / "free-form-pocket"
 
@@ -43,30 +46,31 @@ def test_identification_and_framework_state_the_same_uncertainty(db):
     run = next(run for run in identify(db, IdentifyRequest("free-form-pocket")).runs if run.run == 2)
     assert run.refused == ()
     assert len(run.parameters) == 149
-    framework = uncertainty(db, "free-form-pocket", 2, method="guf")["guf"]
-    ratios = {framework["u"][name] / estimate.u for name, estimate in run.parameters.items()}
+    framework = uncertainty(db, UncertaintyRequest("free-form-pocket", 2, method="guf")).guf
+    ratios = {framework.u[name] / estimate.u for name, estimate in run.parameters.items()}
     assert min(ratios) > 0.99
     assert max(ratios) < 1.1
     for name, estimate in run.parameters.items():
-        assert framework["estimate"][name] == pytest.approx(estimate.value, abs=1e-6)
+        assert framework.estimate[name] == pytest.approx(estimate.value, abs=1e-6)
 
 
 def test_monte_carlo_agrees_with_the_framework(db):
-    found = uncertainty(db, "free-form-pocket", 2, method="mcm", digits=1, seed=3)
-    assert found["mcm"]["not_converged"] == 0
-    for name, u in found["guf"]["u"].items():
-        assert found["mcm"]["u"][name] == pytest.approx(u, rel=0.05)
+    found = uncertainty(db, UncertaintyRequest("free-form-pocket", 2, method="mcm", digits=1, seed=3))
+    assert found.mcm.not_converged == 0
+    for name, u in found.guf.u.items():
+        assert found.mcm.u[name] == pytest.approx(u, rel=0.05)
 
 
 def test_the_map_knows_the_known_length(db):
     """The error at the last node is no result, but an error of the machine."""
-    document, mapped = volumetric_map(db, "free-form-pocket", 2)
+    mapped = map_run(db, VolumetricRequest("free-form-pocket", 2))
+    document = map_answer(mapped)
     campaign = load_campaign(db, "free-form-pocket")
-    place = mapped.known.names.index("EXX(110)")
-    assert mapped.known.estimate[place] == pytest.approx(campaign.artefact.self_calibration.length.value)
-    assert mapped.known.covariance[place, place] ** 0.5 == pytest.approx(0.5e-3, rel=1e-3)
-    assert document["left_out"] == []
-    assert not any(name.startswith("shape") for name in mapped.known.names)
+    place = mapped.errors.names.index("EXX(110)")
+    assert mapped.errors.estimate[place] == pytest.approx(campaign.artefact.self_calibration.length.value)
+    assert mapped.errors.covariance[place, place] ** 0.5 == pytest.approx(0.5e-3, rel=1e-3)
+    assert document.left_out == ()
+    assert not any(name.startswith("shape") for name in mapped.errors.names)
 
 
 def test_plan_proposes_angles(db):

@@ -31,6 +31,8 @@ from monitor.workflow.health.machine import Settings
 from monitor.workflow.health.report import report, stored_health
 from monitor.workflow.health.weeks import week_before, week_named
 from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.volumetric.request import VolumetricRequest
 from monitor.workflow.volumetric.volumetric import volumetric_map
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -381,12 +383,14 @@ def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_wi
     told = stored(fleet, "B-stepped").map
     assert told is not None
     assert told.run == 16
-    document, _ = volumetric_map(fleet, "campaign-B-stepped", 16, before=datetime.fromisoformat("2026-03-09"))
-    assert told.worst_um == document["worst"]["error_um"] == max(one.worst_um for one in told.by_pose)
-    assert told.expanded_um == document["worst"]["expanded_um"]
+    document = volumetric_map(
+        fleet, VolumetricRequest("campaign-B-stepped", 16, before=datetime.fromisoformat("2026-03-09"))
+    )
+    assert told.worst_um == document.worst.error_um == max(one.worst_um for one in told.by_pose)
+    assert told.expanded_um == document.worst.expanded_um
     # That of the whole campaign has another uncertainty, and is left alone.
-    whole, _ = volumetric_map(fleet, "campaign-B-stepped", 16)
-    assert whole["worst"]["expanded_um"] != document["worst"]["expanded_um"]
+    whole = volumetric_map(fleet, VolumetricRequest("campaign-B-stepped", 16))
+    assert whole.worst.expanded_um != document.worst.expanded_um
     found = report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
     again = stored(fleet, "B-stepped")
     assert again.map == told
@@ -394,7 +398,7 @@ def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_wi
     assert "Volumetric error, run 16" in page
     # And drawn: the words of its scale stand in the picture.
     assert [one.across for one in told.slices] == ["Z", "Y", "X"]
-    assert [to_document(one) for one in told.slices] == document["slices"]
+    assert told.slices == document.slices
     assert "length of the error / µm" in page
     assert "Rotary axes at zero, three slices through the middle" in page
     assert again.model is not None
@@ -433,7 +437,7 @@ def test_a_report_made_late_says_what_one_made_on_monday_said(
     assert late.model.rms_um == pytest.approx(then.model.rms_um, rel=1e-9)
     assert late.model.lack_of_fit_p == pytest.approx(then.model.lack_of_fit_p, rel=1e-6)
     # The whole campaign's own result is another, and is left alone.
-    whole = uncertainty(fleet, "campaign-B-stepped", 16, method="guf")
+    whole = uncertainty(fleet, UncertaintyRequest("campaign-B-stepped", 16, method="guf"))
     assert whole["input_covariance"] == "repeated runs, pooled by day, 15 degrees of freedom"
     report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
     assert stored(fleet, "B-stepped").basis == then.basis

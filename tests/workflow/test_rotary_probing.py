@@ -21,10 +21,12 @@ from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
-from monitor.workflow.intake import campaigns
+from monitor.workflow.intake.importing import ImportRequest, import_folders
+from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.trend.trends import trends
 from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 ROOT = Path(__file__).resolve().parents[2]
 SYMBOLS = load("closed_forms", ROOT / "tests" / "methods" / "closed_forms.py").SYMBOLS
@@ -38,7 +40,7 @@ COMPENSATED = {"EX0A", "EY0A", "EZ0A", "EA0C"}
 def db(tmp_path_factory):
     with Database(tmp_path_factory.mktemp("rotary") / "x.duckdb") as own:
         for name in ("tilting-table", "tilting-table-compensated"):
-            campaigns.import_folders(own, [ROOT / "examples" / name])
+            import_folders(own, ImportRequest([ROOT / "examples" / name]))
         yield own
 
 
@@ -52,7 +54,7 @@ def test_table_4_four_repeats_are_four_runs(db):
 
 
 def test_table_4_only_the_z_offset_drifts(db):
-    assert stats(db, "tilting-table")["drift"]["drifts"] == ["EZ0A"]
+    assert stats(db, StatisticsRequest("tilting-table")).drift.drifts == ["EZ0A"]
 
 
 def test_table_4_compensation_moves_what_was_compensated(db):
@@ -70,11 +72,11 @@ def test_the_block_is_explained(db):
 
 
 def test_uncertainty_by_both_routes(db):
-    found = uncertainty(db, "tilting-table", 1, digits=1)
-    for name, u in found["guf"]["u"].items():
-        assert found["mcm"]["u"][name] == pytest.approx(u, rel=0.05)
-    assert found["mcm"]["not_converged"] == 0
-    assert found["guf"]["budget"].keys() == {"readings"}
+    found = uncertainty(db, UncertaintyRequest("tilting-table", 1, digits=1))
+    for name, u in found.guf.u.items():
+        assert found.mcm.u[name] == pytest.approx(u, rel=0.05)
+    assert found.mcm.not_converged == 0
+    assert found.guf.budget.keys() == {"readings"}
 
 
 # Two methods on one machine
@@ -107,7 +109,7 @@ def both_methods(simulator: ModuleType, folder: Path, rotary: dict[str, float]) 
         first=datetime(2026, 3, 9, 9, 0, tzinfo=UTC),
     )  # fmt: skip
     own = Database(folder / "two.duckdb")
-    campaigns.import_folders(own, [folder / "s", folder / "r"])
+    import_folders(own, ImportRequest([folder / "s", folder / "r"]))
     return own
 
 

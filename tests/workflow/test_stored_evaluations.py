@@ -13,13 +13,17 @@ import numpy as np
 import pypdf
 import pytest
 
+from monitor.documents import to_document
 from monitor.exceptions import StoreError
 from monitor.readers import read_campaign, read_linear_axes
 from monitor.store import Database, import_campaign, load_analysis, load_campaign, load_certificate
 from monitor.workflow.certificate.issue import issue
+from monitor.workflow.certificate.request import CertificateRequest
 from monitor.workflow.models import resolve
-from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate, uncertainty
-from monitor.workflow.uncertainty.evaluations import evaluation_of, stored_evaluation
+from monitor.workflow.uncertainty.evaluation import evaluate, uncertainty
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.result import RunUncertainty
+from monitor.workflow.uncertainty.stored import StatedUncertainty, restored, stored_uncertainty
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -49,75 +53,104 @@ def pages_and_files(file: str) -> tuple[list[bytes], dict[str, bytes]]:
 def test_from_a_stored_result_it_is_the_same_as_evaluated_for_it(
     db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wishes: dict[str, bool]
 ) -> None:
-    fresh = issue(db, "five-days", 20, LABORATORY, out=tmp_path / "fresh.pdf", number="N-1", draft=True,
-                  issued_on=DAY, **wishes)  # fmt: skip
+    fresh = issue(
+        db,
+        CertificateRequest(
+            "five-days",
+            20,
+            laboratory=LABORATORY,
+            out=tmp_path / "fresh.pdf",
+            number="N-1",
+            draft=True,
+            issued_on=DAY,
+            **wishes,
+        ),
+    )
     assert load_certificate(db, "N-1").record["inputs"]["stored_result"] is None
-    uncertainty(db, "five-days", 20, method="guf")
+    uncertainty(db, UncertaintyRequest("five-days", 20, method="guf"))
     number = load_analysis(db, "uncertainty", campaign="five-days", run=20).number
 
-    def never(*_: object, **__: object) -> Evaluated:
+    def never(*_: object, **__: object) -> RunUncertainty:
         raise AssertionError("the stored result was not taken")
 
     monkeypatch.setattr("monitor.workflow.uncertainty.evaluation.evaluate", never)
-    stored = issue(db, "five-days", 20, LABORATORY, out=tmp_path / "stored.pdf", number="N-1", draft=True,
-                   issued_on=DAY, **wishes)  # fmt: skip
+    stored = issue(
+        db,
+        CertificateRequest(
+            "five-days",
+            20,
+            laboratory=LABORATORY,
+            out=tmp_path / "stored.pdf",
+            number="N-1",
+            draft=True,
+            issued_on=DAY,
+            **wishes,
+        ),
+    )
     assert load_certificate(db, "N-1").record["inputs"]["stored_result"] == number
-    assert pages_and_files(stored["file"]) == pages_and_files(fresh["file"])
+    assert pages_and_files(stored.file) == pages_and_files(fresh.file)
 
 
 def test_what_is_stated_is_what_was_evaluated(db: Database) -> None:
-    found = evaluate(db, "five-days", 20, method="guf")
-    kept = uncertainty(db, "five-days", 20, method="guf")
-    stated = evaluation_of(json.loads(json.dumps(kept)), found.campaign, found.model)
+    found = evaluate(db, UncertaintyRequest("five-days", 20, method="guf"))
+    kept = uncertainty(db, UncertaintyRequest("five-days", 20, method="guf"))
+    stated = StatedUncertainty(
+        found.campaign, found.model, restored(json.loads(json.dumps(to_document(kept))))
+    )
     guf = found.framework
     factor = np.array([unit.factor for unit in found.units])
     assert stated.names == guf.names
     np.testing.assert_allclose(stated.estimate * factor, guf.estimate, rtol=1e-14)
     np.testing.assert_allclose(stated.covariance * np.outer(factor, factor), guf.covariance, rtol=1e-13)
-    assert (stated.k_p, stated.k_q, stated.rank, stated.dof) == (guf.k_p, guf.k_q, guf.rank, guf.dof)
+    assert (stated.k_p, stated.k_q, stated.answer.guf.rank, stated.dof) == (
+        guf.k_p,
+        guf.k_q,
+        guf.rank,
+        guf.dof,
+    )
     assert stated.fewest_dof == float(np.min(guf.dof_by_output))
-    assert stated.sources == tuple(line.source for line in guf.budget)
+    assert tuple(stated.answer.guf.budget) == tuple(line.source for line in guf.budget)
 
 
 def test_a_result_that_was_asked_for_something_else_is_not_taken(db: Database, tmp_path: Path) -> None:
     campaign, model = load_campaign(db, "five-days"), resolve(db, None, "samba")
-    uncertainty(db, "five-days", 20, method="guf", p=0.9)
-    uncertainty(db, "five-days", 20, method="guf", model_uncertainty=False)
-    uncertainty(db, "five-days", 20, method="guf", select="five-days")
-    uncertainty(db, "five-days", 19, method="guf")
-    assert stored_evaluation(db, campaign, 20, model) is None
-    uncertainty(db, "five-days", 20, method="guf")
+    uncertainty(db, UncertaintyRequest("five-days", 20, method="guf", p=0.9))
+    uncertainty(db, UncertaintyRequest("five-days", 20, method="guf", model_uncertainty=False))
+    uncertainty(db, UncertaintyRequest("five-days", 20, method="guf", select="five-days"))
+    uncertainty(db, UncertaintyRequest("five-days", 19, method="guf"))
+    assert stored_uncertainty(db, campaign, 20, model) is None
+    uncertainty(db, UncertaintyRequest("five-days", 20, method="guf"))
     right = load_analysis(db, "uncertainty", campaign="five-days", run=20).number
-    uncertainty(db, "five-days", 20, method="guf", p=0.99)
-    found = stored_evaluation(db, campaign, 20, model)
+    uncertainty(db, UncertaintyRequest("five-days", 20, method="guf", p=0.99))
+    found = stored_uncertainty(db, campaign, 20, model)
     assert found is not None
-    assert (found.number, found.p) == (right, 0.95)
+    assert (found.number, found.answer.p) == (right, 0.95)
     # Errors of the linear axes belong to the question: others than the stored ones are another question.
     turned, rotary = load_campaign(db, "tilting-table"), resolve(db, None, "rotary-probing")
     axes = read_linear_axes(EXAMPLES / "linear-axes.toml")
-    uncertainty(db, "tilting-table", 4, method="guf", linear_axes=axes)
-    assert stored_evaluation(db, turned, 4, rotary) is None
-    assert stored_evaluation(db, turned, 4, rotary, axes) is not None
+    uncertainty(db, UncertaintyRequest("tilting-table", 4, method="guf", linear_axes=axes))
+    assert stored_uncertainty(db, turned, 4, rotary) is None
+    assert stored_uncertainty(db, turned, 4, rotary, axes) is not None
 
 
 def test_a_result_of_another_version_or_an_altered_one_is_no_source(db: Database, tmp_path: Path) -> None:
     campaign, model = load_campaign(db, "five-days"), resolve(db, None, "samba")
-    uncertainty(db, "five-days", 20, method="guf")
+    uncertainty(db, UncertaintyRequest("five-days", 20, method="guf"))
     document = load_analysis(db, "uncertainty", campaign="five-days", run=20).document
     altered = json.loads(json.dumps(document))
     altered["guf"]["estimate"]["EA0B"] += 1.0
     db.execute("UPDATE analysis SET document = ? WHERE kind = 'uncertainty'", [json.dumps(altered)])
     with pytest.raises(StoreError, match=r"stored result \d+ was altered after it was stored"):
-        issue(db, "five-days", 20, LABORATORY, out=tmp_path, issued_on=DAY)
+        issue(db, CertificateRequest("five-days", 20, laboratory=LABORATORY, out=tmp_path, issued_on=DAY))
     db.execute("UPDATE analysis SET software_version = '0.0.1' WHERE kind = 'uncertainty'")
-    assert stored_evaluation(db, campaign, 20, model) is None
+    assert stored_uncertainty(db, campaign, 20, model) is None
 
 
 def test_a_certificate_of_a_stored_result_loads_no_solver_and_no_compiler(
     db: Database, tmp_path: Path
 ) -> None:
     """What takes a second to load, and would be loaded unseen by one import at the top of a file."""
-    uncertainty(db, "five-days", 20, method="guf")
+    uncertainty(db, UncertaintyRequest("five-days", 20, method="guf"))
     path = db.path
     db.close()
     script = (

@@ -18,11 +18,12 @@ from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.trend.trends import Choice, trends
-from monitor.workflow.uncertainty.documents import document
 from monitor.workflow.uncertainty.evaluation import evaluate
-from monitor.workflow.uncertainty.evaluations import evaluation_of
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.stating import answer_of
+from monitor.workflow.uncertainty.stored import StatedUncertainty
 from monitor.workflow.volumetric.volumetric import geometric_errors, poses_of, ranges_of
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -38,7 +39,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("volumetric") / "m.duckdb"
     rng = np.random.default_rng(3)
     with Database(place) as db:
-        import_folders(db, [EXAMPLES / "cold-cold"])
+        import_folders(db, ImportRequest([EXAMPLES / "cold-cold"]))
         identify(db, IdentifyRequest("cold-cold"))
         ((machine, topology_of, start),) = db.rows(
             "SELECT machine, machine_description, min(started_at) FROM campaign JOIN run USING (campaign_id) "
@@ -98,9 +99,9 @@ def test_the_date_is_that_of_the_exact_chain_at_the_extrapolated_parameters(db: 
     assert ahead["why"] is None
     assert ahead["held"] == []
     # The other way: the whole grid through the exact chain, for parameters on their lines, and the root of the limit.
-    evaluated = evaluate(db, "cold-cold", method="guf", model_uncertainty=False)
+    evaluated = evaluate(db, UncertaintyRequest("cold-cold", method="guf", model_uncertainty=False))
     known, _ = geometric_errors(
-        evaluation_of(document(evaluated), evaluated.campaign, evaluated.model), evaluated.fit
+        StatedUncertainty(evaluated.campaign, evaluated.model, answer_of(evaluated)), evaluated.fit
     )
     ranges, _ = ranges_of(evaluated.campaign, known.chain)
     points = grid(known.chain, ranges, 7, poses_of(known.chain, known.context.positions))

@@ -28,12 +28,16 @@ from monitor.store import (
 from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import fleet
 from monitor.workflow.run_statistics.columns import group_labels
+from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import stats
-from monitor.workflow.selections import select, side_by_side
+from monitor.workflow.selections.request import SelectionRequest, SideBySideRequest
+from monitor.workflow.selections.select import select
+from monitor.workflow.selections.side_by_side import side_by_side
 from monitor.workflow.trend.figures import headline, trend_figures
 from monitor.workflow.trend.parameter import Series
 from monitor.workflow.trend.trends import Choice, trends
 from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 START = datetime(2024, 1, 1, 8)
@@ -235,22 +239,25 @@ def campaigns(tmp_path_factory: pytest.TempPathFactory) -> Any:
     with Database(tmp_path_factory.mktemp("selections") / "m.duckdb") as db:
         for name in ("hot-cold", "cold-cold", "five-days"):
             import_campaign(db, read_campaign(EXAMPLES / name))
-        select(db, "hot-cold", "hot-cold-star", "hours >= 6")
+        select(db, SelectionRequest("hot-cold", "hot-cold-star", "hours >= 6"))
         yield db
 
 
 def test_los_2017_figure_4_6_without_its_first_hours_the_hot_machine_is_like_the_cold(
     campaigns: Database,
 ) -> None:
-    found = side_by_side(campaigns, ["hot-cold", "hot-cold-star", "cold-cold"])["selections"]
-    assert [one["runs"] for one in found.values()] == [44, 33, 44]
+    found = side_by_side(campaigns, SideBySideRequest(("hot-cold", "hot-cold-star", "cold-cold"))).selections
+    assert [one.runs for one in found.values()] == [44, 33, 44]
     # The thesis states k_q = 2.9 for its eleven parameters.
-    assert all(abs(one["k_q"] - 2.9) < 0.1 for one in found.values())
-    hot, star, cold = (found[name]["expanded"] for name in ("hot-cold", "hot-cold-star", "cold-cold"))
+    assert all(abs(one.k_q - 2.9) < 0.1 for one in found.values())
+    hot, star, cold = (found[name].expanded for name in ("hot-cold", "hot-cold-star", "cold-cold"))
     # What a calibration with these readings states: so few runs ask for a larger factor.
-    own = uncertainty(campaigns, "hot-cold", method="guf", select="hot-cold-star", model_uncertainty=False)
-    assert star == pytest.approx(own["guf"]["expanded"], rel=1e-12)
-    assert 3.0 < found["hot-cold-star"]["k_q_with_degrees_of_freedom"] < 3.1
+    own = uncertainty(
+        campaigns,
+        UncertaintyRequest("hot-cold", method="guf", select="hot-cold-star", model_uncertainty=False),
+    )
+    assert star == pytest.approx(own.guf.expanded, rel=1e-12)
+    assert 3.0 < found["hot-cold-star"].k_q_with_degrees_of_freedom < 3.1
     for name in ("EXX", "EYY", "EZZ", "EX0C"):
         assert hot[name] > 1.2 * star[name]
         assert hot[name] > 1.2 * cold[name]
@@ -259,28 +266,35 @@ def test_los_2017_figure_4_6_without_its_first_hours_the_hot_machine_is_like_the
 
 
 def test_a_selection_is_a_group_and_feeds_the_uncertainty(campaigns: Database) -> None:
-    within = stats(campaigns, "hot-cold", select="hot-cold-star")
-    assert within["groups"] == {"1": 33}
-    assert within["vector"]["manova"]["why"] == "groups names 1 group (1); 2 are needed."
-    apart = stats(campaigns, "hot-cold", by="hot-cold-star")
-    assert apart["groups"] == {"hot-cold-star": 33, "not hot-cold-star": 11}
-    assert apart["parameters"]["EYY"]["anova_q"] < 1e-4
-    assert "has 11 runs for 11 parameters" in apart["vector"]["box_m"]["why"]
-    own = uncertainty(campaigns, "hot-cold", method="guf", select="hot-cold-star", model_uncertainty=False)
-    assert own["input_covariance"].startswith("selection hot-cold-star: ")
-    whole = uncertainty(campaigns, "hot-cold", method="guf", model_uncertainty=False)
-    assert own["guf"]["u"]["EYY"] < 0.8 * whole["guf"]["u"]["EYY"]
+    within = stats(campaigns, StatisticsRequest("hot-cold", select="hot-cold-star"))
+    assert within.groups == {"1": 33}
+    assert within.vector.manova.why == "groups names 1 group (1); 2 are needed."
+    apart = stats(campaigns, StatisticsRequest("hot-cold", by="hot-cold-star"))
+    assert apart.groups == {"hot-cold-star": 33, "not hot-cold-star": 11}
+    assert apart.parameters["EYY"].anova_q < 1e-4
+    assert "has 11 runs for 11 parameters" in apart.vector.box_m.why
+    own = uncertainty(
+        campaigns,
+        UncertaintyRequest("hot-cold", method="guf", select="hot-cold-star", model_uncertainty=False),
+    )
+    assert own.input_covariance.startswith("selection hot-cold-star: ")
+    whole = uncertainty(campaigns, UncertaintyRequest("hot-cold", method="guf", model_uncertainty=False))
+    assert own.guf.u["EYY"] < 0.8 * whole.guf.u["EYY"]
     with pytest.raises(InputError, match="followed another plan than hot-cold"):
-        uncertainty(campaigns, "hot-cold", method="guf", select="five-days")
+        uncertainty(campaigns, UncertaintyRequest("hot-cold", method="guf", select="five-days"))
     with pytest.raises(InputError, match="--name cold-cold: a campaign has that name"):
-        select(campaigns, "hot-cold", "cold-cold", "hours > 6")
+        select(campaigns, SelectionRequest("hot-cold", "cold-cold", "hours > 6"))
     with pytest.raises(InputError, match="--name day: runs are grouped by a column of that name"):
-        select(campaigns, "hot-cold", "day", "hours > 6")
+        select(campaigns, SelectionRequest("hot-cold", "day", "hours > 6"))
     # Channels recorded with each probing are conditions of the runs here as in `stats`.
-    warm = select(campaigns, "five-days", "warm-axis", "x_axis_degC > 22")["runs"]
-    assert len(warm) == sum(stats(campaigns, "five-days", where="x_axis_degC > 22")["groups"].values()) == 13
+    warm = select(campaigns, SelectionRequest("five-days", "warm-axis", "x_axis_degC > 22")).runs
+    assert (
+        len(warm)
+        == sum(stats(campaigns, StatisticsRequest("five-days", where="x_axis_degC > 22")).groups.values())
+        == 13
+    )
     with pytest.raises(InputError, match="no run of campaign hot-cold meets it"):
-        select(campaigns, "hot-cold", "late", "hours > 99")
+        select(campaigns, SelectionRequest("hot-cold", "late", "hours > 99"))
 
 
 def test_a_condition_that_never_varies_makes_no_groups() -> None:
@@ -289,14 +303,14 @@ def test_a_condition_that_never_varies_makes_no_groups() -> None:
 
 
 def test_five_days_components_histogram_and_the_vector(campaigns: Database) -> None:
-    found = stats(campaigns, "five-days")
-    parts = found["parameters"]["EB0C"]["components"]
-    assert parts["between"] > 3 * parts["within"]
-    assert parts["between_interval"][0] < parts["between"] < parts["between_interval"][1]
-    assert 0.0 < found["parameters"]["EB0C"]["normality_p"] <= 1.0
-    assert found["vector"]["box_m"]["why"].startswith("group 1 has 4 runs for 13 parameters")
-    assert found["vector"]["manova"]["p_value"] < 1e-3
-    fourth = found["correlation_by_group"]["4"]
+    found = stats(campaigns, StatisticsRequest("five-days"))
+    parts = found.parameters["EB0C"].components
+    assert parts.between > 3 * parts.within
+    assert parts.between_interval[0] < parts.between < parts.between_interval[1]
+    assert 0.0 < found.parameters["EB0C"].normality_p <= 1.0
+    assert found.vector.box_m.why.startswith("group 1 has 4 runs for 13 parameters")
+    assert found.vector.manova.p_value < 1e-3
+    fourth = found.correlation_by_group["4"]
     assert fourth["degrees_of_freedom"] == 3
     runs = load_identification(campaigns, "five-days", "samba", 1)
     values = np.array([one.estimate for one in runs.runs if one.run in (13, 14, 15, 16)])

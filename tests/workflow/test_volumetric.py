@@ -8,12 +8,15 @@ from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
 from monitor.methods.samba.virtual import virtual_campaign
 from monitor.store import Database
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import add_effect
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.simulation import SimulateRequest, simulate
+from monitor.workflow.volumetric.error_map import at_zero
 from monitor.workflow.volumetric.known_errors import _of_shared
-from monitor.workflow.volumetric.volumetric import at_zero, volumetric_map
+from monitor.workflow.volumetric.request import VolumetricRequest
+from monitor.workflow.volumetric.stating import map_answer
+from monitor.workflow.volumetric.volumetric import map_run
 
 
 @pytest.fixture(scope="module")
@@ -58,52 +61,55 @@ def database(tmp_path_factory):
     folder = tmp_path_factory.mktemp("volumetric")
     simulate(SimulateRequest(folder / "hidden", "EBB:harmonic2", 8.0, 1.0, 3))
     with Database(folder / "map.duckdb") as db:
-        import_folders(db, [folder / "hidden"])
+        import_folders(db, ImportRequest([folder / "hidden"]))
         add_effect(db, AddEffectRequest("EBB:harmonic2", "samba", "with-b"))
         yield db
 
 
 def test_a_shared_effect_takes_part_in_the_map(database):
-    plain, _ = volumetric_map(database, "hidden", points=3)
-    found, mapped = volumetric_map(database, "hidden", points=3, model="with-b")
-    assert "EBB:harmonic2.cos" in found["parameters"]
-    assert "EBB:harmonic2.cos" not in plain["parameters"]
-    place = found["parameters"].index("EBB:harmonic2.cos")
-    assert mapped.known.covariance[place, place] > 0.0
-    assert np.all(np.linalg.eigvalsh(mapped.known.covariance) > -1e-18)
+    plain = map_answer(map_run(database, VolumetricRequest("hidden", points=3)))
+    mapped = map_run(database, VolumetricRequest("hidden", points=3, model="with-b"))
+    found = map_answer(mapped)
+    assert "EBB:harmonic2.cos" in found.parameters
+    assert "EBB:harmonic2.cos" not in plain.parameters
+    place = found.parameters.index("EBB:harmonic2.cos")
+    assert mapped.errors.covariance[place, place] > 0.0
+    assert np.all(np.linalg.eigvalsh(mapped.errors.covariance) > -1e-18)
     # Without the effect the plain model carries lack of fit, and its map is less certain for it.
-    assert found["least_certain"]["u_um"] < plain["least_certain"]["u_um"]
+    assert found.least_certain.u_um < plain.least_certain.u_um
 
 
 def test_strokes_of_the_machine_file_bound_the_map(database):
-    found, mapped = volumetric_map(database, "hidden", points=2)
+    mapped = map_run(database, VolumetricRequest("hidden", points=2))
+    found = map_answer(mapped)
     assert not mapped.from_strokes
-    for name, ends in found["region"]["readings_mm"].items():
+    for name, ends in found.region.readings_mm.items():
         readings = mapped.evaluated.campaign.probings.readings[name]
-        assert ends == [readings.min(), readings.max()]
+        assert ends == (readings.min(), readings.max())
 
 
 def test_what_is_drawn_has_axes_and_vectors_in_the_order_of_the_directions_whatever_the_chain(database):
     # The chain is w C B X b Z Y (C1) t: its axes come in the order X, Z, Y.
-    document, mapped = volumetric_map(database, "hidden", 20)
+    mapped = map_run(database, VolumetricRequest("hidden", 20))
+    document = map_answer(mapped)
     drawn = at_zero(mapped)
     assert drawn.axes == ("X", "Y", "Z")
-    joints = [joint.name for joint in mapped.known.chain.joints]
+    joints = [joint.name for joint in mapped.errors.chain.joints]
     assert joints.index("Z") < joints.index("Y")
     for column, axis in enumerate(drawn.axes):
         place = joints.index(axis)
-        sign = mapped.known.chain.joints[place].sign
+        sign = mapped.errors.chain.joints[place].sign
         np.testing.assert_array_equal(
             drawn.readings_mm[:, column], sign * mapped.error.positions[:343, place]
         )
-    assert [one["across"] for one in document["slices"]] == ["Z", "Y", "X"]
-    first = document["slices"][0]
+    assert [one.across for one in document.slices] == ["Z", "Y", "X"]
+    first = document.slices[0]
     corner = int(
         np.flatnonzero(
-            (drawn.readings_mm[:, 0] == first["first_mm"][0])
-            & (drawn.readings_mm[:, 1] == first["second_mm"][0])
-            & (abs(drawn.readings_mm[:, 2] - first["at_mm"]) < 1e-6)
+            (drawn.readings_mm[:, 0] == first.first_mm[0])
+            & (drawn.readings_mm[:, 1] == first.second_mm[0])
+            & (abs(drawn.readings_mm[:, 2] - first.at_mm) < 1e-6)
         )[0]
     )
-    assert first["first_um"][0][0] == pytest.approx(drawn.vectors_um[corner, 0], abs=1e-4)
-    assert first["second_um"][0][0] == pytest.approx(drawn.vectors_um[corner, 1], abs=1e-4)
+    assert first.first_um[0][0] == pytest.approx(drawn.vectors_um[corner, 0], abs=1e-4)
+    assert first.second_um[0][0] == pytest.approx(drawn.vectors_um[corner, 1], abs=1e-4)

@@ -10,8 +10,10 @@ import pytest
 
 from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import ChainMethod, methods
+from monitor.reporting.covariance_source import covariance_sentence
 from monitor.store import Database, load_campaign, load_identification
-from monitor.workflow import keeping
+from monitor.workflow import events
+from monitor.workflow.events import EventRequest, EventsRequest
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
@@ -19,12 +21,15 @@ from monitor.workflow.explain.versions import latest_campaign
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake import campaigns
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import add_effect, version_with
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.model.show import list_all_models
 from monitor.workflow.run_statistics.columns import run_columns
+from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import coordinates, stats
 from monitor.workflow.uncertainty.evaluation import evaluate
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -49,18 +54,18 @@ def test_one_run_alone_has_the_numbers_it_has_among_all(db: Database) -> None:
 
 
 def test_statistics_from_sums_by_hand(db: Database) -> None:
-    document = stats(db, "five-days")
+    document = stats(db, StatisticsRequest("five-days"))
     found = load_identification(db, "five-days", "samba", 1)
     place = found.parameters.index("EB0C")
     values = np.array([run.estimate[place] for run in found.runs]) / found.units[place].factor
     days = np.array([run.day for run in load_campaign(db, "five-days").runs])
-    one = document["parameters"]["EB0C"]
-    assert one["mean"] == pytest.approx(values.mean(), rel=1e-12)
-    assert one["u_all"] == pytest.approx(values.std(ddof=1), rel=1e-12)
+    one = document.parameters["EB0C"]
+    assert one.mean == pytest.approx(values.mean(), rel=1e-12)
+    assert one.u_all == pytest.approx(values.std(ddof=1), rel=1e-12)
     within = sum(((values[days == day] - values[days == day].mean()) ** 2).sum() for day in range(1, 6))
-    assert one["u_pooled"] == pytest.approx(np.sqrt(within / 15), rel=1e-12)
+    assert one.u_pooled == pytest.approx(np.sqrt(within / 15), rel=1e-12)
     for day in range(1, 6):
-        assert one["u_by_day"][str(day)] == pytest.approx(values[days == day].std(ddof=1), rel=1e-12)
+        assert one.u_by_day[str(day)] == pytest.approx(values[days == day].std(ddof=1), rel=1e-12)
 
 
 def test_columns_of_the_runs(db: Database) -> None:
@@ -81,8 +86,8 @@ def test_coordinates_only_where_all_runs_follow_one_plan(db: Database) -> None:
 def test_import_of_several_folders_names_what_came_before_a_refusal(tmp_path: Path) -> None:
     with Database(tmp_path / "x.duckdb") as own:
         with pytest.raises(InputError, match="In the database before it was met: cold-cold"):
-            campaigns.import_folders(own, [EXAMPLES / "cold-cold", tmp_path / "nope"])
-        assert campaigns.chosen(own, None) == ["cold-cold"]
+            import_folders(own, ImportRequest([EXAMPLES / "cold-cold", tmp_path / "nope"]))
+        assert campaigns.selected_campaigns(own, None) == ["cold-cold"]
 
 
 def test_no_campaign_yet(tmp_path: Path) -> None:
@@ -90,7 +95,7 @@ def test_no_campaign_yet(tmp_path: Path) -> None:
         Database(tmp_path / "x.duckdb") as own,
         pytest.raises(NotFoundError, match="no campaign yet; type `monitor import FOLDER`"),
     ):
-        campaigns.chosen(own, None)
+        campaigns.selected_campaigns(own, None)
 
 
 def test_a_base_effect_is_not_added(db: Database) -> None:
@@ -114,25 +119,26 @@ def test_history_is_that_of_the_campaign_last_looked_at(db: Database) -> None:
 @pytest.mark.parametrize("seed", [-1, 2**63])
 def test_seeds_that_cannot_be_stored(db: Database, seed: int) -> None:
     with pytest.raises(InputError, match="a seed is a whole number from 0"):
-        evaluate(db, "five-days", seed=seed)
+        evaluate(db, UncertaintyRequest("five-days", seed=seed))
+
+
+def covariance_of(db: Database, campaign: str) -> str:
+    """Where the covariance of a campaign's readings comes from, in words."""
+    return covariance_sentence(evaluate(db, UncertaintyRequest(campaign, method="guf")).covariance_source)
 
 
 def test_inputs_come_from_the_repeated_runs_where_there_are_enough(db: Database) -> None:
-    assert evaluate(db, "five-days", method="guf").input_covariance.startswith(
-        "repeated runs, pooled by day, 15"
-    )
-    assert evaluate(db, "cold-cold", method="guf").input_covariance.startswith(
-        "repeated runs, pooled by day, 43"
-    )
+    assert covariance_of(db, "five-days").startswith("repeated runs, pooled by day, 15")
+    assert covariance_of(db, "cold-cold").startswith("repeated runs, pooled by day, 43")
 
 
 def test_events_need_words_and_a_machine(db: Database) -> None:
     at = datetime.fromisoformat("2026-03-05T07:00:00-05:00")
     with pytest.raises(InputError, match="say in words what happened"):
-        keeping.record(db, "HU40-T", at, "note", " ")
+        events.record(db, EventRequest("HU40-T", at, "note", " "))
     with pytest.raises(NotFoundError, match="there is no machine 'NOPE'; there are HU40-T"):
-        keeping.events(db, "NOPE")
-    assert keeping.events(db)["events"] == []
+        events.events(db, EventsRequest("NOPE"))
+    assert events.events(db, EventsRequest()).events == ()
 
 
 def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: Path) -> None:

@@ -2,24 +2,47 @@
 
 from __future__ import annotations
 
+import dataclasses
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
 
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
-from monitor.cli.parser import common, told
+from monitor.cli.parser import common, described
+from monitor.documents import to_document
 from monitor.exceptions import InputError
-from monitor.workflow.certificate import checks as certificate_checks
-from monitor.workflow.certificate import issue as certificates
+from monitor.workflow.certificate.answer import (
+    CertificateFileAnswer,
+    CertificatesAnswer,
+    CertificateShowAnswer,
+)
+from monitor.workflow.certificate.issue import amend, issue, withdraw
+from monitor.workflow.certificate.remaking import remake
+from monitor.workflow.certificate.request import (
+    AmendmentRequest,
+    CertificateFileRequest,
+    CertificateRequest,
+    CertificateShowRequest,
+    CertificatesRequest,
+    RemakeRequest,
+    VerificationRequest,
+    WithdrawalRequest,
+)
+from monitor.workflow.certificate.states import (
+    list_certificates,
+    show_certificate,
+    write_digital,
+    write_issued,
+)
+from monitor.workflow.certificate.verification import verify_file
 
 EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/laboratory.toml"
 
 
 def options(parser: ArgumentParser) -> None:
     verbs = parser.add_subparsers(dest="what", metavar="issue|show|verify|amend|withdraw", required=True)
-    issued = verbs.add_parser("issue", **told("a certificate for one run", EXAMPLE))
+    issued = verbs.add_parser("issue", **described("a certificate for one run", EXAMPLE))
     issued.add_argument("campaign", metavar="CAMPAIGN")
     issued.add_argument(
         "--run", type=int, metavar="N", dest="number_of_run",
@@ -32,7 +55,9 @@ def options(parser: ArgumentParser) -> None:
     )
     issued.add_argument("--reason", default="", help="why it is replaced")
     issued.set_defaults(run=_issue)
-    shown = verbs.add_parser("show", **told("one certificate, or all", "monitor certificate show 2026-0001"))
+    shown = verbs.add_parser(
+        "show", **described("one certificate, or all", "monitor certificate show 2026-0001")
+    )
     shown.add_argument("number", nargs="?", metavar="NUMBER")
     shown.add_argument(
         "--remake", type=Path, metavar="PATH",
@@ -51,7 +76,7 @@ def options(parser: ArgumentParser) -> None:
     shown.set_defaults(run=_show)
     verified = verbs.add_parser(
         "verify",
-        **told(
+        **described(
             "is a file an unaltered certificate of this database?",
             "monitor certificate verify certificate-2026-0001.pdf",
         ),
@@ -63,7 +88,7 @@ def options(parser: ArgumentParser) -> None:
     verified.set_defaults(run=_verify)
     amended = verbs.add_parser(
         "amend",
-        **told(
+        **described(
             "a new certificate that replaces another and says so; the old one is marked",
             "monitor certificate amend 2026-0001 --laboratory laboratory.toml --reason 'wrong customer'",
         ),
@@ -78,106 +103,109 @@ def options(parser: ArgumentParser) -> None:
     amended.set_defaults(run=_amend)
     withdrawn = verbs.add_parser(
         "withdraw",
-        **told("mark as withdrawn", "monitor certificate withdraw 2026-0001 --reason 'the bar was damaged'"),
+        **described(
+            "mark as withdrawn", "monitor certificate withdraw 2026-0001 --reason 'the bar was damaged'"
+        ),
     )
     withdrawn.add_argument("number", metavar="NUMBER")
     withdrawn.add_argument("--reason", required=True)
     withdrawn.set_defaults(run=_withdraw)
-    for one in (issued, shown, verified, amended, withdrawn):
-        common(one)
+    for verb in (issued, shown, verified, amended, withdrawn):
+        common(verb)
 
 
 def _issue(options: Namespace) -> int:
+    request = CertificateRequest(
+        options.campaign, options.number_of_run, options.replaces, options.reason, draft=options.draft,
+        **issuing(options),
+    )  # fmt: skip
     with opened(options, threads=1) as db, output.working("issuing"):
-        found = certificates.issue(
-            db, options.campaign, options.number_of_run, options.laboratory, draft=options.draft,
-            replaces=options.replaces, reason=options.reason, **issuing(options),
-        )  # fmt: skip
-    return _issued(found, options.json)
+        answer = issue(db, request)
+    return _issued(answer, options.json)
 
 
 def _amend(options: Namespace) -> int:
+    request = AmendmentRequest(
+        options.replaces, options.reason, options.campaign, options.number_of_run, **issuing(options)
+    )
     with opened(options, threads=1) as db, output.working("issuing"):
-        found = certificates.amend(
-            db, options.replaces, options.laboratory, options.reason, campaign=options.campaign,
-            run=options.number_of_run, **issuing(options),
-        )  # fmt: skip
-    return _issued(found, options.json)
+        answer = amend(db, request)
+    return _issued(answer, options.json)
 
 
-def _issued(found: dict[str, Any], as_json: bool) -> int:
+def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
     if as_json:
-        output.document(found)
+        output.document(to_document(answer))
     else:
-        output.say(f"certificate {found['number']} ({found['state']}): {found['file']}")
+        output.say(f"certificate {answer.certificate.number} ({answer.certificate.state}): {answer.file}")
     return 0
 
 
 def _show(options: Namespace) -> int:
-    for wish, path in (("--remake", options.remake), ("--dcc", options.dcc), ("--pdf", options.pdf)):
+    writing = (("--remake", options.remake), ("--dcc", options.dcc), ("--pdf", options.pdf))
+    for option, path in writing:
         if path is not None and options.number is None:
             raise InputError(
-                f"{wish} needs the number of a certificate; `monitor certificate show` lists them"
+                f"{option} needs the number of a certificate; `monitor certificate show` lists them"
             )
     if options.remake is not None:
         return _remake(options)
-    for path, write in (
-        (options.dcc, certificate_checks.digital),
-        (options.pdf, certificate_checks.stored_file),
-    ):
+    for path, write in ((options.dcc, write_digital), (options.pdf, write_issued)):
         if path is not None:
             with opened(options) as db:
-                made = write(db, options.number, path)
-            output.document(made) if options.json else output.say(made["file"])
+                written = write(db, CertificateFileRequest(options.number, path))
+            output.document(to_document(written)) if options.json else output.say(written.file)
             return 0
     with opened(options) as db:
-        found = certificate_checks.show(db, options.number)
+        answer: CertificateShowAnswer | CertificatesAnswer = (
+            list_certificates(db, CertificatesRequest())
+            if options.number is None
+            else show_certificate(db, CertificateShowRequest(options.number))
+        )
     if options.json:
-        output.document(found)
+        output.document(to_document(answer))
         return 0
-    rows = [found] if options.number else found["certificates"]
-    plain = [{key: value for key, value in row.items() if key != "record"} for row in rows]
-    output.listing(plain, "no certificate was made yet")
+    states = (answer.certificate,) if isinstance(answer, CertificateShowAnswer) else answer.certificates
+    output.listing([to_document(state) for state in states], "no certificate was made yet")
     return 0
 
 
 def _remake(options: Namespace) -> int:
+    request = RemakeRequest(options.number, options.remake, tuple(options.font))
     with opened(options) as db, output.working("making it again"):
-        found = certificate_checks.remake(db, options.number, options.remake, options.font)
+        answer = remake(db, request)
     if options.json:
-        output.document(found)
+        output.document(to_document(answer))
     else:
         output.say(
-            f"certificate {found['number']} made again: {found['file']}, "
-            + ("the same to the last byte" if found["identical"] else f"NOT the same: {found['why']}")
+            f"certificate {answer.certificate.number} made again: {answer.file}, "
+            + ("the same to the last byte" if answer.identical else f"NOT the same: {answer.why}")
         )
-    return 0 if found["identical"] else 1
+    return 0 if answer.identical else 1
 
 
 def _verify(options: Namespace) -> int:
     with opened(options) as db, output.working("verifying"):
-        found = certificate_checks.verify(db, options.file, options.trust)
+        answer = verify_file(db, VerificationRequest(options.file, options.trust))
     if options.json:
-        output.document(found)
-    else:
-        for name, value in found["checks"].items():
-            output.say(f"{name:<10} {'not signed' if value is None else 'good' if value else 'FAILED'}")
-        if found["signer"] is not None:
-            output.say(
-                f"signed by {found['signer']}{'' if options.trust else ' (not checked against --trust)'}"
-            )
-        for fault in found["faults"]:
-            output.say(f"  {fault}")
-        name = options.file if found["number"] is None else f"certificate {found['number']}"
-        output.say(f"{name} is {'genuine and valid' if found['ok'] else 'NOT confirmed'}")
-    return 0 if found["ok"] else 1
+        output.document(to_document(answer))
+        return 0 if answer.ok else 1
+    for name, passed in dataclasses.asdict(answer.checks).items():
+        output.say(f"{name:<10} {'not signed' if passed is None else 'good' if passed else 'FAILED'}")
+    if answer.signer is not None:
+        output.say(f"signed by {answer.signer}{'' if options.trust else ' (not checked against --trust)'}")
+    for fault in answer.faults:
+        output.say(f"  {fault}")
+    name = options.file if answer.number is None else f"certificate {answer.number}"
+    output.say(f"{name} is {'genuine and valid' if answer.ok else 'NOT confirmed'}")
+    return 0 if answer.ok else 1
 
 
 def _withdraw(options: Namespace) -> int:
     with opened(options) as db:
-        found = certificates.withdraw(db, options.number, options.reason)
+        answer = withdraw(db, WithdrawalRequest(options.number, options.reason))
     if options.json:
-        output.document(found)
+        output.document(to_document(answer))
     else:
-        output.say(f"certificate {found['number']} is {found['state']}")
+        output.say(f"certificate {answer.number} is {answer.state}")
     return 0

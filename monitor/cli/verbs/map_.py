@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.workflow.volumetric.compensation import FORMATS, write_tables
-from monitor.workflow.volumetric.volumetric import POINTS, map_figures, volumetric_map
+from monitor.documents import to_document
+from monitor.workflow.volumetric.answer import VolumetricAnswer
+from monitor.workflow.volumetric.request import COMPENSATION_FORMATS, POINTS, VolumetricRequest
+from monitor.workflow.volumetric.volumetric import volumetric_map
 
 EXAMPLE = "monitor map five-days --run 20 --figures figures --compensation positioning-csv"
 
@@ -31,65 +34,78 @@ def options(parser: ArgumentParser) -> None:
         "-p", type=float, default=0.95, metavar="P", help="coverage probability (default 0.95)"
     )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw slices through the workspace")
-    parser.add_argument("--compensation", metavar="FORMAT", help=f"write tables: {' or '.join(FORMATS)}")
+    parser.add_argument(
+        "--compensation", metavar="FORMAT", help=f"write tables: {' or '.join(COMPENSATION_FORMATS)}"
+    )
     parser.add_argument(
         "--out", type=Path, default=Path("."), metavar="DIR", help="where the tables go (default: here)"
     )
 
 
 def run(options: Namespace) -> int:
+    request = VolumetricRequest(
+        options.campaign,
+        options.number,
+        model=options.model,
+        p=options.p,
+        points=options.points,
+        absolute=options.absolute,
+        figures=options.figures,
+        compensation=options.compensation,
+        out=options.out,
+    )
     # One transaction: files that cannot be written leave no result behind.
     with opened(options) as db, output.working("mapping"), db.transaction():
-        found, mapped = volumetric_map(
-            db, options.campaign, options.number, model=options.model, p=options.p, points=options.points,
-            absolute=options.absolute,
-        )  # fmt: skip
-        if options.figures is not None:
-            found["figures"] = map_figures(found, mapped, options.figures)
-        if options.compensation is not None:
-            found["tables"] = write_tables(mapped, options.compensation, options.out)
+        answer = volumetric_map(db, request)
     if options.json:
-        output.document(found)
-        return 0
-    region, worst = found["region"], found["worst"]
-    strokes = ", ".join(
-        f"{name} {low:.4g} to {high:.4g} mm" for name, (low, high) in region["readings_mm"].items()
-    )
-    output.say(
-        f"{found['campaign']}, run {found['run']}, model {found['model']}: volumetric error at {region['points']} "
-        f"points, {strokes} ({region['from']}), at {region['rotary_poses']} rotary "
-        f"pose{'s' if region['rotary_poses'] != 1 else ''}"
-    )
-    rows = [
-        [name, output.rounded(part["error_um"], part["expanded_um"]), output.two_digits(part['u_um']),
-         output.rounded(part["expanded_um"], part["expanded_um"])]
-        for name, part in (("worst point", worst), ("mean", found["mean"]), ("RMS", found["rms"]))
-    ]  # fmt: skip
-    output.table(
-        "",
-        ["length of the error", "µm", "u / µm", f"U / µm (k = {found['k']:.2f}, p = {found['p']:g})"],
-        rows,
-    )
-    output.say(f"worst at {_place(worst['at'])}: {_vector(worst['vector_um'])}")
-    largest = sorted(worst["by_parameter_um"].items(), key=lambda item: -abs(item[1]))[:4]
-    output.say("most of it from " + ", ".join(f"{name} ({value:+.1f} µm)" for name, value in largest))
-    if found["datum"] is not None:
-        output.say(
-            f"the workpiece's zero is set at {_place(found['datum'])}; --absolute leaves it where it is"
-        )
-    for one in found["left_out"]:
-        output.say(f"not in the map: {one['parameter']}: {one['why']}")
-    for file in (*found.get("figures", []), *found.get("tables", [])):
-        output.say(file)
+        output.document(to_document(answer))
+    else:
+        _say(answer)
     return 0
 
 
-def _place(at: dict[str, float]) -> str:
+def _say(answer: VolumetricAnswer) -> None:
+    region, worst = answer.region, answer.worst
+    strokes = ", ".join(
+        f"{name} {low:.4g} to {high:.4g} mm" for name, (low, high) in region.readings_mm.items()
+    )
+    output.say(
+        f"{answer.campaign}, run {answer.run}, model {answer.model}: volumetric error at {region.points} "
+        f"points, {strokes} ({region.origin}), at {region.rotary_poses} rotary "
+        f"pose{'s' if region.rotary_poses != 1 else ''}"
+    )
+    rows = [
+        [
+            name,
+            output.rounded(length.error_um, length.expanded_um),
+            output.two_digits(length.u_um),
+            output.rounded(length.expanded_um, length.expanded_um),
+        ]
+        for name, length in (("worst point", worst), ("mean", answer.mean), ("RMS", answer.rms))
+    ]
+    output.table(
+        "",
+        ["length of the error", "µm", "u / µm", f"U / µm (k = {answer.k:.2f}, p = {answer.p:g})"],
+        rows,
+    )
+    output.say(f"worst at {_place(worst.at)}: {_vector(worst.vector_um)}")
+    shares = (worst.by_parameter_um or {}).items()
+    largest = sorted(shares, key=lambda share: -abs(share[1]))[:4]
+    output.say("most of it from " + ", ".join(f"{name} ({share:+.1f} µm)" for name, share in largest))
+    if answer.datum is not None:
+        output.say(f"the workpiece's zero is set at {_place(answer.datum)}; --absolute leaves it where it is")
+    for omitted in answer.left_out:
+        output.say(f"not in the map: {omitted.parameter}: {omitted.why}")
+    for file in (*(answer.figures or ()), *(answer.tables or ())):
+        output.say(file)
+
+
+def _place(at: Mapping[str, float]) -> str:
     return ", ".join(
         f"{name.split('_')[0].upper()} {value:.4g}{'°' if name.endswith('_deg') else ' mm'}"
         for name, value in at.items()
     )
 
 
-def _vector(vector: dict[str, float]) -> str:
+def _vector(vector: Mapping[str, float]) -> str:
     return ", ".join(f"{axis} {value:+.1f} µm" for axis, value in vector.items())

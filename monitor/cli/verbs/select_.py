@@ -10,13 +10,22 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
 
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.documents import to_document
 from monitor.exceptions import InputError
-from monitor.workflow.selections import select, selections, side_by_side, side_by_side_figure
+from monitor.store import Database
+from monitor.workflow.selections.request import (
+    SelectionAnswer,
+    SelectionRequest,
+    SelectionsAnswer,
+    SelectionsRequest,
+    SideBySideAnswer,
+    SideBySideRequest,
+)
+from monitor.workflow.selections.select import select, selections
 
 EXAMPLE = (
     'monitor select hot-cold --name hot-cold-star --where "hours >= 6"\n'
@@ -43,42 +52,50 @@ def run(options: Namespace) -> int:
     if making and options.compare is not None:
         raise InputError("make the selection first, then --compare it")
     with opened(options, threads=1) as db, output.working("selecting"), db.transaction():
-        if making:
-            found = select(db, options.campaign, options.name, options.where)
-        elif options.compare is not None:
-            names = [name.strip() for name in options.compare.split(",") if name.strip()]
-            found = side_by_side(db, names, options.model)
-            if options.figures is not None:
-                found["figures"] = side_by_side_figure(found, options.figures)
-        else:
-            found = selections(db, options.campaign)
+        answer = _answer(db, options)
     if options.json:
-        output.document(found)
-    elif making:
+        output.document(to_document(answer))
+    elif isinstance(answer, SelectionAnswer):
         output.say(
-            f"{found['selection']}: {len(found['runs'])} runs of {found['campaign']} where {found['condition']}"
+            f"{answer.selection}: {len(answer.runs)} runs of {answer.campaign} where {answer.condition}"
         )
-    elif options.compare is not None:
-        _comparison(found)
+    elif isinstance(answer, SideBySideAnswer):
+        _comparison(answer)
     else:
-        output.listing(found["selections"], "there is no selection yet")
+        output.listing(to_document(answer)["selections"], "there is no selection yet")
     return 0
 
 
-def _comparison(found: dict[str, Any]) -> None:
-    parts = found["selections"]
-    units: dict[str, str] = {}
-    for one in parts.values():
-        units |= one["units"]
+def _answer(db: Database, options: Namespace) -> SelectionAnswer | SideBySideAnswer | SelectionsAnswer:
+    if options.name is not None:
+        return select(db, SelectionRequest(options.campaign, options.name, options.where))
+    if options.compare is not None:
+        names = tuple(name.strip() for name in options.compare.split(",") if name.strip())
+        # Loaded here: what compares waits for the solver, what selects or lists does not.
+        from monitor.workflow.selections.side_by_side import side_by_side
+
+        return side_by_side(db, SideBySideRequest(names, options.model, figures=options.figures))
+    return selections(db, SelectionsRequest(options.campaign))
+
+
+def _comparison(answer: SideBySideAnswer) -> None:
+    scatters = answer.selections
     rows = [
-        [name, unit, *(
-            output.two_digits(one["expanded"][name]) if name in one["expanded"] else "-" for one in parts.values()
-        )]
-        for name, unit in units.items()
-    ]  # fmt: skip
+        [
+            name,
+            unit,
+            *(
+                output.two_digits(scatter.expanded[name]) if name in scatter.expanded else "-"
+                for scatter in scatters.values()
+            ),
+        ]
+        for name, unit in answer.units.items()
+    ]
     output.table(
-        f"expanded uncertainty U = k_q u of a calibration, all parameters together with p = {found['p']:g}",
-        ["parameter", "unit", *(f"{name} ({one['runs']} runs)" for name, one in parts.items())], rows, text_columns=2,
-    )  # fmt: skip
-    for file in found.get("figures", []):
+        f"expanded uncertainty U = k_q u of a calibration, all parameters together with p = {answer.p:g}",
+        ["parameter", "unit", *(f"{name} ({scatter.runs} runs)" for name, scatter in scatters.items())],
+        rows,
+        text_columns=2,
+    )
+    for file in answer.figures or ():
         output.say(file)

@@ -13,7 +13,9 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.store import load_campaign, load_identification
+from monitor.documents import to_document
+from monitor.workflow.run_statistics.answer import DIFFERENT, NoVectorTest, StatisticsAnswer, VectorTestAnswer
+from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import stats
 
 EXAMPLE = "monitor stats five-days --by day --figures figures"
@@ -35,68 +37,70 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
+    request = StatisticsRequest(
+        options.campaign,
+        by=options.by,
+        where=options.where,
+        model=options.model,
+        select=options.select,
+        matrices=options.matrices,
+        figures=options.figures,
+    )
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options, threads=1) as db, output.working("computing"), db.transaction():
-        found = stats(
-            db, options.campaign, options.by, options.where, options.model, options.select, options.matrices
-        )
-        if options.figures is not None:
-            from monitor.workflow.run_statistics.figures import statistics_figure
-
-            days = {one.run: one.day for one in load_campaign(db, options.campaign).runs}
-            found["figures"] = statistics_figure(
-                found, load_identification(db, options.campaign), days, options.figures
-            )
+        answer = stats(db, request)
     if options.json:
-        output.document(found)
+        output.document(to_document(answer))
         return 0
-    groups = ", ".join(f"{label}: {count}" for label, count in found["groups"].items())
+    _parameters(answer)
+    if answer.moved:
+        output.say(
+            f"the groups differ in {', '.join(answer.moved)} (ANOVA, false discovery rate q below {DIFFERENT:g})"
+        )
+    _vector("equal covariances", answer.vector.box_m)
+    _vector("equal means", answer.vector.manova)
+    for name in answer.drift.drifts:
+        drift = answer.drift.parameters[name]
+        output.say(
+            f"{name} drifts within the day: {output.rounded(drift.per_hour, drift.u)} {drift.unit} "
+            f"(u = {output.two_digits(drift.u)} {drift.unit}, q = {output.probability(drift.q_value)})"
+        )
+    tested = [p for p in answer.coordinates.anova_p if p is not None]
+    if tested:
+        below = sum(p < 0.05 for p in tested)
+        output.say(f"probed coordinates: {len(tested)}; ANOVA p below 0.05 in {below} of them")
+    for file in (*(answer.matrices or ()), *(answer.figures or ())):
+        output.say(file)
+    return 0
+
+
+def _parameters(answer: StatisticsAnswer) -> None:
+    """The table of the parameters."""
+    groups = ", ".join(f"{label}: {count}" for label, count in answer.groups.items())
     rows = [
         [
             name,
-            one["unit"],
-            output.rounded(one["mean"], one["u_all"]),
-            output.two_digits(one["u_all"]),
-            output.two_digits(one["u_pooled"]),
-            output.probability(one["bartlett_p"]),
-            output.probability(one["anova_p"]),
-            output.probability(one["anova_q"]),
-            output.probability(one["normality_p"]),
+            parameter.unit,
+            output.rounded(parameter.mean, parameter.u_all),
+            output.two_digits(parameter.u_all),
+            output.two_digits(parameter.u_pooled),
+            output.probability(parameter.bartlett_p),
+            output.probability(parameter.anova_p),
+            output.probability(parameter.anova_q),
+            output.probability(parameter.normality_p),
         ]
-        for name, one in found["parameters"].items()
+        for name, parameter in answer.parameters.items()
     ]
     output.table(
-        f"{found['campaign']}, runs by {found['by']} ({groups})",
+        f"{answer.campaign}, runs by {answer.by} ({groups})",
         ["parameter", "unit", "mean", "u all", "u pooled", "Bartlett p", "ANOVA p", "ANOVA q", "normal p"],
         rows,
         text_columns=2,
     )
-    moved = [
-        name
-        for name, one in found["parameters"].items()
-        if one["anova_q"] is not None and one["anova_q"] < 0.001
-    ]
-    if moved:
-        output.say(f"the groups differ in {', '.join(moved)} (ANOVA, false discovery rate q below 0.001)")
-    for name in ("box_m", "manova"):
-        test = found["vector"][name]
-        words = "equal covariances" if name == "box_m" else "equal means"
-        if test["why"] is None:
-            output.say(
-                f"all parameters together, {words} ({test['name']}): {output.stated('p', test['p_value'])}"
-            )
-        else:
-            output.say(f"all parameters together, {words}: not tested. {test['why']}")
-    for name in found["drift"]["drifts"]:
-        one = found["drift"]["parameters"][name]
-        output.say(
-            f"{name} drifts within the day: {output.rounded(one['per_hour'], one['u'])} {one['unit']} "
-            f"(u = {output.two_digits(one['u'])} {one['unit']}, q = {output.probability(one['q_value'])})"
-        )
-    tested = [p for p in found["coordinates"]["anova_p"] if p is not None]
-    if tested:
-        below = sum(p < 0.05 for p in tested)
-        output.say(f"probed coordinates: {len(tested)}; ANOVA p below 0.05 in {below} of them")
-    for file in (*found.get("matrices", []), *found.get("figures", [])):
-        output.say(file)
-    return 0
+
+
+def _vector(hypothesis: str, test: VectorTestAnswer | NoVectorTest) -> None:
+    if isinstance(test, NoVectorTest):
+        output.say(f"all parameters together, {hypothesis}: not tested. {test.why}")
+    else:
+        output.say(f"all parameters together, {hypothesis} ({test.name}): {output.stated('p', test.p_value)}")

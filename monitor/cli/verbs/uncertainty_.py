@@ -8,8 +8,11 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.documents import to_document
 from monitor.readers import read_linear_axes
+from monitor.workflow.uncertainty.answer import MonteCarloAnswer, UncertaintyAnswer, ValidationAnswer
 from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 EXAMPLE = "monitor uncertainty five-days --run 20 --method guf"
 
@@ -49,62 +52,92 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
+    request = UncertaintyRequest(
+        options.campaign,
+        options.number,
+        model=options.model,
+        method=options.method,
+        digits=options.digits,
+        seed=options.seed,
+        p=options.p,
+        select=options.select,
+        model_uncertainty=not options.no_model_uncertainty,
+        workers=options.workers,
+        cluster=options.cluster,
+        linear_axes=None if options.linear_axes is None else read_linear_axes(options.linear_axes),
+    )
     with opened(options) as db, output.working("propagating"):
-        found = uncertainty(
-            db, options.campaign, options.number, model=options.model, method=options.method, digits=options.digits,
-            seed=options.seed, p=options.p, select=options.select, model_uncertainty=not options.no_model_uncertainty,
-            workers=options.workers, cluster=options.cluster,
-            linear_axes=None if options.linear_axes is None else read_linear_axes(options.linear_axes),
-        )  # fmt: skip
+        answer = uncertainty(db, request)
     if options.json:
-        output.document(found)
+        output.document(to_document(answer))
         return 0
-    guf, mcm = found["guf"], found.get("mcm")
-    columns = ["parameter", "unit", "estimate", "u (GUF)", *(["u (Monte Carlo)"] if mcm else []), "U = k_q u"]
-    rows = []
-    for name in found["parameters"]:
-        u, expanded = guf["u"][name], guf["expanded"][name]
-        more = [output.two_digits(mcm["u"][name])] if mcm else []
-        rows.append(
-            [name, found["units"][name], output.rounded(guf["estimate"][name], expanded), output.two_digits(u), *more,
-             output.rounded(expanded, expanded)]
-        )  # fmt: skip
-    output.table(
-        f"{found['campaign']}, run {found['run']}, model {found['model']}", columns, rows, text_columns=2
-    )
-    count, p = len(found["parameters"]), found["p"]
-    output.say(f"readings: {found['input_covariance']}")
-    output.say(
-        f"all {count} together with p = {p:g}: intervals U = {guf['k_q_with_degrees_of_freedom']:.2f} u (k_q), "
-        f"ellipsoid k_p = {guf['k_p_with_degrees_of_freedom'] or float('inf'):.2f}; for a known covariance (JCGM 102) "
-        f"k_q = {guf['k_q']:.2f}, k_p = {guf['k_p']:.2f}"
-    )
-    output.say(f"k = 2 each would hold all {count} with only {100 * guf['joint_coverage_of_k_2_each']:.0f} %")
-    if mcm:
-        output.say(
-            f"Monte Carlo: {mcm['trials']} trials in {mcm['seconds']:.1f} s, {mcm['not_converged']} not converged, "
-            f"{'stable' if mcm['stable'] else 'not stable yet'}; k_q = {mcm['k_q']:.2f}, k_p = {mcm['k_p']:.2f}"
-        )
-    if "validation" in found:
-        failed = [
-            name for name, value in found["validation"]["differences"].items()
-            if abs(value) > found["validation"]["tolerances"][name]
-        ]  # fmt: skip
-        verdict = (
-            "passed" if found["validation"]["passed"] else f"not passed: {', '.join(failed) or 'undecided'}"
-        )
-        output.say(f"validation of the framework by Monte Carlo (JCGM 102, 8): {verdict}")
-        if failed == ["k_q"] and mcm is not None and guf["k_q"] > mcm["k_q"]:
-            output.say(
-                f"   the framework's k_q = {guf['k_q']:.2f} holds whatever the correlations (Bonferroni); these would "
-                f"allow {mcm['k_q']:.2f}, so its intervals are on the safe side"
-            )
-    if "lack_of_fit_causes" in found:
-        causes = ", ".join(one["effect"] for one in found["lack_of_fit_causes"][:3])
+    _parameters(answer)
+    _coverage(answer)
+    if answer.mcm is not None:
+        _monte_carlo(answer.mcm)
+    if answer.validation is not None:
+        _validation(answer, answer.validation)
+    if answer.lack_of_fit_causes is not None:
+        causes = ", ".join(cause.effect for cause in answer.lack_of_fit_causes[:3])
         output.say(
             f"the model does not explain all: what effects such as {causes} would do to the parameters, none of them "
-            f"confirmed, is a line of the budget; `monitor explain {found['campaign']}` tests which one is missing"
+            f"confirmed, is a line of the budget; `monitor explain {answer.campaign}` tests which one is missing"
         )
-    for refusal in found["refused"]:
-        output.say(f"no number: {refusal['why']}")
+    for refusal in answer.refused:
+        output.say(f"no number: {refusal.why}")
     return 0
+
+
+def _parameters(answer: UncertaintyAnswer) -> None:
+    """The table of the parameters."""
+    framework, sampled = answer.guf, answer.mcm
+    of_sampled = ["u (Monte Carlo)"] if sampled is not None else []
+    columns = ["parameter", "unit", "estimate", "u (GUF)", *of_sampled, "U = k_q u"]
+    rows = []
+    for name in answer.parameters:
+        expanded = framework.expanded[name]
+        rows.append(
+            [
+                name,
+                answer.units[name],
+                output.rounded(framework.estimate[name], expanded),
+                output.two_digits(framework.u[name]),
+                *([output.two_digits(sampled.u[name])] if sampled is not None else []),
+                output.rounded(expanded, expanded),
+            ]
+        )
+    output.table(f"{answer.campaign}, run {answer.run}, model {answer.model}", columns, rows, text_columns=2)
+
+
+def _coverage(answer: UncertaintyAnswer) -> None:
+    """Where the readings' covariance is from, and the factors for all parameters together."""
+    framework, count = answer.guf, len(answer.parameters)
+    output.say(f"readings: {answer.input_covariance}")
+    output.say(
+        f"all {count} together with p = {answer.p:g}: intervals U = {framework.k_q_with_degrees_of_freedom:.2f} u "
+        f"(k_q), ellipsoid k_p = {framework.k_p_with_degrees_of_freedom or float('inf'):.2f}; for a known covariance "
+        f"(JCGM 102) k_q = {framework.k_q:.2f}, k_p = {framework.k_p:.2f}"
+    )
+    if framework.joint_coverage_of_k_2_each is not None:
+        output.say(
+            f"k = 2 each would hold all {count} with only {100 * framework.joint_coverage_of_k_2_each:.0f} %"
+        )
+
+
+def _monte_carlo(sampled: MonteCarloAnswer) -> None:
+    output.say(
+        f"Monte Carlo: {sampled.trials} trials in {sampled.seconds:.1f} s, {sampled.not_converged} not converged, "
+        f"{'stable' if sampled.stable else 'not stable yet'}; k_q = {sampled.k_q:.2f}, k_p = {sampled.k_p:.2f}"
+    )
+
+
+def _validation(answer: UncertaintyAnswer, validation: ValidationAnswer) -> None:
+    failed = ", ".join(validation.failed) or "undecided"
+    verdict = "passed" if validation.passed else f"not passed: {failed}"
+    output.say(f"validation of the framework by Monte Carlo (JCGM 102, 8): {verdict}")
+    framework, sampled = answer.guf, answer.mcm
+    if validation.failed == ("k_q",) and sampled is not None and framework.k_q > sampled.k_q:
+        output.say(
+            f"   the framework's k_q = {framework.k_q:.2f} holds whatever the correlations (Bonferroni); these would "
+            f"allow {sampled.k_q:.2f}, so its intervals are on the safe side"
+        )

@@ -6,6 +6,7 @@ Each item has one origin. What none of the three knows stays None and makes the 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import date
 
 from monitor import __version__
@@ -23,39 +24,44 @@ from monitor.units import COLUMN_UNITS
 _CONDITION_WORDS = {"ambient_degC": "ambient", "humidity_percent": "humidity", "pressure_hPa": "pressure"}
 
 
+@dataclass(frozen=True)
+class CertificateIdentity:
+    """Number and day of a certificate, the stored model's name and version; ``method_name`` replaces the campaign's
+    word for its method."""
+
+    number: str | None
+    issued_on: date | None
+    model: str | None
+    method_name: str | None = None
+
+
 def certificate_record(
     laboratory: LaboratoryFile,
     campaign: Campaign,
     runs: int | Sequence[int],
     results: Sequence[ResultSet],
-    *,
-    number: str | None,
-    issued_on: date | None,
-    model: str | None,
-    method_name: str | None = None,
+    identity: CertificateIdentity,
     volumetric: Sequence[VolumetricResult] = (),
 ) -> CertificateRecord:
     """The record for one run of a campaign, or for two: as found and as left, in the order of ``results``.
 
-    ``model`` is the stored model's name and version.
-
-    ``method_name`` replaces the campaign's word for its method. The words around the numbers are in the laboratory's
+    The words around the numbers are in the laboratory's
     language. Nothing is checked here: see ``check_complete``. Raises NotFoundError where the campaign has no such run.
     """
-    chosen = [_run_of(campaign, run) for run in ([runs] if isinstance(runs, int) else runs)]
-    days = [one.started_at.date() for one in chosen]
+    certified = [_run_of(campaign, run) for run in ([runs] if isinstance(runs, int) else runs)]
+    days = [run.started_at.date() for run in certified]
     machine = campaign.machine
     texts = texts_of(laboratory.language or ENGLISH)
     return CertificateRecord(
         title=laboratory.title,
         laboratory=laboratory.laboratory,
         place=laboratory.place or machine.location,
-        number=number,
+        number=identity.number,
         customer=laboratory.customer,
         method=MethodUsed(
-            name=method_name or campaign.method,
+            name=identity.method_name or campaign.method,
             document=laboratory.method_document,
-            model=model,
+            model=identity.model,
             software=f"machine-health-monitor {__version__}",
         ),
         item=Item(
@@ -65,7 +71,7 @@ def certificate_record(
         ),
         received_on=laboratory.received_on,
         performed_on=(min(days), max(days)),
-        issued_on=issued_on,
+        issued_on=identity.issued_on,
         sampling=laboratory.sampling,
         relates_only=laboratory.relates_only,
         results=tuple(results),
@@ -73,7 +79,7 @@ def certificate_record(
         authorised_by=laboratory.authorised_by,
         external_results=laboratory.external_results,
         reproduction=laboratory.reproduction,
-        conditions=_conditions_of(campaign, chosen, [one.state for one in results], texts),
+        conditions=_conditions_of(campaign, certified, [result.state for result in results], texts),
         traceability=laboratory.traceability,
         references=_references(laboratory, campaign, texts),
         adjustment=laboratory.adjustment,
@@ -90,8 +96,8 @@ def _run_of(campaign: Campaign, run: int) -> Run:
     for candidate in campaign.runs:
         if candidate.run == run:
             return candidate
-    there = ", ".join(str(candidate.run) for candidate in campaign.runs)
-    raise NotFoundError(f"campaign {campaign.name} has no run {run}; it has {there}")
+    numbers = ", ".join(str(candidate.run) for candidate in campaign.runs)
+    raise NotFoundError(f"campaign {campaign.name} has no run {run}; it has {numbers}")
 
 
 def _description(machine: Machine, texts: Texts) -> str:
@@ -114,13 +120,13 @@ def _conditions_of(
     if len(each) == 1:
         return each[0]
     shared = set(each[0]).intersection(*each[1:])
-    own = [
-        Condition(f"{one.name}, {state}", one.value)
+    of_one_state = [
+        Condition(f"{condition.name}, {state}", condition.value)
         for conditions, state in zip(each, states, strict=True)
-        for one in conditions
-        if one not in shared
+        for condition in conditions
+        if condition not in shared
     ]
-    return (*own, *(one for one in each[0] if one in shared))
+    return (*of_one_state, *(condition for condition in each[0] if condition in shared))
 
 
 def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, ...]:
@@ -174,9 +180,9 @@ def _with_unit(name: str, value: float, texts: Texts) -> str:
 def _references(laboratory: LaboratoryFile, campaign: Campaign, texts: Texts) -> tuple[Reference, ...]:
     probe, bar = campaign.probe, campaign.artefact.scale_bar
     name = texts("record.probe", id=probe.id, model=probe.model)
-    found = [Reference(name, probe.certificate or laboratory.probe)]
+    references = [Reference(name, probe.certificate or laboratory.probe)]
     if bar is not None:
         first, second = bar.balls
         name = texts("record.bar", first=first, second=second)
-        found.insert(0, Reference(name, bar.certificate or laboratory.scale_bar))
-    return tuple(found)
+        references.insert(0, Reference(name, bar.certificate or laboratory.scale_bar))
+    return tuple(references)

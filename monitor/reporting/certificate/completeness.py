@@ -45,12 +45,12 @@ class IncompleteCertificateError(InputError):
 
 def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
     """Every item that is None, empty or says nothing, and every such part of an item, in the order of the record."""
-    found: list[MissingItem] = []
+    missing: list[MissingItem] = []
     for name, (clause, item) in ITEMS.items():
-        found += [MissingItem(clause, item, part) for part in _gaps(getattr(record, name))]
+        missing += [MissingItem(clause, item, part) for part in _gaps(getattr(record, name))]
     if record.replaces is not None:
-        found += [MissingItem(*AMENDMENT, part) for part in _gaps(record.replaces)]
-    return tuple(found)
+        missing += [MissingItem(*AMENDMENT, part) for part in _gaps(record.replaces)]
+    return tuple(missing)
 
 
 def date_faults(record: CertificateRecord) -> tuple[str, ...]:
@@ -99,9 +99,9 @@ def _gaps(value: object) -> list[str]:
         return list(value.gaps())
     if dataclasses.is_dataclass(value):
         return [
-            _within(place.name, gap)
-            for place in dataclasses.fields(value)
-            for gap in _gaps(getattr(value, place.name))
+            _within(part.name, gap)
+            for part in dataclasses.fields(value)
+            for gap in _gaps(getattr(value, part.name))
         ]
     return []
 

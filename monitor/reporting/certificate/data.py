@@ -44,28 +44,33 @@ def certificate_files(
     files = [Attached("certificate.json", text.encode(), texts("files.record"), "Source")]
     if record.country is not None:
         files.append(Attached("certificate.dcc.xml", dcc_xml(record), texts("files.dcc"), "Alternative"))
-    for place, result in enumerate(record.results or (), start=1):
-        words = texts("files.results", state=result.state)
-        files.append(Attached(f"results-{place}.csv", _estimates(result), words, "Data"))
-        words = texts("files.covariance", state=result.state)
-        files.append(Attached(f"covariance-{place}.csv", _covariance(result), words, "Data"))
-    for place, found in enumerate(record.volumetric, start=1):
-        words = texts("files.map", state=found.state)
-        files.append(Attached(POINTS_FILE.format(place=place), _points(found), words, "Data"))
+    for number, result in enumerate(record.results or (), start=1):
+        description = texts("files.results", state=result.state)
+        files.append(Attached(f"results-{number}.csv", _estimates(result), description, "Data"))
+        description = texts("files.covariance", state=result.state)
+        files.append(Attached(f"covariance-{number}.csv", _covariance(result), description, "Data"))
+    for number, volumetric in enumerate(record.volumetric, start=1):
+        description = texts("files.map", state=volumetric.state)
+        files.append(Attached(POINTS_FILE.format(place=number), _points(volumetric), description, "Data"))
     return tuple(files)
 
 
-def _points(found: VolumetricResult) -> bytes:
-    head = [f"{axis}_mm" for axis in found.axes] + ["error_x_um", "error_y_um", "error_z_um", "expanded_um"]
-    numbers = np.column_stack([found.readings_mm, found.vectors_um, found.expanded_um])
+def _points(volumetric: VolumetricResult) -> bytes:
+    head = [f"{axis}_mm" for axis in volumetric.axes] + [
+        "error_x_um",
+        "error_y_um",
+        "error_z_um",
+        "expanded_um",
+    ]
+    numbers = np.column_stack([volumetric.readings_mm, volumetric.vectors_um, volumetric.expanded_um])
     return _table([head, *([repr(float(number)) for number in row] for row in numbers)])
 
 
 def _estimates(result: ResultSet) -> bytes:
     limits = np.full(len(result.names), np.nan) if result.tolerances is None else result.tolerances
     rows = [
-        [name, words, unit, *(repr(float(number)) for number in (value, u, expanded)), _limit(limit)]
-        for name, words, unit, value, u, expanded, limit in zip(
+        [name, description, unit, *(repr(float(number)) for number in (value, u, expanded)), _limit(limit)]
+        for name, description, unit, value, u, expanded, limit in zip(
             result.names, result.descriptions, result.units, result.estimate, result.u, result.expanded, limits,
             strict=True,
         )

@@ -23,6 +23,7 @@ from monitor.reporting.certificate.record import (
     ConformityStatement,
     Party,
     Replaced,
+    Verdict,
 )
 from monitor.reporting.certificate.words import amendment, answer, verdict_words
 from monitor.reporting.numbers import decimal_of
@@ -33,11 +34,11 @@ _XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
 #: The schema's word for a verdict (stringConformityStatementStatusType).
 _STATUS = {
-    "pass": "pass",
-    "fail": "fail",
-    "conditional pass": "conditionalPass",
-    "conditional fail": "conditionalFail",
-    "undecided": "noPass",
+    Verdict.PASS: "pass",
+    Verdict.FAIL: "fail",
+    Verdict.CONDITIONAL_PASS: "conditionalPass",
+    Verdict.CONDITIONAL_FAIL: "conditionalFail",
+    Verdict.UNDECIDED: "noPass",
 }
 
 
@@ -62,8 +63,8 @@ def dcc_xml(record: CertificateRecord) -> bytes:
     results = add(root, "measurementResults")
     for result in record.results or ():
         geometric_errors(add(results, "measurementResult"), record, result, texts)
-    for found in record.volumetric:
-        volumetric_error(add(results, "measurementResult"), record, found, texts)
+    for volumetric in record.volumetric:
+        volumetric_error(add(results, "measurementResult"), record, volumetric, texts)
     ET.indent(root, " ")
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
 
@@ -109,11 +110,11 @@ def _administrative(parent: ET.Element, record: CertificateRecord, texts: Texts)
     add(identification, "value", record.item.identification)
     _contact(add(add(parent, "calibrationLaboratory"), "contact"), record.laboratory, language)
     people = add(parent, "respPersons")
-    for place, person in enumerate(record.authorised_by or ()):
-        one = add(people, "respPerson")
-        say(add(one, "person"), "name", str(person.name), language)
-        add(one, "role", person.function)
-        add(one, "mainSigner", "true" if place == 0 else "false")
+    for index, person in enumerate(record.authorised_by or ()):
+        responsible = add(people, "respPerson")
+        say(add(responsible, "person"), "name", str(person.name), language)
+        add(responsible, "role", person.function)
+        add(responsible, "mainSigner", "true" if index == 0 else "false")
     _contact(add(parent, "customer"), record.customer, language)
     _statements(add(parent, "statements"), record, texts)
 
@@ -145,14 +146,14 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
     conformity = record.conformity
     if isinstance(conformity, ConformityStatement):
         for verdict in conformity.verdicts:
-            one = add(parent, "statement")
+            statement = add(parent, "statement")
             say(
-                one,
+                statement,
                 "name",
                 texts("dcc.conformity_of", name=verdict.name, state=conformity.state),
                 texts.language,
             )
-            words = texts(
+            declaration = texts(
                 "dcc.verdict",
                 verdict=verdict_words(verdict.verdict, texts),
                 tolerance=texts.number(decimal_of(verdict.tolerance)),
@@ -162,8 +163,8 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
                 risk=conformity.risk,
                 basis=conformity.basis,
             )
-            say(one, "declaration", words, texts.language)
-            add(one, "conformity", _STATUS[verdict.verdict])
+            say(statement, "declaration", declaration, texts.language)
+            add(statement, "conformity", _STATUS[verdict.verdict])
     statements = [
         ("title", record.title),
         ("place", record.place),
@@ -182,11 +183,11 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
     ]
     named = [(texts(f"dcc.{key}"), value) for key, value in statements]
     named[3:3] = [
-        (texts("dcc.standard", name=one.name), answer(one.certificate, texts))
-        for one in record.references or ()
+        (texts("dcc.standard", name=statement.name), answer(statement.certificate, texts))
+        for statement in record.references or ()
     ]
     for name, value in named:
         if value:
-            one = add(parent, "statement")
-            say(one, "name", name, texts.language)
-            say(one, "declaration", value, texts.language)
+            statement = add(parent, "statement")
+            say(statement, "name", name, texts.language)
+            say(statement, "declaration", value, texts.language)

@@ -71,37 +71,39 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
     say(parent, "name", texts("dcc.result", state=result.state), texts.language)
     results = _results(parent, record, result.evaluation, texts)
     for region, factor in (("ellipsoidal", result.k_p), ("rectangular", result.k_q)):
-        one = add(results, "result")
-        say(one, "name", texts(f"dcc.{region}"), texts.language)
-        say(one, "description", texts(f"dcc.{region}_words", rank=result.rank), texts.language)
-        quantity = add(add(one, "data"), "quantity")
+        element = add(results, "result")
+        say(element, "name", texts(f"dcc.{region}"), texts.language)
+        say(element, "description", texts(f"dcc.{region}_words", rank=result.rank), texts.language)
+        quantity = add(add(element, "data"), "quantity")
         say(quantity, "name", "; ".join(result.descriptions), texts.language)
         _values(quantity, result, region, factor)
     for refusal in result.refused:
-        one = add(results, "result")
-        say(one, "name", texts("dcc.refused", parameters=", ".join(refusal.parameters)), texts.language)
-        say(add(one, "data"), "text", texts.computed(refusal.why), texts.language)
+        element = add(results, "result")
+        say(element, "name", texts("dcc.refused", parameters=", ".join(refusal.parameters)), texts.language)
+        say(add(element, "data"), "text", texts.computed(refusal.why), texts.language)
 
 
 def volumetric_error(
-    parent: ET.Element, record: CertificateRecord, found: VolumetricResult, texts: Texts
+    parent: ET.Element, record: CertificateRecord, volumetric: VolumetricResult, texts: Texts
 ) -> None:
     """The largest, mean and RMS volumetric error of the region, each with its own expanded uncertainty."""
-    say(parent, "name", texts("dcc.map", state=found.state), texts.language)
-    printed = printed_map(found, texts)
+    say(parent, "name", texts("dcc.map", state=volumetric.state), texts.language)
+    printed = printed_map(volumetric, texts)
     results = _results(parent, record, printed.explained, texts)
-    for length, (name, where, _) in zip((found.largest, found.rms, found.mean), printed.rows, strict=True):
-        one = add(results, "result")
-        say(one, "name", name, texts.language)
-        say(one, "description", where, texts.language)
-        quantity = add(add(one, "data"), "quantity")
+    for length, (name, where, _) in zip(
+        (volumetric.largest, volumetric.rms, volumetric.mean), printed.rows, strict=True
+    ):
+        element = add(results, "result")
+        say(element, "name", name, texts.language)
+        say(element, "description", where, texts.language)
+        quantity = add(add(element, "data"), "quantity")
         real = add(quantity, "real", space=SI)
         add(real, "value", _number(length.value_um), SI)
         add(real, "unit", unit_of("µm"), SI)
         around = add(real, "expandedUnc", space=SI)
         add(around, "uncertainty", _number(length.expanded_um), SI)
-        add(around, "coverageFactor", _number(found.k), SI)
-        add(around, "coverageProbability", _number(found.p), SI)
+        add(around, "coverageFactor", _number(volumetric.k), SI)
+        add(around, "coverageProbability", _number(volumetric.p), SI)
 
 
 def _results(parent: ET.Element, record: CertificateRecord, evaluation: str, texts: Texts) -> ET.Element:
@@ -109,10 +111,10 @@ def _results(parent: ET.Element, record: CertificateRecord, evaluation: str, tex
     assert record.method is not None  # complete: dcc_xml has checked it
     method = add(add(parent, "usedMethods"), "usedMethod")
     say(method, "name", str(record.method.name), texts.language)
-    words = texts(
+    explanation = texts(
         "dcc.method", document=record.method.document, model=record.method.model, evaluation=evaluation
     )
-    say(method, "description", words, texts.language)
+    say(method, "description", explanation, texts.language)
     conditions = add(parent, "influenceConditions")
     for condition in record.conditions or ():
         one = add(conditions, "influenceCondition")
@@ -129,11 +131,11 @@ def _values(parent: ET.Element, result: ResultSet, region: str, factor: float) -
     add(values, "unitXMLList", " ".join(units), SI)
     around = add(values, f"{region}RegionXMLList", space=SI)
     matrix = add(around, "covarianceMatrix", space=SI)
-    for place, unit in enumerate(units):
+    for index, unit in enumerate(units):
         column = add(matrix, "column", space=SI)
         for other, second in enumerate(units):
             element = add(column, "covariance", space=SI)
-            add(element, "value", _number(float(result.covariance[other, place])), SI)
+            add(element, "value", _number(float(result.covariance[other, index])), SI)
             add(element, "unit", second + unit, SI)
     add(around, "coverageFactor", _number(factor), SI)
     add(around, "coverageProbability", _number(result.p), SI)

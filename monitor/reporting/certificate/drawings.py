@@ -62,13 +62,13 @@ def _pages(result: ResultSet, limits: Array) -> list[list[_Panel]]:
     room = TALLEST_MM * SCALE
     most = int((room - _AROUND) // _ROW)
     for unit in dict.fromkeys(result.units):
-        left = [place for place, own in enumerate(result.units) if own == unit]
-        across = _range(result, limits, left)
+        of_unit = [index for index, other in enumerate(result.units) if other == unit]
+        across = _range(result, limits, of_unit)
         # Pieces of nearly the same length.
-        pieces = -(-len(left) // most)
-        each = -(-len(left) // pieces)
-        for first in range(0, len(left), each):
-            part = tuple(left[first : first + each])
+        pieces = -(-len(of_unit) // most)
+        each = -(-len(of_unit) // pieces)
+        for first in range(0, len(of_unit), each):
+            part = tuple(of_unit[first : first + each])
             height = len(part) * _ROW + _AROUND
             if height > room and pages[-1]:
                 pages.append([])
@@ -81,11 +81,11 @@ def _pages(result: ResultSet, limits: Array) -> list[list[_Panel]]:
 def _range(result: ResultSet, limits: Array, members: list[int]) -> tuple[float, float]:
     """What a scale spans: every interval, every limit, zero, and a little more."""
     ends = [0.0]
-    for place in members:
-        value, half = float(result.estimate[place]), float(result.expanded[place])
+    for index in members:
+        value, half = float(result.estimate[index]), float(result.expanded[index])
         ends += [value - half, value + half]
-        if math.isfinite(limits[place]):
-            ends += [-float(limits[place]), float(limits[place])]
+        if math.isfinite(limits[index]):
+            ends += [-float(limits[index]), float(limits[index])]
     low, high = min(ends), max(ends)
     margin = 0.05 * (high - low) or 1.0
     return low - margin, high + margin
@@ -102,20 +102,20 @@ def _draw_panel(
         return left + (right - left) * (value - low) / (high - low)
 
     bars, ends, dots, brackets, bands = [], [], [], [], []
-    for row, place in enumerate(panel.members):
+    for row, index in enumerate(panel.members):
         y = top + (row + 0.5) * _ROW
-        value, half = float(result.estimate[place]), float(result.expanded[place])
+        value, half = float(result.estimate[index]), float(result.expanded[index])
         first, last = x(value - half), x(value + half)
         bands.append(f"M{left:.1f} {y:.1f}H{right:.1f}")
         bars.append(f"M{first:.1f} {y:.1f}H{last:.1f}")
         ends += [f"M{end:.1f} {y - _END:.1f}v{2 * _END:g}" for end in (first, last)]
         dots.append(f"M{x(value):.1f} {y:.1f}h0")
-        if math.isfinite(limits[place]):
+        if math.isfinite(limits[index]):
             brackets += [
                 f"M{x(limit):.1f} {y - _BRACKET:.1f}v{2 * _BRACKET:g}"
-                for limit in (-limits[place], limits[place])
+                for limit in (-limits[index], limits[index])
             ]
-        on.text(label, y + 0.36 * LETTER, _fitted(result.names[place], label), anchor="end")
+        on.text(label, y + 0.36 * LETTER, _fitted(result.names[index], label), anchor="end")
     on.path("".join(bands), stroke=FAINT, width=11.0)
     on.line(x(0.0), top, x(0.0), bottom, MID, 2.0, "8 5")
     on.path("".join(bars), stroke=BLUE, width=4.6)
@@ -154,8 +154,8 @@ def residual_drawing(
         on.text(left - 10.0, y(value) + 0.36 * LETTER, tick_words(value, texts.decimal_sign), anchor="end")
     step = (right - left) / max(len(residuals.labels), 4)
     bars, stripes = [], []
-    for place, rms in enumerate(residuals.rms_um):
-        first, wide = left + (place + 0.17) * step, 0.66 * step
+    for index, rms in enumerate(residuals.rms_um):
+        first, wide = left + (index + 0.17) * step, 0.66 * step
         bars.append(f"M{first:.1f} {bottom:.1f}V{y(rms):.1f}h{wide:.1f}V{bottom:.1f}z")
         if level is not None and rms > 2.0 * level:
             stripes += [
@@ -166,9 +166,9 @@ def residual_drawing(
         on.path("".join(stripes), stroke="white", width=4.0)
     longest = WIDE * LETTER * max(map(len, residuals.labels), default=1) + 10.0
     every = max(1, math.ceil(longest / step))
-    for place in range(0, len(residuals.labels), every):
-        at = left + (place + 0.5) * step
-        on.text(at, bottom + 10.0 + LETTER, residuals.labels[place], anchor="middle")
+    for index in range(0, len(residuals.labels), every):
+        at = left + (index + 0.5) * step
+        on.text(at, bottom + 10.0 + LETTER, residuals.labels[index], anchor="middle")
     on.line(left, bottom, right, bottom, MID, 2.4)
     if level is not None:
         on.line(left, y(level), right, y(level), INK, 3.4, "14 8")

@@ -91,45 +91,45 @@ class LaboratoryFile:
 
 def read_laboratory(path: str | Path) -> LaboratoryFile:
     """The answers in a TOML file. Raises InputError, with all faults, where it cannot be read as such."""
-    place = Path(path)
+    file = Path(path)
     try:
-        text = place.read_bytes().decode("utf-8-sig")
+        text = file.read_bytes().decode("utf-8-sig")
         tables = tomllib.loads(text)
     except OSError as error:
-        raise InputError(f"{place} cannot be read: {error.strerror or error}") from error
+        raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
-        raise InputError(f"{place}, line {line}, is not UTF-8; save the file as UTF-8 text") from error
+        raise InputError(f"{file}, line {line}, is not UTF-8; save the file as UTF-8 text") from error
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{place} is not TOML: {error}") from error
+        raise InputError(f"{file} is not TOML: {error}") from error
     faults: list[str] = []
-    found = _answers(tables, faults)
+    answers = _answers(tables, faults)
     if faults:
-        raise InputError("\n  ".join([f"{place} was refused:", *faults]))
-    people = found.get("authorised_by")
+        raise InputError("\n  ".join([f"{file} was refused:", *faults]))
+    people = answers.get("authorised_by")
     return LaboratoryFile(
-        laboratory=_party("laboratory", found),
-        customer=_party("customer", found),
-        accreditation=found.get("laboratory.accreditation"),
-        country=found.get("laboratory.country"),
-        language=found.get("laboratory.language"),
-        item_description=found.get("item.description"),
-        item_identification=found.get("item.identification"),
-        item_condition=found.get("item.condition"),
-        place=found.get("item.place"),
-        received_on=found.get("item.received_on"),
-        method_document=found.get("method.document"),
-        traceability=found.get("traceability.statement"),
-        probe=found.get("traceability.probe"),
-        scale_bar=found.get("traceability.scale_bar"),
+        laboratory=_party("laboratory", answers),
+        customer=_party("customer", answers),
+        accreditation=answers.get("laboratory.accreditation"),
+        country=answers.get("laboratory.country"),
+        language=answers.get("laboratory.language"),
+        item_description=answers.get("item.description"),
+        item_identification=answers.get("item.identification"),
+        item_condition=answers.get("item.condition"),
+        place=answers.get("item.place"),
+        received_on=answers.get("item.received_on"),
+        method_document=answers.get("method.document"),
+        traceability=answers.get("traceability.statement"),
+        probe=answers.get("traceability.probe"),
+        scale_bar=answers.get("traceability.scale_bar"),
         authorised_by=people,
-        **{key: found.get(f"statements.{key}") for key in SECTIONS["statements"]},
+        **{key: answers.get(f"statements.{key}") for key in SECTIONS["statements"]},
     )
 
 
 def _answers(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
     """Every answer under ``section.key``; what is wrong goes to ``faults``."""
-    found: dict[str, Any] = {}
+    answers: dict[str, Any] = {}
     for section, content in tables.items():
         if section not in SECTIONS:
             faults.append(f"there is no section [{section}]; there are {', '.join(SECTIONS)}")
@@ -138,18 +138,18 @@ def _answers(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
                 faults.append("authorised_by is a list of persons: begin each with [[authorised_by]]")
                 continue
             people = [_section(section, person, faults) for person in content]
-            found[section] = tuple(
+            answers[section] = tuple(
                 Person(person.get(f"{section}.name"), person.get(f"{section}.function")) for person in people
             )
         elif isinstance(content, dict):
-            found |= _section(section, content, faults)
+            answers |= _section(section, content, faults)
         else:
             faults.append(f"{section} is a section: write [{section}] and its keys below")
-    return found
+    return answers
 
 
 def _section(section: str, content: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
-    found = {}
+    answers = {}
     for key, value in content.items():
         name = f"{section}.{key}"
         if key not in SECTIONS[section]:
@@ -157,8 +157,8 @@ def _section(section: str, content: Mapping[str, Any], faults: list[str]) -> dic
             continue
         answer = _answer(name, value, faults)
         if answer is not None:
-            found[name] = answer
-    return found
+            answers[name] = answer
+    return answers
 
 
 def _answer(name: str, value: Any, faults: list[str]) -> Any:
@@ -199,9 +199,9 @@ def _shown(value: object) -> str:
     return value.isoformat() if isinstance(value, datetime) else repr(value)
 
 
-def _party(section: str, found: Mapping[str, Any]) -> Party | None:
+def _party(section: str, answers: Mapping[str, Any]) -> Party | None:
     keys = [f"{section}.{key}" for key in ("name", "address", "contact")]
-    if not any(key in found for key in keys):
+    if not any(key in answers for key in keys):
         return None
     name, address, contact = keys
-    return Party(found.get(name), found.get(address, ()), found.get(contact))
+    return Party(answers.get(name), answers.get(address, ()), answers.get(contact))

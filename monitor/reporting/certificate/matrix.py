@@ -51,11 +51,11 @@ def correlation_blocks(
     names: tuple[str, ...], correlation: Array, texts: Texts, title: str
 ) -> tuple[Block, ...]:
     """The lower triangle in blocks of columns and of rows; rows wholly above the diagonal are left out."""
-    numbered = max((in_mm(one, _POINTS) for one in names), default=0.0) > _LONGEST_ABOVE_MM
-    heads = tuple(str(place + 1) for place in range(len(names))) if numbered else names
-    sides = tuple(_side(name, place) for place, name in enumerate(names)) if numbered else names
+    numbered = max((in_mm(column, _POINTS) for column in names), default=0.0) > _LONGEST_ABOVE_MM
+    heads = tuple(str(index + 1) for index in range(len(names))) if numbered else names
+    sides = tuple(_side(name, index) for index, name in enumerate(names)) if numbered else names
     pitch = _NUMBERED_MM if numbered else _NAMED_MM
-    left = max((in_mm(one, _POINTS) for one in sides), default=0.0) + 2.0
+    left = max((in_mm(column, _POINTS) for column in sides), default=0.0) + 2.0
     across = max(1, int((PAGE_WIDTH_MM - left) / pitch))
     blocks = []
     for start in range(0, len(names), across):
@@ -65,13 +65,15 @@ def correlation_blocks(
         each = -(-count // parts)
         for first in range(start, len(names), each):
             rows = range(first, min(first + each, len(names)))
-            coefficients = [[float(correlation[row, one]) for one in columns if one <= row] for row in rows]
+            coefficients = [
+                [float(correlation[row, column]) for column in columns if column <= row] for row in rows
+            ]
             blocks.append(
                 Block(
-                    head="\t" + _spaced([heads[one] for one in columns], pitch, middle=True),
+                    head="\t" + _spaced([heads[column] for column in columns], pitch, middle=True),
                     lines=tuple(
                         f"{sides[row]}\t"
-                        + _spaced([_signed(one, texts.decimal_sign) for one in values], pitch)
+                        + _spaced([_signed(column, texts.decimal_sign) for column in values], pitch)
                         for row, values in zip(rows, coefficients, strict=True)
                     ),
                     left_mm=left,
@@ -82,8 +84,8 @@ def correlation_blocks(
     return tuple(blocks)
 
 
-def _side(name: str, place: int) -> str:
-    number = f" ({place + 1})"
+def _side(name: str, index: int) -> str:
+    number = f" ({index + 1})"
     while in_mm(name + number, _POINTS) > _MOST_LEFT_MM:
         name = name.rstrip("…")[:-1] + "…"
     return name + number
@@ -91,8 +93,8 @@ def _side(name: str, place: int) -> str:
 
 def _signed(coefficient: float, decimal_sign: str) -> str:
     """A coefficient with room for a sign, so that digits stand below digits."""
-    words = written_correlation(coefficient, decimal_sign)
-    return words if words.startswith(MINUS) else "\N{FIGURE SPACE}\N{THIN SPACE}" + words
+    written = written_correlation(coefficient, decimal_sign)
+    return written if written.startswith(MINUS) else "\N{FIGURE SPACE}\N{THIN SPACE}" + written
 
 
 def _spaced(words: list[str], pitch: float, *, middle: bool = False) -> str:
@@ -100,9 +102,9 @@ def _spaced(words: list[str], pitch: float, *, middle: bool = False) -> str:
     wide = pitch / (_POINTS * MILLIMETRES_A_POINT) * units_an_em()
     room = in_units("\N{FIGURE SPACE}\N{THIN SPACE}0.00")
     line, at = "", 0
-    for place, word in enumerate(words):
-        begin = place * wide + (max(0.0, (room - in_units(word)) / 2.0) if middle else 0.0)
-        more = _space(begin - at, least=place > 0) + word
+    for index, word in enumerate(words):
+        begin = index * wide + (max(0.0, (room - in_units(word)) / 2.0) if middle else 0.0)
+        more = _space(begin - at, least=index > 0) + word
         line += more
         at += in_units(more)
     return line
@@ -110,12 +112,12 @@ def _spaced(words: list[str], pitch: float, *, middle: bool = False) -> str:
 
 def _space(wanted: float, *, least: bool) -> str:
     """Spaces of a width in the font's units, to half a hair space; ``least`` asks for one at least."""
-    found = ""
+    line = ""
     for space in _SPACES:
         count = int((wanted + in_units(_SPACES[-1]) / 2.0) // in_units(space))
-        found += space * max(0, count)
+        line += space * max(0, count)
         wanted -= max(0, count) * in_units(space)
-    return found or ("\N{THIN SPACE}" if least else "")
+    return line or ("\N{THIN SPACE}" if least else "")
 
 
 def _shades(coefficients: list[list[float]], pitch: float, title: str) -> Markup:

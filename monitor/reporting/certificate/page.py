@@ -62,11 +62,11 @@ def certificate_context(record: CertificateRecord) -> dict[str, Any]:
         "received_on": answer(record.received_on, texts),
         "performed_on": first if first == last else texts("page.from_to", first=first, last=last),
         "method": _method(record.method, texts),
-        "references": [(one.name, answer(one.certificate, texts)) for one in record.references or ()],
+        "references": [(entry.name, answer(entry.certificate, texts)) for entry in record.references or ()],
         "results": [_printed(result, texts) for result in record.results],
         "maps": [
-            (printed_map(one, texts), map_picture(one, texts, POINTS_FILE.format(place=place)))
-            for place, one in enumerate(record.volumetric, start=1)
+            (printed_map(entry, texts), map_picture(entry, texts, POINTS_FILE.format(place=number)))
+            for number, entry in enumerate(record.volumetric, start=1)
         ],
         "conformity": conformity_rows(conformity, texts)
         if isinstance(conformity, ConformityStatement)
@@ -116,8 +116,10 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
             evaluation=result.evaluation,
         ),
         refused=tuple(
-            texts.markup("page.refused", parameters=", ".join(one.parameters), why=texts.computed(one.why))
-            for one in result.refused
+            texts.markup(
+                "page.refused", parameters=", ".join(refusal.parameters), why=texts.computed(refusal.why)
+            )
+            for refusal in result.refused
         ),
         half_axes=texts.markup("page.half_axes", half_axes=half_axes),
         blocks=correlation_blocks(

@@ -39,13 +39,13 @@ def pictures_of(result: ResultSet, texts: Texts) -> tuple[Picture, ...]:
     """The parameters with their intervals, and the residuals by group where they are stored."""
     width = PAGE_WIDTH_MM / 2 - 2.0 if beside(result) else PAGE_WIDTH_MM
     limited = result.tolerances is not None and bool(np.any(np.isfinite(result.tolerances)))
-    words = texts(
+    caption = texts(
         "figures.intervals",
         k_q=written_factor(result.k_q, texts.decimal_sign),
         brackets=texts("figures.brackets") if limited else "",
     )
     drawings = interval_drawings(result, texts, width)
-    pictures = [Picture(Markup(on.svg()), width, words) for on in drawings]
+    pictures = [Picture(Markup(on.svg()), width, caption) for on in drawings]
     if result.residuals is not None:
         height = max(50.0, drawings[0].height_mm) if beside(result) else _RESIDUALS_MM
         pictures.append(_residual_picture(result.residuals, width, height, texts))
@@ -59,19 +59,19 @@ def _residual_picture(residuals: ResidualSummary, width: float, height: float, t
         for label, rms in zip(residuals.labels, residuals.rms_um, strict=True)
     )
     title = texts("figures.residuals_alternative", by=by, numbers=numbers)
-    words = texts("figures.residuals", by=by)
+    caption = texts("figures.residuals", by=by)
     if residuals.probe_um is not None:
         level = f"{residuals.probe_um:.2g}".replace(".", texts.decimal_sign)
         dashed = texts("figures.dashed", name=texts("figures.probe"), level=level)
         striped = any(rms > 2.0 * residuals.probe_um for rms in residuals.rms_um)
-        words += f" {dashed[:1].upper()}{dashed[1:]}{texts('figures.hatched') if striped else ''}."
-    return Picture(Markup(residual_drawing(residuals, texts, width, height, title).svg()), width, words)
+        caption += f" {dashed[:1].upper()}{dashed[1:]}{texts('figures.hatched') if striped else ''}."
+    return Picture(Markup(residual_drawing(residuals, texts, width, height, title).svg()), width, caption)
 
 
-def map_picture(found: VolumetricResult, texts: Texts, file: str) -> Picture:
+def map_picture(volumetric: VolumetricResult, texts: Texts, file: str) -> Picture:
     """Slices through the workspace, in grey; ``file`` inside the PDF has the numbers."""
     drawing = map_drawing(
-        slices_of(found.readings_mm, found.vectors_um, found.expanded_um, found.axes),
+        slices_of(volumetric.readings_mm, volumetric.vectors_um, volumetric.expanded_um, volumetric.axes),
         title=texts("figures.map_alternative", file=file),
         scale_words=texts("figures.length"),
         sign=texts.decimal_sign,

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
+from enum import StrEnum
 
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
@@ -77,6 +78,16 @@ class Person:
     function: str | None
 
 
+class Verdict(StrEnum):
+    """What a decision rule says of one parameter; the value is how records store it."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    CONDITIONAL_PASS = "conditional pass"
+    CONDITIONAL_FAIL = "conditional fail"
+    UNDECIDED = "undecided"
+
+
 @dataclass(frozen=True)
 class ConformityVerdict:
     """What is stated of one parameter: its tolerance (limit of the absolute value) and probability of conformity."""
@@ -84,7 +95,7 @@ class ConformityVerdict:
     name: str
     unit: str
     tolerance: float
-    verdict: str
+    verdict: Verdict
     probability: float
 
 
@@ -147,7 +158,7 @@ class CertificateRecord:
     """One certificate. Nothing in it is computed here, nothing is filled in.
 
     What the laboratory says in words is in its own ``language`` (ISO 639-1), and so is what is printed around it.
-    A ``ConformityVerdict`` keeps the English word, which is translated where it is printed.
+    A ``ConformityVerdict`` keeps its kind, which gets its word where it is printed.
 
     ``performed_on`` are the first and last day of the calibration. ``ITEMS`` names the clause
     that asks for each field. ``accreditation`` is printed where a laboratory has one;

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -106,86 +106,105 @@ class ResultSet:
         )
 
 
-def result_set(
-    names: Sequence[str],
-    units: Sequence[Unit],
-    estimate: npt.ArrayLike,
-    covariance: npt.ArrayLike,
-    *,
-    state: str,
-    p: float,
-    k_p: float,
-    k_q: float,
-    rank: int,
-    evaluation: str,
-    descriptions: Mapping[str, str] | None = None,
-    refused: Sequence[RefusedParameters] = (),
-    residuals: ResidualSummary | None = None,
-    trials: int | None = None,
-    validation: str | None = None,
-    tolerances: Mapping[str, float] | None = None,
-    dof: float = math.inf,
-    texts: Texts | None = None,
-) -> ResultSet:
-    """A result to print from ``estimate`` (m,) and ``covariance`` (m, m) in internal units.
+@dataclass(frozen=True)
+class JointEstimate:
+    """Estimates (m,) of m parameters and their covariance (m, m), in internal units; ``units`` are those to print."""
 
-    Parameters named in ``refused`` are left out of the numbers. ``tolerances`` are in display units by name.
-    What has no word in ``descriptions`` is described in the language of ``texts`` (English without).
-    Raises DataError where shapes differ, a number is not finite, a factor is not positive or a variance is
-    not positive: such a result cannot be certified.
+    names: Sequence[str]
+    units: Sequence[Unit]
+    estimate: npt.ArrayLike
+    covariance: npt.ArrayLike
+
+
+@dataclass(frozen=True)
+class CoverageFactors:
+    """The coverage factors of a result for probability ``p``, as ``ResultSet`` has them."""
+
+    p: float
+    k_p: float
+    k_q: float
+    rank: int
+    dof: float = math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResultStatements:
+    """What a result states besides its numbers, as ``ResultSet`` has it.
+
+    ``tolerances`` are in display units by name. ``descriptions`` are words for parameters by name.
     """
-    every = np.asarray(estimate, dtype=np.float64)
-    matrix = np.asarray(covariance, dtype=np.float64)
-    count = len(names)
-    if every.shape != (count,) or matrix.shape != (count, count) or len(units) != count:
+
+    state: str
+    evaluation: str
+    refused: Sequence[RefusedParameters] = ()
+    residuals: ResidualSummary | None = None
+    trials: int | None = None
+    validation: str | None = None
+    tolerances: Mapping[str, float] | None = None
+    descriptions: Mapping[str, str] = field(default_factory=dict)
+
+
+def result_set(
+    joint: JointEstimate, factors: CoverageFactors, statements: ResultStatements, texts: Texts | None = None
+) -> ResultSet:
+    """A result to print from numbers in internal units.
+
+    Parameters that are refused are left out of the numbers. What has no word in the statements' descriptions is
+    described in the language of ``texts`` (English without). Raises DataError where shapes differ, a number is not
+    finite, a factor is not positive or a variance is not positive: such a result cannot be certified.
+    """
+    estimate = np.asarray(joint.estimate, dtype=np.float64)
+    covariance = np.asarray(joint.covariance, dtype=np.float64)
+    count = len(joint.names)
+    if estimate.shape != (count,) or covariance.shape != (count, count) or len(joint.units) != count:
         raise DataError(
             f"{count} parameters need as many units and estimates and a covariance of shape ({count}, {count}), "
-            f"not {len(units)}, {every.shape} and {matrix.shape}"
+            f"not {len(joint.units)}, {estimate.shape} and {covariance.shape}"
         )
-    without = {name for refusal in refused for name in refusal.parameters}
-    kept = [place for place, name in enumerate(names) if name not in without]
-    factor = np.array([units[place].factor for place in kept])
-    shown = every[kept] / factor
-    spread = matrix[np.ix_(kept, kept)] / np.outer(factor, factor)
-    chosen = tuple(names[place] for place in kept)
-    _check_numbers(chosen, shown, spread, p, k_p, k_q)
-    words = descriptions or {}
-    limits = None
-    if tolerances is not None:
-        limits = np.array([tolerances.get(name, math.nan) for name in chosen])
+    refused = {name for refusal in statements.refused for name in refusal.parameters}
+    printed = [index for index, name in enumerate(joint.names) if name not in refused]
+    factor = np.array([joint.units[index].factor for index in printed])
+    names = tuple(joint.names[index] for index in printed)
+    estimate = estimate[printed] / factor
+    covariance = covariance[np.ix_(printed, printed)] / np.outer(factor, factor)
+    _check_numbers(names, estimate, covariance)
+    _check_factors(factors)
+    limits = statements.tolerances
+    descriptions = statements.descriptions
     return ResultSet(
-        state=state,
-        names=chosen,
-        descriptions=tuple(words.get(name, describe(name, texts)) for name in chosen),
-        units=tuple(units[place].name for place in kept),
-        estimate=shown,
-        covariance=spread,
-        p=p,
-        k_p=k_p,
-        k_q=k_q,
-        rank=rank,
-        evaluation=evaluation,
-        refused=tuple(refused),
-        residuals=residuals,
-        trials=trials,
-        validation=validation,
-        tolerances=limits,
-        dof=dof,
+        state=statements.state,
+        names=names,
+        descriptions=tuple(descriptions.get(name, describe(name, texts)) for name in names),
+        units=tuple(joint.units[index].name for index in printed),
+        estimate=estimate,
+        covariance=covariance,
+        p=factors.p,
+        k_p=factors.k_p,
+        k_q=factors.k_q,
+        rank=factors.rank,
+        evaluation=statements.evaluation,
+        refused=tuple(statements.refused),
+        residuals=statements.residuals,
+        trials=statements.trials,
+        validation=statements.validation,
+        tolerances=None if limits is None else np.array([limits.get(name, math.nan) for name in names]),
+        dof=factors.dof,
     )
 
 
-def _check_numbers(
-    names: tuple[str, ...], estimate: Array, covariance: Array, p: float, k_p: float, k_q: float
-) -> None:
-    for place, name in enumerate(names):
-        if not math.isfinite(estimate[place]) or not np.all(np.isfinite(covariance[place])):
+def _check_numbers(names: tuple[str, ...], estimate: Array, covariance: Array) -> None:
+    for index, name in enumerate(names):
+        if not math.isfinite(estimate[index]) or not np.all(np.isfinite(covariance[index])):
             raise DataError(f"parameter {name} has no finite number; name it among the refused parameters")
-        if not covariance[place, place] > 0.0:
+        if not covariance[index, index] > 0.0:
             raise DataError(
-                f"parameter {name} has the variance {covariance[place, place]:g}; it must be positive"
+                f"parameter {name} has the variance {covariance[index, index]:g}; it must be positive"
             )
-    if not 0.0 < p < 1.0:
-        raise DataError(f"the coverage probability p must lie between 0 and 1, but is {p}")
-    for symbol, factor in (("k_p", k_p), ("k_q", k_q)):
+
+
+def _check_factors(factors: CoverageFactors) -> None:
+    if not 0.0 < factors.p < 1.0:
+        raise DataError(f"the coverage probability p must lie between 0 and 1, but is {factors.p}")
+    for symbol, factor in (("k_p", factors.k_p), ("k_q", factors.k_q)):
         if not (math.isfinite(factor) and factor > 0.0):
             raise DataError(f"the coverage factor {symbol} must be positive and finite, but is {factor}")

@@ -62,10 +62,10 @@ def result_rows(result: ResultSet, texts: Texts) -> tuple[Row, ...]:
         columns[0].append(texts.number(rounded.estimate))
         columns[1].append(texts.number(round_uncertainty(float(u))))
         columns[2].append(texts.number(rounded.uncertainty))
-    estimates, standard, expansions = (aligned(one, texts.decimal_sign) for one in columns)
+    estimates, standard, expansions = (aligned(column, texts.decimal_sign) for column in columns)
     return tuple(
-        Row(name, words, (estimate, u, expanded), unit)
-        for name, words, estimate, u, expanded, unit in zip(
+        Row(name, description, (estimate, u, expanded), unit)
+        for name, description, estimate, u, expanded, unit in zip(
             result.names, result.descriptions, estimates, standard, expansions, result.units, strict=True
         )
     )
@@ -76,19 +76,19 @@ def result_widths(rows: tuple[Row, ...], heads: tuple[str, str, str, str, str, s
 
     Known before the page is laid out, which then need not try every cell: a third of the time of 149 parameters.
     """
-    bold = [BOLD * in_mm(words, LETTERS_PT) + _PADDING_MM for words in heads]
+    bold = [BOLD * in_mm(head, LETTERS_PT) + _PADDING_MM for head in heads]
     names = max((BOLD * in_mm(row.name, LETTERS_PT) for row in rows), default=0.0) + _PADDING_MM
     numbers = [
         max(
             (
-                in_mm(row.numbers[place].text, LETTERS_PT)
-                + row.numbers[place].room * LETTERS_PT * MILLIMETRES_A_POINT
+                in_mm(row.numbers[index].text, LETTERS_PT)
+                + row.numbers[index].room * LETTERS_PT * MILLIMETRES_A_POINT
                 for row in rows
             ),
             default=0.0,
         )
         + _PADDING_MM
-        for place in range(3)
+        for index in range(3)
     ]
     units = max((in_mm(row.unit, LETTERS_PT) for row in rows), default=0.0) + _PADDING_MM
     wide = [max(pair) for pair in zip([*numbers, units], bold[2:], strict=True)]
@@ -110,13 +110,13 @@ def conformity_rows(statement: ConformityStatement, texts: Texts) -> PrintedConf
     """The verdicts with their tolerances and probabilities."""
     rows = tuple(
         (
-            one.name,
-            f"{PLUS_MINUS} {texts.number(decimal_of(one.tolerance))}",
-            one.unit,
-            _probability(one.probability, texts),
-            verdict_words(one.verdict, texts),
+            verdict.name,
+            f"{PLUS_MINUS} {texts.number(decimal_of(verdict.tolerance))}",
+            verdict.unit,
+            _probability(verdict.probability, texts),
+            verdict_words(verdict.verdict, texts),
         )
-        for one in statement.verdicts
+        for verdict in statement.verdicts
     )
     return PrintedConformity(rows, _probability(statement.joint_probability, texts), len(rows))
 
@@ -125,9 +125,9 @@ def _probability(p: float, texts: Texts) -> str:
     """A probability of conformity in percent; what is nearly sure is not printed as sure."""
     tenth = Decimal("0.1")
     if p < 0.001:
-        words = f"< {texts.number(tenth)}"
+        written = f"< {texts.number(tenth)}"
     elif p > 0.999:
-        words = f"> {texts.number(100 - tenth)}"
+        written = f"> {texts.number(100 - tenth)}"
     else:
-        words = texts.number(round_to_place(100.0 * p, tenth))
-    return f"{words}\N{NO-BREAK SPACE}%"
+        written = texts.number(round_to_place(100.0 * p, tenth))
+    return f"{written}\N{NO-BREAK SPACE}%"

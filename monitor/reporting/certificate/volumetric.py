@@ -33,42 +33,42 @@ class PrintedMap:
     left_out: str
 
 
-def printed_map(found: VolumetricResult, texts: Texts) -> PrintedMap:
+def printed_map(volumetric: VolumetricResult, texts: Texts) -> PrintedMap:
     """The map in the words of a language."""
     sign = texts.decimal_sign
-    k = written_factor(found.k, sign)
+    k = written_factor(volumetric.k, sign)
     return PrintedMap(
-        state=found.state,
+        state=volumetric.state,
         expanded=texts.markup("page.map_expanded", k=k),
-        rows=_rows(found, texts),
+        rows=_rows(volumetric, texts),
         explained=texts(
             "page.map_explained",
-            points=found.points,
-            each=found.each,
-            poses=found.poses,
+            points=volumetric.points,
+            each=volumetric.each,
+            poses=volumetric.poses,
             ranges="; ".join(
                 texts("page.map_range", axis=axis, first=_tenths(first, texts), last=_tenths(last, texts))
-                for axis, first, last in found.ranges
+                for axis, first, last in volumetric.ranges
             ),
-            origin=texts("page.map_from_strokes" if found.from_strokes else "page.map_from_visited"),
-            datum=texts("page.map_datum", place=place_words(found.datum, texts))
-            if found.datum
+            origin=texts("page.map_from_strokes" if volumetric.from_strokes else "page.map_from_visited"),
+            datum=texts("page.map_datum", place=place_words(volumetric.datum, texts))
+            if volumetric.datum
             else texts("page.map_no_datum"),
             k=k,
-            p=written_probability(found.p, sign),
+            p=written_probability(volumetric.p, sign),
         ),
         left_out=" ".join(
             texts("page.map_left_out", parameters=name, why=texts.computed(why))
-            for name, why in found.left_out
+            for name, why in volumetric.left_out
         ),
     )
 
 
-def place_words(place: Place, texts: Texts) -> str:
+def place_words(position: Place, texts: Texts) -> str:
     """A place of the machine: ``X −178.9 mm, B −90.0°``."""
     return ", ".join(
         f"{axis}\N{NO-BREAK SPACE}{_tenths(reading, texts)}{'' if unit == '°' else chr(0xA0)}{unit}"
-        for axis, reading, unit in place
+        for axis, reading, unit in position
     )
 
 
@@ -76,20 +76,20 @@ def _tenths(value: float, texts: Texts) -> str:
     return texts.number(round_to_place(value, Decimal("0.1")))
 
 
-def _rows(found: VolumetricResult, texts: Texts) -> tuple[tuple[str, str, tuple[Number, ...]], ...]:
+def _rows(volumetric: VolumetricResult, texts: Texts) -> tuple[tuple[str, str, tuple[Number, ...]], ...]:
     lengths: list[tuple[str, Length]] = [
-        ("page.map_largest", found.largest),
-        ("page.map_rms", found.rms),
-        ("page.map_mean", found.mean),
+        ("page.map_largest", volumetric.largest),
+        ("page.map_rms", volumetric.rms),
+        ("page.map_mean", volumetric.mean),
     ]
     columns: tuple[list[str], list[str], list[str]] = ([], [], [])
-    for _, one in lengths:
-        rounded = round_result(one.value_um, one.expanded_um)
+    for _, length in lengths:
+        rounded = round_result(length.value_um, length.expanded_um)
         columns[0].append(texts.number(rounded.estimate))
-        columns[1].append(texts.number(round_uncertainty(one.u_um)))
+        columns[1].append(texts.number(round_uncertainty(length.u_um)))
         columns[2].append(texts.number(rounded.uncertainty))
     numbers = zip(*(aligned(column, texts.decimal_sign) for column in columns), strict=True)
     return tuple(
-        (texts(key), place_words(one.at, texts) if one.at else texts("page.map_all"), row)
-        for (key, one), row in zip(lengths, numbers, strict=True)
+        (texts(key), place_words(length.at, texts) if length.at else texts("page.map_all"), row)
+        for (key, length), row in zip(lengths, numbers, strict=True)
     )

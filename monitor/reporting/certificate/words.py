@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import date
 
-from monitor.reporting.certificate.record import ConformityStatement, NotApplicable, Replaced
+from monitor.reporting.certificate.record import ConformityStatement, NotApplicable, Replaced, Verdict
 from monitor.reporting.texts import Texts
 
 
@@ -26,6 +26,6 @@ def amendment(replaced: Replaced | None, texts: Texts) -> str:
     return texts("record.replaces", number=replaced.number, day=day, reason=replaced.reason)
 
 
-def verdict_words(verdict: str, texts: Texts) -> str:
-    """A verdict of the record in the language."""
-    return texts(f"conformity.{verdict.replace(' ', '_')}")
+def verdict_words(verdict: Verdict, texts: Texts) -> str:
+    """The word for a verdict in the language."""
+    return texts(f"conformity.{verdict.name.lower()}")

@@ -7,23 +7,39 @@ import errno
 import hashlib
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from monitor.exceptions import InputError
 from monitor.store import Database, find_certificate, load_certificate
 
 
+@dataclass(frozen=True)
+class HashedFile:
+    """A file that a certificate was made from or with."""
+
+    name: str
+    sha256: str
+
+
 def path_of(out: Path | None, number: str) -> Path:
+    """The file of a certificate: ``out`` itself, or a file in the folder ``out``, or here without."""
     name = f"certificate-{number}.pdf".replace("/", "-").replace("\\", "-")
     if out is None:
         return Path(name)
     return out if out.suffix.lower() == ".pdf" else out / name
 
 
-def font_hashes(fonts: Sequence[Path]) -> list[dict[str, str]]:
+def dcc_path_of(out: Path, number: str) -> Path:
+    """The file of a digital certificate: ``out`` itself, or a file in the folder ``out``."""
+    name = f"certificate-{number}.dcc.xml".replace("/", "-").replace("\\", "-")
+    return out if out.suffix.lower() == ".xml" else out / name
+
+
+def font_hashes(fonts: Sequence[Path]) -> tuple[HashedFile, ...]:
     """Name and SHA-256 of fonts that are not ours: they are too large to be kept with every certificate."""
     try:
-        return [{"name": one.name, "sha256": hashlib.sha256(one.read_bytes()).hexdigest()} for one in fonts]
+        return tuple(HashedFile(font.name, hashlib.sha256(font.read_bytes()).hexdigest()) for font in fonts)
     except OSError as error:
         raise InputError(f"the font {error.filename} cannot be read: {error.strerror or error}") from error
 
@@ -36,21 +52,21 @@ def keep_issued(db: Database, path: Path) -> None:
     if not path.is_file():
         return
     content = path.read_bytes()
-    there = find_certificate(db, hashlib.sha256(content).hexdigest())
-    if there is None and content:
+    number = find_certificate(db, hashlib.sha256(content).hexdigest())
+    if number is None and content:
         raise InputError(
             f"{path} is there already, and no draft of this database: name another file, or remove it"
         )
-    if there is not None and load_certificate(db, there).state != "draft":
-        raise InputError(f"{path} is certificate {there}; name another file")
+    if number is not None and load_certificate(db, number).state != "draft":
+        raise InputError(f"{path} is certificate {number}; name another file")
 
 
 def why_not(folder: Path, error: OSError) -> str:
     """Why nothing can be written into a folder, in words: the system calls a file in its place "File exists"."""
-    at = next((one for one in (folder, *folder.parents) if one.exists()), None)
-    return (
-        f"{at} is a file, not a folder" if at is not None and at.is_file() else error.strerror or str(error)
-    )
+    existing = next((path for path in (folder, *folder.parents) if path.exists()), None)
+    if existing is not None and existing.is_file():
+        return f"{existing} is a file, not a folder"
+    return error.strerror or str(error)
 
 
 def prepared(path: Path, content: bytes) -> Path:

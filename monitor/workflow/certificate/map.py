@@ -8,16 +8,16 @@ from monitor.records import Array
 from monitor.reporting.certificate.volumetric_result import Length, Place, VolumetricResult
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.models import as_model
-from monitor.workflow.uncertainty.evaluations import Evaluation
-from monitor.workflow.volumetric.volumetric import Mapped, at_zero, map_of
+from monitor.workflow.uncertainty.stored import StatedUncertainty
+from monitor.workflow.volumetric.error_map import VolumetricMap, at_zero, map_of
 
 
-def volumetric_result(found: Evaluation, state: str) -> VolumetricResult:
+def volumetric_result(evaluated: StatedUncertainty, state: str) -> VolumetricResult:
     """The map of an evaluated run in display units. Raises InputError where not three linear axes moved."""
-    problem = campaign_method(found.campaign).problem_of(found.campaign, as_model(found.model))
-    mapped = map_of(found, fit(problem))
+    problem = campaign_method(evaluated.campaign).problem_of(evaluated.campaign, as_model(evaluated.model))
+    mapped = map_of(evaluated, fit(problem))
     drawn = at_zero(mapped)
-    error, p = mapped.error, found.p
+    error, p = mapped.error, evaluated.answer.p
     k = error.factor(p)
     worst = error.worst
     return VolumetricResult(
@@ -51,7 +51,7 @@ def _length(value: float, u: float, k: float, at: Place = ()) -> Length:
     return Length(shown(value), shown(u), shown(k * u), at)
 
 
-def _place(mapped: Mapped, position: Array) -> Place:
+def _place(mapped: VolumetricMap, position: Array) -> Place:
     """Readings of a commanded point, without the spindle's angle."""
     return tuple(
         (
@@ -59,6 +59,6 @@ def _place(mapped: Mapped, position: Array) -> Place:
             joint.sign * (DEGREE.to_display(float(value)) if joint.turns else float(value)) + 0.0,
             "°" if joint.turns else "mm",
         )
-        for joint, value in zip(mapped.known.chain.joints, position, strict=True)
+        for joint, value in zip(mapped.errors.chain.joints, position, strict=True)
         if joint.kind != "spindle"
     )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import date
-from typing import Any
 
+from monitor.documents import from_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.records import Campaign, Run
 from monitor.reporting.certificate.laboratory import LaboratoryFile
 from monitor.reporting.certificate.record import NotApplicable, Replaced
-from monitor.store import Database, certificate_numbers, load_certificate
+from monitor.store import Database, StoredCertificate, certificate_numbers, load_certificate
+from monitor.workflow.certificate.inputs import MadeWith
 
 #: The two states of a machine that a certificate may describe (ISO/IEC 17025:2017, 7.8.4.1 d).
 AS_FOUND, AS_LEFT = "as found", "as left"
@@ -33,8 +34,8 @@ class Measured:
 
 def next_number(db: Database, year: int) -> str:
     """The next free number of a year: ``2026-0001``."""
-    taken = certificate_numbers(db)
-    last = max((int(n[5:]) for n in taken if n.startswith(f"{year}-") and n[5:].isdigit()), default=0)
+    numbers = certificate_numbers(db)
+    last = max((int(n[5:]) for n in numbers if n.startswith(f"{year}-") and n[5:].isdigit()), default=0)
     return f"{year}-{last + 1:04d}"
 
 
@@ -61,27 +62,26 @@ def check_number(db: Database, number: str) -> None:
 def measured_runs(campaign: Campaign, run: int | None, as_left: int | None) -> tuple[Measured, ...]:
     """The runs that are certified: ``run`` as found, ``as_left`` behind an adjustment; the only one where none is
     named. Raises InputError where it is open which, or the machine cannot have been left as ``as_left`` says."""
-    known = {one.run: one for one in campaign.runs}
+    by_number = {run.run: run for run in campaign.runs}
     if run is None and as_left is None:
-        if len(known) > 1:
+        if len(by_number) > 1:
             raise InputError(
-                f"campaign {campaign.name} has {len(known)} runs ({min(known)} to {max(known)}): --run N says which "
-                "one the certificate is of"
+                f"campaign {campaign.name} has {len(by_number)} runs ({min(by_number)} to {max(by_number)}): --run N "
+                "says which one the certificate is of"
             )
-        run = next(iter(known))
-    found = [Measured(run, AS_FOUND)] if run is not None else []
-    found += [Measured(as_left, AS_LEFT)] if as_left is not None else []
-    for one in found:
-        if one.run not in known:
-            raise NotFoundError(
-                f"campaign {campaign.name} has no run {one.run}; it has {', '.join(str(number) for number in known)}"
-            )
-    if run is not None and as_left is not None and known[as_left].started_at <= known[run].started_at:
+        run = next(iter(by_number))
+    measured = [Measured(run, AS_FOUND)] if run is not None else []
+    measured += [Measured(as_left, AS_LEFT)] if as_left is not None else []
+    for state in measured:
+        if state.run not in by_number:
+            numbers = ", ".join(map(str, by_number))
+            raise NotFoundError(f"campaign {campaign.name} has no run {state.run}; it has {numbers}")
+    if run is not None and as_left is not None and by_number[as_left].started_at <= by_number[run].started_at:
         raise InputError(
-            f"run {as_left} was begun on {_when(known[as_left])}, run {run} on {_when(known[run])}: results as "
+            f"run {as_left} was begun on {_when(by_number[as_left])}, run {run} on {_when(by_number[run])}: results as "
             "left are measured after those as found"
         )
-    return tuple(found)
+    return tuple(measured)
 
 
 def _when(run: Run) -> str:
@@ -90,10 +90,12 @@ def _when(run: Run) -> str:
 
 def check_day(campaign: Campaign, measured: tuple[Measured, ...], day: date, today: date) -> None:
     """A certificate bears the day on which it is issued: not before its measurement, not to come. Raises InputError."""
-    for one in measured:
-        (on,) = (run.started_at.date() for run in campaign.runs if run.run == one.run)
-        if day < on:
-            raise InputError(f"run {one.run} was measured on {on}; no certificate was issued of it on {day}")
+    for run in campaign.runs:
+        measured_on = run.started_at.date()
+        if day < measured_on and any(state.run == run.run for state in measured):
+            raise InputError(
+                f"run {run.run} was measured on {measured_on}; no certificate was issued of it on {day}"
+            )
     if day > today:
         raise InputError(
             f"--date {day} is still to come (today is {today}): a certificate is issued on its day; --draft shows it "
@@ -103,7 +105,7 @@ def check_day(campaign: Campaign, measured: tuple[Measured, ...], day: date, tod
 
 def check_adjustment(stated: LaboratoryFile, measured: tuple[Measured, ...]) -> None:
     """Results as left say that something was done; what, only the laboratory knows. Raises InputError."""
-    if any(one.state == AS_LEFT for one in measured) and isinstance(stated.adjustment, NotApplicable):
+    if any(run.state == AS_LEFT for run in measured) and isinstance(stated.adjustment, NotApplicable):
         raise InputError(
             "results as left are stated, but adjustment under [statements] of the laboratory's file says that it does "
             "not apply: say in words what was adjusted or repaired between (ISO/IEC 17025:2017, 7.8.4.1 d)"
@@ -128,8 +130,8 @@ def replaced_by(db: Database, number: str, reason: str, draft: bool, campaign: C
     return Replaced(number, issued_on, reason.strip(), old.pdf_sha256)
 
 
-def runs_of(record: Any, runs: tuple[int, ...]) -> tuple[int | None, int | None]:
+def runs_of(old: StoredCertificate) -> tuple[int | None, int | None]:
     """The runs that a stored certificate describes as found and as left, from its record and its list of runs."""
-    states = (record.get("inputs") or {}).get("states") or [AS_FOUND]
-    by_state = dict(zip(states, runs, strict=False))
+    states = from_document(MadeWith, old.record.get("inputs") or {}).states or (AS_FOUND,)
+    by_state = dict(zip(states, old.runs, strict=False))
     return by_state.get(AS_FOUND), by_state.get(AS_LEFT)

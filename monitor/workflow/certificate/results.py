@@ -2,93 +2,94 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.records import Array
-from monitor.reporting.certificate.results import RefusedParameters, ResidualSummary, ResultSet, result_set
+from monitor.reporting.certificate.results import (
+    CoverageFactors,
+    JointEstimate,
+    ResidualSummary,
+    ResultSet,
+    ResultStatements,
+    result_set,
+)
+from monitor.reporting.covariance_source import covariance_sentence
 from monitor.reporting.numbers import decimal_of, round_to_place, written_factor
 from monitor.reporting.texts import Texts
 from monitor.store import Database, check_analysis, stored_analyses
 from monitor.units import MICROMETRE, Unit
-from monitor.workflow.uncertainty.evaluations import LACK_OF_FIT, Evaluation
+from monitor.workflow.uncertainty.answer import MonteCarloAnswer, UncertaintyAnswer
+from monitor.workflow.uncertainty.stored import KIND, StatedUncertainty, restored
 
-METHODS = ("guf", "mcm")
 #: What two evaluations of the same readings may differ by, relative to u: the last digits of double precision.
 _SAME = 1e-6
 
 
 @dataclass(frozen=True)
 class StoredMonteCarlo:
-    """The latest stored Monte Carlo result of a run and what it says of the framework; ``number`` in v_analyses.
-
-    ``estimate`` (m,) and ``covariance`` (m, m) are in display units.
-    """
+    """The latest stored Monte Carlo result ``mcm`` of a run, in its ``answer``; ``number`` in v_analyses."""
 
     number: int
-    trials: int
-    seed: int
-    estimate: Array
-    covariance: Array
-    k_p: float
-    k_q: float
-    verdict: str | None
-    differing: tuple[str, ...]
+    answer: UncertaintyAnswer
+    mcm: MonteCarloAnswer
+
+    @property
+    def trials(self) -> int:
+        """How many trials there were."""
+        return self.mcm.trials
+
+    @property
+    def seed(self) -> int:
+        """The seed of the trials."""
+        return self.mcm.seed
+
+    @property
+    def estimate(self) -> Array:
+        """Estimates (m,) in display units."""
+        return np.array([self.mcm.estimate[name] for name in self.answer.parameters])
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (m, m) in products of the display units."""
+        u = np.array([self.mcm.u[name] for name in self.answer.parameters])
+        return np.asarray(self.mcm.correlation * np.outer(u, u))
 
 
-def stored_monte_carlo(db: Database, found: Evaluation) -> StoredMonteCarlo | None:
+def stored_monte_carlo(db: Database, evaluated: StatedUncertainty) -> StoredMonteCarlo | None:
     """The latest stored Monte Carlo result that belongs to what is certified, None where there is none.
 
     It belongs where its framework result is the same: not one from a selection of runs, without the budget's line for
     lack of fit, or for another probability. Raises StoreError where it was altered since it was stored.
     """
-    for one in stored_analyses(
-        db, "uncertainty", campaign=found.campaign.name, run=found.run, model=found.model.name,
-        model_version=found.model.version,
+    for analysis in stored_analyses(
+        db, KIND, campaign=evaluated.campaign.name, run=evaluated.run, model=evaluated.model.name,
+        model_version=evaluated.model.version,
     ):  # fmt: skip
-        if "mcm" in one.document and _belongs(one.document, found):
-            check_analysis(db, one.number)
-            return _stored(one.number, one.document)
+        if "mcm" not in analysis.document:
+            continue
+        answer = restored(analysis.document)
+        if answer.mcm is not None and _belongs(answer, evaluated):
+            check_analysis(db, analysis.number)
+            return StoredMonteCarlo(analysis.number, answer, answer.mcm)
     return None
 
 
-def _belongs(document: Mapping[str, Any], found: Evaluation) -> bool:
-    if tuple(document["parameters"]) != found.names or document["p"] != found.p:
+def _belongs(answer: UncertaintyAnswer, evaluated: StatedUncertainty) -> bool:
+    if answer.parameters != evaluated.names or answer.p != evaluated.answer.p:
         return False
-    guf = document["guf"]
-    u = np.array([guf["u"][name] for name in found.names])
-    estimate = np.array([guf["estimate"][name] for name in found.names])
+    u = np.array([answer.guf.u[name] for name in evaluated.names])
+    estimate = np.array([answer.guf.estimate[name] for name in evaluated.names])
+    allowed = _SAME * evaluated.u
     return bool(
-        np.all(abs(u - found.u) <= _SAME * found.u)
-        and np.all(abs(estimate - found.estimate) <= _SAME * found.u)
-    )
-
-
-def _stored(number: int, document: Mapping[str, Any]) -> StoredMonteCarlo:
-    mcm, checked, names = document["mcm"], document.get("validation"), document["parameters"]
-    u = np.array([mcm["u"][name] for name in names])
-    differing = () if checked is None else tuple(
-        name for name, value in checked["differences"].items() if abs(value) > checked["tolerances"][name]
-    )  # fmt: skip
-    return StoredMonteCarlo(
-        number=number,
-        trials=int(mcm["trials"]),
-        seed=int(mcm["seed"]),
-        estimate=np.array([mcm["estimate"][name] for name in names]),
-        covariance=np.asarray(mcm["correlation"], dtype=np.float64) * np.outer(u, u),
-        k_p=float(mcm["k_p"]),
-        k_q=float(mcm["k_q"]),
-        verdict=None if checked is None else str(checked["verdict"]),
-        differing=differing,
+        np.all(abs(u - evaluated.u) <= allowed) and np.all(abs(estimate - evaluated.estimate) <= allowed)
     )
 
 
 def results_of(
-    found: Evaluation,
+    evaluated: StatedUncertainty,
     texts: Texts,
     monte_carlo: StoredMonteCarlo | None = None,
     method: str = "guf",
@@ -101,54 +102,50 @@ def results_of(
     (Hotelling, Student), which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where
     the method cannot be certified, DataError where there are too few runs for any joint region.
     """
-    if method not in METHODS:
-        raise InputError(f"--method {method}: a certificate states guf or mcm")
-    if not np.isfinite(found.k_p):
+    if not np.isfinite(evaluated.k_p):
         raise DataError(
-            f"{found.dof:.0f} degrees of freedom bound no joint region of {len(found.names)} parameters; "
+            f"{evaluated.dof:.0f} degrees of freedom bound no joint region of {len(evaluated.names)} parameters; "
             "a certificate needs more repeated runs"
         )
-    estimate, covariance, k_p, k_q = found.estimate, found.covariance, found.k_p, found.k_q
+    answer = evaluated.answer
+    estimate, covariance = evaluated.estimate, evaluated.covariance
+    factors = CoverageFactors(answer.p, evaluated.k_p, evaluated.k_q, answer.guf.rank, evaluated.dof)
     if method == "mcm":
-        monte_carlo = _certifiable(found, monte_carlo)
+        monte_carlo = _certifiable(evaluated, monte_carlo)
         estimate, covariance = monte_carlo.estimate, monte_carlo.covariance
-        if not np.isfinite(found.dof):
-            k_p, k_q = monte_carlo.k_p, monte_carlo.k_q
-    limits = found.campaign.machine.tolerances
+        if not np.isfinite(evaluated.dof):
+            factors = replace(factors, k_p=monte_carlo.mcm.k_p, k_q=monte_carlo.mcm.k_q)
+    limits = evaluated.campaign.machine.tolerances
     return result_set(
-        found.names,
         # In display units already.
-        [Unit(unit, 1.0) for unit in found.units],
-        estimate,
-        covariance,
-        state=state or texts("record.as_found"),
-        p=found.p,
-        k_p=k_p,
-        k_q=k_q,
-        rank=found.rank,
-        evaluation=_evaluation(found, texts, monte_carlo, method),
-        refused=[RefusedParameters(parameters, why) for parameters, why in found.refused],
-        residuals=ResidualSummary(
-            "target",
-            tuple(found.residuals),
-            tuple(found.residuals.values()),
-            MICROMETRE.to_display(found.campaign.probe.standard_uncertainty),
+        JointEstimate(evaluated.names, [Unit(unit, 1.0) for unit in evaluated.units], estimate, covariance),
+        factors,
+        ResultStatements(
+            state=state or texts("record.as_found"),
+            evaluation=_evaluation(evaluated, texts, monte_carlo, method),
+            refused=answer.refused,
+            residuals=ResidualSummary(
+                "target",
+                tuple(answer.residuals.by_target_um),
+                tuple(answer.residuals.by_target_um.values()),
+                MICROMETRE.to_display(evaluated.campaign.probe.standard_uncertainty),
+            ),
+            trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
+            validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
+            tolerances={name: limits[name] for name in limits if name in evaluated.names} or None,
         ),
-        trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
-        validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
-        tolerances={name: limits[name] for name in limits if name in found.names} or None,
-        dof=found.dof,
-        texts=texts,
+        texts,
     )
 
 
-def _certifiable(found: Evaluation, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:
+def _certifiable(evaluated: StatedUncertainty, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:
     if monte_carlo is None:
+        run, campaign = evaluated.run, evaluated.campaign.name
         raise NotFoundError(
-            f"there is no stored Monte Carlo result of run {found.run} of campaign {found.campaign.name}; first: "
-            f"monitor uncertainty {found.campaign.name} --run {found.run} --method both"
+            f"there is no stored Monte Carlo result of run {run} of campaign {campaign}; first: "
+            f"monitor uncertainty {campaign} --run {run} --method both"
         )
-    if LACK_OF_FIT in found.sources:
+    if evaluated.counts_lack_of_fit:
         raise InputError(
             "the model does not explain all of the measurement, and the Monte Carlo result holds no part for that: "
             "certify the framework's result (--method guf), or complete the model"
@@ -156,9 +153,11 @@ def _certifiable(found: Evaluation, monte_carlo: StoredMonteCarlo | None) -> Sto
     return monte_carlo
 
 
-def _evaluation(found: Evaluation, texts: Texts, monte_carlo: StoredMonteCarlo | None, method: str) -> str:
-    """How the results were found, sentence by sentence, the last without its full stop."""
-    readings = texts.computed(found.input_covariance)
+def _evaluation(
+    evaluated: StatedUncertainty, texts: Texts, monte_carlo: StoredMonteCarlo | None, method: str
+) -> str:
+    """How the results were evaluated, sentence by sentence, the last without its full stop."""
+    readings = covariance_sentence(evaluated.covariance_source, texts)
     if method == "mcm" and monte_carlo is not None:
         parts = [
             texts(
@@ -167,45 +166,50 @@ def _evaluation(found: Evaluation, texts: Texts, monte_carlo: StoredMonteCarlo |
         ]
     else:
         parts = [texts("evaluation.framework", readings=readings)]
-    if np.isfinite(found.dof):
+    if np.isfinite(evaluated.dof):
         # Two numbers, so that either factor can be found again: k_q by Student's t of the least known of the outputs,
         # k_p by Hotelling's T² of all of them together.
         single, joint = (
-            texts.number(round_to_place(float(one), decimal_of(0.1))) for one in (found.fewest_dof, found.dof)
+            texts.number(round_to_place(dof, decimal_of(0.1)))
+            for dof in (evaluated.fewest_dof, evaluated.dof)
         )
         parts[0] += ", " + texts("evaluation.degrees_of_freedom", single=single, joint=joint)
         if method == "mcm" and monte_carlo is not None:
-            k_q, k_p = (written_factor(one, texts.decimal_sign) for one in (monte_carlo.k_q, monte_carlo.k_p))
+            k_q = written_factor(monte_carlo.mcm.k_q, texts.decimal_sign)
+            k_p = written_factor(monte_carlo.mcm.k_p, texts.decimal_sign)
             parts[0] += "; " + texts("evaluation.known_covariance", k_q=k_q, k_p=k_p)
-    if monte_carlo is not None and monte_carlo.verdict is not None:
-        words = texts(
+    if monte_carlo is not None and monte_carlo.answer.validation is not None:
+        checked = texts(
             "evaluation.checked",
             trials=monte_carlo.trials,
             seed=monte_carlo.seed,
             verdict=_verdict(monte_carlo, texts),
         )
-        parts.append(words[:1].upper() + words[1:])
-    return ". ".join([*parts, _how_it_fits(found, texts)])
+        parts.append(checked[:1].upper() + checked[1:])
+    return ". ".join([*parts, _how_it_fits(evaluated, texts)])
 
 
 def _verdict(monte_carlo: StoredMonteCarlo, texts: Texts) -> str | None:
-    if monte_carlo.verdict is None:
+    validation = monte_carlo.answer.validation
+    if validation is None:
         return None
-    if monte_carlo.verdict == "validated":
+    if validation.passed:
         return texts("evaluation.validated")
-    if not monte_carlo.differing:
+    if not validation.failed:
         return texts("evaluation.undecided")
-    return texts("evaluation.not_validated", quantities=", ".join(monte_carlo.differing))
+    return texts("evaluation.not_validated", quantities=", ".join(validation.failed))
 
 
-def _how_it_fits(found: Evaluation, texts: Texts) -> str:
+def _how_it_fits(evaluated: StatedUncertainty, texts: Texts) -> str:
     """Whether the model explains the measurement, in a sentence that ends without its full stop."""
+    residuals = evaluated.answer.residuals
     rms, expected = (
-        texts.number(round_to_place(one, decimal_of(0.01))) for one in (found.rms_um, found.expected_rms_um)
+        texts.number(round_to_place(value, decimal_of(0.01)))
+        for value in (residuals.rms_um, residuals.expected_rms_um)
     )
     fits = texts("evaluation.fit", rms=rms, expected=expected)
-    if LACK_OF_FIT in found.sources:
+    if evaluated.counts_lack_of_fit:
         fits += "; " + texts("evaluation.fit_counted")
-    elif found.something_is_missing:
+    elif residuals.something_is_missing:
         fits += "; " + texts("evaluation.fit_not_counted")
     return fits

@@ -14,7 +14,7 @@ from monitor.workflow.figure_files import make_folder, save_figure
 
 
 def curve_figures(first: CurveFit, explanation: CurveExplanation | None, folder: Path) -> list[str]:
-    """Draw the model as given (``first``), with an explanation every missing effect too; return the files."""
+    """Draw what the model leaves, with an explanation every missing effect too; return the names of the files."""
     make_folder(folder)
     name = "residual" if explanation is None else "missing-effects"
     return save_figure(residual_figure(first, explanation), folder, name)

@@ -19,9 +19,9 @@ from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.explain.compare import Draw
-from monitor.workflow.explain.curve_answer import curve_explain_answer
+from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import ExplainAnswer
-from monitor.workflow.explain.machine_answer import explain_answer
+from monitor.workflow.explain.machine_answer import machine_explanation
 from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sentence
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.identify.fitting import curve_problem, load_measured, machine_problem
@@ -58,7 +58,7 @@ def explanation_of(campaign: Campaign, model: StoredModel, first: Fit, rate: flo
     rng = np.random.default_rng(SEED)
     explanation = search(campaign, first.problem, label(model), rate=rate, rng=rng, first=first)
     if is_hopeless(explanation):
-        # The effects that were found leave nearly all of the residual: none of them is an answer.
+        # The effects of the search leave nearly all of the residual: none of them is an answer.
         return replace(explanation, missing=(), suspect=(), moves=(), steps=())
     return explanation
 
@@ -82,7 +82,7 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
 def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[ExplainAnswer, Draw]:
     first = first_fit(campaign, model)
     explanation = explanation_of(campaign, model, first, rate)
-    answer = explain_answer(explanation)
+    answer = machine_explanation(explanation)
 
     def draw(folder: Path) -> Sequence[str]:
         # Loaded here: drawing costs a second that an explanation without figures need not wait.
@@ -107,7 +107,7 @@ def _search_curve(curve: CurveCampaign, model: StoredModel, rate: float) -> tupl
 
         return curve_figures(explanation.first, explanation, folder)
 
-    return curve_explain_answer(explanation, label(model)), draw
+    return curve_explanation(explanation, label(model)), draw
 
 
 def save_explanation(

@@ -11,8 +11,12 @@ from monitor.discovery import ChainComparison, Explanation, Fit
 from monitor.effects import ChainEffect
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.figures.drivers import predicted_against_measured, residual_against_driver
-from monitor.reporting.figures.models import error_falling, ranked_effects
+from monitor.reporting.figures.drivers import (
+    DrivenResiduals,
+    predicted_against_measured,
+    residual_against_driver,
+)
+from monitor.reporting.figures.models import ErrorSteps, RankedEffects, error_falling, ranked_effects
 from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import Figure
 from monitor.reporting.numbers import round_result
@@ -55,8 +59,7 @@ def comparison_figures(comparison: ChainComparison, fit: Fit, folder: Path) -> l
     files += _over_workspace(fit, *in_machine_frame(fit), folder)
     for name, driver, axis, residuals_um in drivers_followed(fit):
         figure = residual_against_driver(
-            driver,
-            residuals_um,
+            DrivenResiduals(driver, residuals_um),
             title=f"Residual along {axis} against {name}",
             driver_name=name,
             residual_name=f"residual along {axis} / µm",
@@ -101,7 +104,8 @@ def _ranked(missing: Sequence[MachineMissing], title: str) -> Figure:
         groups += [effect.rank] * (1 + len(rivals))
         notes += [_size(effect.amplitude, effect.u, effect.unit)]
         notes += ["not ruled out"] * len(rivals)
-    return ranked_effects(names, peaks, groups, title=title, value_name="peak displacement / µm", notes=notes)
+    effects = RankedEffects(names, peaks, groups, notes)
+    return ranked_effects(effects, title=title, value_name="peak displacement / µm")
 
 
 def _failing(explanation: Explanation, effect: str, folder: Path) -> list[str]:
@@ -113,13 +117,10 @@ def _failing(explanation: Explanation, effect: str, folder: Path) -> list[str]:
     against = against_effect(explanation, effect)
     if against is not None:
         figure = residual_against_driver(
-            against.at,
-            against.before,
+            DrivenResiduals(against.at, against.before, against.groups, after_um=against.after),
             title=f"{effect} is missing: the residual along {against.along} follows it",
             driver_name=against.driver,
             residual_name=f"residual along {against.along} / µm",
-            group=against.groups,
-            after_um=against.after,
         )
         files += save_figure(figure, folder, "missing-effect-before-after")
     return files
@@ -140,14 +141,9 @@ def _not_a_number_for_none(values: list[float | None]) -> list[float]:
 def _falling(missing: Sequence[MachineMissing], noise_um: float) -> Figure:
     rms = [missing[0].rms_before_um, *(effect.rms_after_um for effect in missing)]
     held_out = [missing[0].heldout_before_um, *(effect.heldout_after_um for effect in missing)]
-    return error_falling(
-        ["as it is", *(f"+ {effect.effect}" for effect in missing)],
-        rms,
-        _not_a_number_for_none(held_out),
-        noise_um=noise_um,
-        noise_name=NOISE_NAME,
-        title=f"The error falls from {rms[0]:.2f} to {rms[-1]:.2f} µm",
-    )
+    names = ["as it is", *(f"+ {effect.effect}" for effect in missing)]
+    steps = ErrorSteps(names, rms, _not_a_number_for_none(held_out), noise_um, NOISE_NAME)
+    return error_falling(steps, title=f"The error falls from {rms[0]:.2f} to {rms[-1]:.2f} µm")
 
 
 def _predicted(explanation: Explanation, text: str) -> tuple[Array, Array] | None:
@@ -175,12 +171,14 @@ def history_figures(steps: Sequence[MachineVersion | CurveVersion], folder: Path
     unit = "" if last.unit == "1" else last.unit
     named_unit = "" if isinstance(last, CurveVersion) else f" {unit}"
     figure = error_falling(
-        [step.model if step.added is None else f"+ {step.added}" for step in steps],
-        [step.rms for step in steps],
-        _not_a_number_for_none([step.heldout_rms for step in steps]),
-        noise_um=noise,
-        noise_name=noise_name,
-        unit=unit,
+        ErrorSteps(
+            [step.model if step.added is None else f"+ {step.added}" for step in steps],
+            [step.rms for step in steps],
+            _not_a_number_for_none([step.heldout_rms for step in steps]),
+            noise,
+            noise_name,
+            unit,
+        ),
         title=f"{last.model} on {last.campaign}: the error falls from {first.rms:{digits}} to "
         f"{last.rms:{digits}}{named_unit}",
     )

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from monitor.discovery import Fit
 from monitor.methods.free_form.problem import FreeFormProblem
 from monitor.records import Array
-from monitor.reporting.figures.shape import raw_and_identified
+from monitor.reporting.figures.shape import Deviations, raw_and_identified
 from monitor.reporting.figures.style import Figure
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.figure_files import save_figure
@@ -39,12 +39,14 @@ def _raw_and_identified(name: str, fit: Fit, problem: FreeFormProblem) -> Figure
     in_plane = [int(np.argmax(np.abs(joint.direction))) for joint in (plane.u, plane.v)]
     um = MICROMETRE.to_display(1.0)
     return raw_and_identified(
-        context.nominal[rows[first]][:, in_plane],
-        problem.normals[rows[first]][:, in_plane],
-        raw * um,
-        angles,
-        shape * um,
-        np.where(free, K * um * np.sqrt(variance), np.nan),
+        Deviations(
+            context.nominal[rows[first]][:, in_plane],
+            problem.normals[rows[first]][:, in_plane],
+            raw * um,
+            angles,
+            shape * um,
+            np.where(free, K * um * np.sqrt(variance), np.nan),
+        ),
         title=f"{name}, run {run}: the angles disagree by up to {um * float(np.nanmax(np.ptp(raw, axis=1))):.1f} µm; "
         f"U of the shape at most {K * um * float(np.sqrt(variance[free].max(initial=0.0))):.1f} µm",
         axes_names=(plane.u.name, plane.v.name),

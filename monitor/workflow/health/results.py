@@ -36,8 +36,8 @@ from monitor.workflow.health.stored import (
     VersionErrors,
 )
 from monitor.workflow.health.task import METHOD, Task, TaskResult, attempted
-from monitor.workflow.uncertainty.documents import save_uncertainty
-from monitor.workflow.uncertainty.evaluations import COVERAGE
+from monitor.workflow.uncertainty.request import COVERAGE
+from monitor.workflow.uncertainty.stored import save_uncertainty
 from monitor.workflow.volumetric.volumetric import save_map
 
 Record = TypeVar("Record")

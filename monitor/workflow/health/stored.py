@@ -9,8 +9,10 @@ import numpy as np
 
 from monitor.documents import OMITTED, named
 from monitor.records import Array
+from monitor.reporting.covariance_source import CovarianceSource
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.reporting.svg.map_slices import Slice
+from monitor.workflow.uncertainty.released import covariance_source_of
 
 
 @dataclass(frozen=True)
@@ -43,11 +45,13 @@ class StatedUncertainty:
     input_covariance: str
     refused: tuple[RefusedGroup, ...]
     guf: FrameworkResult
+    input_covariance_source: CovarianceSource | None = field(default=None, metadata=OMITTED)
 
     @property
     def rests_on_a_selection(self) -> bool:
         """Whether the scatter is that of runs that a user selected, and not of the campaign's own."""
-        return self.input_covariance.startswith("selection")
+        source = self.input_covariance_source or covariance_source_of(self.input_covariance)
+        return source.selection is not None
 
     def covariance(self) -> Array:
         """Covariance (k, k) of the parameters, in display units."""

@@ -21,15 +21,19 @@ from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
 from monitor.workflow.explain.explain import explanation_of
 from monitor.workflow.explain.explain_answer import ExplainAnswer
-from monitor.workflow.explain.machine_answer import explain_answer
+from monitor.workflow.explain.machine_answer import machine_explanation
 from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 from monitor.workflow.explain.versions import error_steps
 from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
-from monitor.workflow.uncertainty.documents import document
-from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate_fit
-from monitor.workflow.uncertainty.evaluations import COVERAGE, Evaluation, evaluation_of
-from monitor.workflow.volumetric.volumetric import map_document, map_of
+from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+from monitor.workflow.uncertainty.evaluation import evaluate_fit
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.stating import answer_of
+from monitor.workflow.uncertainty.stored import StatedUncertainty
+from monitor.workflow.volumetric.answer import VolumetricAnswer
+from monitor.workflow.volumetric.error_map import map_of
+from monitor.workflow.volumetric.stating import map_answer
 
 #: A result as it is stored and read again, made by the question that it answers.
 ComputedDocument = dict[str, Any]
@@ -62,9 +66,9 @@ class TaskResult:
     """What was computed; None for what was not asked or could not be, the latter with a remark that says why."""
 
     identified: tuple[StoredIdentification, ...] = ()
-    uncertainty: ComputedDocument | None = None
+    uncertainty: UncertaintyAnswer | None = None
     explanation: ExplainAnswer | None = None
-    map: ComputedDocument | None = None
+    map: VolumetricAnswer | None = None
     versions: tuple[MachineVersion | CurveVersion, ...] | None = None
     remarks: tuple[str, ...] = ()
 
@@ -101,17 +105,14 @@ class _Fitted:
         return fit(campaign_method(past).problem_of(past, as_model(self._task.model)))
 
     @cached_property
-    def evaluated(self) -> Evaluated:
+    def uncertainty(self) -> UncertaintyAnswer:
         task = self._task
-        return evaluate_fit(task.past, task.model, self.fit, task.run, method=METHOD, p=COVERAGE)
-
-    @cached_property
-    def uncertainty(self) -> ComputedDocument:
-        return document(self.evaluated)
+        request = UncertaintyRequest(task.past.name, task.run, method=METHOD)
+        return answer_of(evaluate_fit(task.past, task.model, self.fit, request))
 
     @property
-    def evaluation(self) -> Evaluation:
-        return evaluation_of(self.uncertainty, self._task.past, self._task.model)
+    def evaluated(self) -> StatedUncertainty:
+        return StatedUncertainty(self._task.past, self._task.model, self.uncertainty)
 
 
 def _computed(task: Task, fitted: _Fitted) -> TaskResult:
@@ -136,14 +137,14 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
         )
     if task.explanation:
         explanation = attempted(
-            lambda: explain_answer(explanation_of(task.past, task.model, fitted.fit)),
+            lambda: machine_explanation(explanation_of(task.past, task.model, fitted.fit)),
             "model and measurement could not be compared",
             remarks,
         )
     # Without an uncertainty there is no map, and its remark says why.
     if task.map and (uncertainty is not None or not task.uncertainty):
         mapped = attempted(
-            lambda: map_document(map_of(fitted.evaluation, fitted.fit), COVERAGE),
+            lambda: map_answer(map_of(fitted.evaluated, fitted.fit)),
             "the volumetric error could not be mapped",
             remarks,
         )

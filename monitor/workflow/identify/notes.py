@@ -1,4 +1,4 @@
-"""What has to be known before the numbers of an identified run are used: notes in plain sentences."""
+"""Warnings to those who use the numbers of an identified run, in plain sentences."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The base model of a curve, checked before anything of the folder is kept."""
+"""The base model of a curve, checked before anything of the folder is stored."""
 
 from __future__ import annotations
 

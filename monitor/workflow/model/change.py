@@ -17,8 +17,8 @@ from monitor.workflow.models import label, resolve
 def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
     """Make a version with one more effect, and fit its line to a campaign.
 
-    The effect must exist on one of the machines that are there, or for a curve in its ``campaign``, else in one of
-    the curves that are there. Raises EffectError, NotFoundError.
+    The effect must exist on one of the machines of the database, or for a curve in its ``campaign``, else in one of
+    the curves of the database. Raises EffectError, NotFoundError.
     """
     model = version_with(db, request)
     try:
@@ -72,7 +72,7 @@ def _checked_name(name: str | None, parent: StoredModel) -> str:
 def _changed(
     db: Database, model: StoredModel, new_name: str | None, steps: tuple[MachineVersion | CurveVersion, ...]
 ) -> ChangeModelAnswer:
-    """The answer; without a new name the name itself means another version from now on, which others have to know."""
+    """The answer, with a note for other users where the name without a version means another version from now on."""
     name, version = model.name, model.version
     note = None
     if version > 1 and new_name in (None, name):

@@ -26,8 +26,8 @@ class TimeAnswer:
 class PlannedParameter:
     """What a plan promises of a parameter, None where it gives no number.
 
-    ``figure_of_merit`` is what an hour of the plan says of the parameter, against the present plan; ``separation`` how
-    well it is told apart from the others (0 to 1).
+    ``figure_of_merit`` is what an hour of the plan says of the parameter, against the present plan; ``separation`` is
+    how well it is separated from the others (0 to 1).
     """
 
     u: float | None
@@ -62,7 +62,7 @@ class BallSubset:
 
 
 class SeparationVerdict(Enum):
-    """Whether two effects can be told apart."""
+    """Whether two effects can be separated."""
 
     IMPOSSIBLE = "no pose that this machine reaches tells them apart"
     WITH_POSES = "probe at these poses too"
@@ -71,7 +71,7 @@ class SeparationVerdict(Enum):
 
 @dataclass(frozen=True)
 class SeparationAnswer:
-    """Poses that tell two effects of size ``peak_um`` at the tip apart."""
+    """Poses that separate two effects of size ``peak_um`` at the tip."""
 
     effects: tuple[str, str]
     peak_um: float

@@ -15,7 +15,7 @@ class PlanRequest:
     """Weigh the plan of a campaign, and propose a better one where numbers or uncertainties are named.
 
     ``balls`` and ``poses`` ask for the best plan of so many; ``wanted`` (parameter to display unit) for the quickest
-    that reaches these standard uncertainties; ``separate`` for poses that tell two effects apart. Expanded
+    that reaches these standard uncertainties; ``separate`` for poses that separate two effects. Expanded
     uncertainties are of the coverage probability ``p``. Raises InputError.
     """
 

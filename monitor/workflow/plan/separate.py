@@ -1,4 +1,4 @@
-"""Poses that tell two effects apart which a plan may not."""
+"""Poses that separate two effects which the plan alone may not separate."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from monitor.workflow.models import as_model
 from monitor.workflow.plan.answer import SeparationAnswer, SeparationVerdict
 from monitor.workflow.plan.candidates import strokes_of
 
-# The size for which effects are told apart, at the tip.
+#: The size at the tip for which effects are separated.
 SEPARATED_PEAK = MICROMETRE.to_internal(5.0)
 
 

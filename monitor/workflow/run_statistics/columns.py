@@ -32,10 +32,10 @@ def campaign_columns(campaign: Campaign) -> dict[str, Array]:
         if name in columns:
             continue
         means = np.full(len(campaign.runs), np.nan)
-        for place, run in enumerate(campaign.runs):
-            own = values[campaign.probings.run == run.run]
-            if np.isfinite(own).any():
-                means[place] = np.nanmean(own)
+        for index, run in enumerate(campaign.runs):
+            of_run = values[campaign.probings.run == run.run]
+            if np.isfinite(of_run).any():
+                means[index] = np.nanmean(of_run)
         columns[name] = means
     return columns
 
@@ -67,9 +67,9 @@ def selected(columns: dict[str, Array], where: str | None, count: int) -> npt.ND
     if where is None:
         return np.ones(count, dtype=bool)
     try:
-        chosen: npt.NDArray[np.bool_] = Formula(where).evaluate(columns, count) != 0
-        return chosen
+        meets: npt.NDArray[np.bool_] = Formula(where).evaluate(columns, count) != 0
+        return meets
     except InputError as error:
         # The language is that of effects, whose rows are probings; here a row is a run.
-        words = str(error).replace(" probings", " runs").replace("sin(2*pi*x_mm/20)", "hours > 6")
-        raise InputError(f"--where: {words}") from error
+        message = str(error).replace(" probings", " runs").replace("sin(2*pi*x_mm/20)", "hours > 6")
+        raise InputError(f"--where: {message}") from error

@@ -27,10 +27,10 @@ def write_matrices(folder: Path, what: str, pooled: Pooling, units: Sequence[str
     paths = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, one in _kinds(pooled):
-            for kind, matrix in (("covariance", one.matrix), ("correlation", one.correlation)):
+        for name, covariance in _kinds(pooled):
+            for kind, matrix in (("covariance", covariance.matrix), ("correlation", covariance.correlation)):
                 path = folder / f"{what}-{kind}-{name}.csv"
-                _write(path, one, matrix, units)
+                _write(path, covariance, matrix, units)
                 paths.append(str(path))
     except OSError as error:
         raise InputError(f"--matrices {folder}: {error.strerror or error}") from error
@@ -40,20 +40,20 @@ def write_matrices(folder: Path, what: str, pooled: Pooling, units: Sequence[str
 def _kinds(pooled: Pooling) -> Iterator[tuple[str, Covariance]]:
     yield "all", pooled.covariance_all
     yield "pooled", pooled.covariance_pooled
-    for number, (label, one) in enumerate(
+    for number, (label, covariance) in enumerate(
         zip(pooled.labels, pooled.covariance_by_group, strict=True), start=1
     ):
-        if one is not None:
+        if covariance is not None:
             # A label may hold what no file name may; its number keeps two labels apart.
             plain = re.sub(r"[^\w.-]+", "-", label).strip("-")
-            yield f"{number}-{plain}", one
+            yield f"{number}-{plain}", covariance
 
 
-def _write(path: Path, one: Covariance, matrix: Array, units: Sequence[str]) -> None:
+def _write(path: Path, covariance: Covariance, matrix: Array, units: Sequence[str]) -> None:
     # Excel reads UTF-8 where a byte order mark says so.
     with path.open("w", encoding="utf-8-sig", newline="") as file:
         lines = csv.writer(file)
-        lines.writerow(["name", "unit", "degrees_of_freedom", "u", *one.names])
-        for name, unit, u, row in zip(one.names, units, one.u, matrix, strict=True):
+        lines.writerow(["name", "unit", "degrees_of_freedom", "u", *covariance.names])
+        for name, unit, u, row in zip(covariance.names, units, covariance.u, matrix, strict=True):
             numbers = ["" if not np.isfinite(value) else repr(float(value)) for value in row]
-            lines.writerow([name, unit, one.dof, repr(float(u)), *numbers])
+            lines.writerow([name, unit, covariance.dof, repr(float(u)), *numbers])

@@ -3,16 +3,18 @@ probed coordinate by probed coordinate."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.methods import Unable, campaign_method, require
+from monitor.methods import campaign_method, require
 from monitor.records import Array, Campaign
-from monitor.statistics import Homogeneity, Pooling, homogeneity, pool
+from monitor.statistics import AnalysisOfVariance, FalseDiscoveries, GroupTest, Homogeneity, Pooling
 from monitor.store import (
     Database,
     StoredIdentification,
@@ -21,98 +23,94 @@ from monitor.store import (
     load_identification,
     save_analysis,
 )
-from monitor.units import DEGREE
+from monitor.units import Unit
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.models import resolve
+from monitor.workflow.run_statistics.answer import (
+    GroupCorrelation,
+    NoVarianceComponents,
+    ParameterStatistics,
+    StatisticsAnswer,
+    VarianceComponents,
+)
 from monitor.workflow.run_statistics.columns import campaign_columns, group_labels, selected
+from monitor.workflow.run_statistics.coordinates import coordinate_statistics, probed
 from monitor.workflow.run_statistics.matrix_files import write_matrices
+from monitor.workflow.run_statistics.pooling import pooled_by_group
+from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.session_drift import session_drift
-from monitor.workflow.run_statistics.tests import SEED, components, histogram, normal_scatter, vector_tests
-from monitor.workflow.selections import group
-
-Document = dict[str, Any]
+from monitor.workflow.run_statistics.tests import SEED, components, finite, normal_scatter, vector_tests
+from monitor.workflow.selections.select import group
 
 
-def _matrix(found: StoredIdentification, runs: list[int]) -> tuple[list[str], list[Any], Array]:
-    by_run = {one.run: one for one in found.runs}
+def _matrix(identification: StoredIdentification, runs: list[int]) -> tuple[list[str], list[Unit], Array]:
+    """Names, display units and values (R, p), in these, of the parameters that have a number in every run."""
+    by_run = {run.run: run for run in identification.runs}
     values = np.array([by_run[run].estimate for run in runs])
-    kept = np.isfinite(values).all(axis=0)
-    units = [unit for unit, keep in zip(found.units, kept, strict=True) if keep]
-    names = [name for name, keep in zip(found.parameters, kept, strict=True) if keep]
-    return names, units, values[:, kept] / np.array([unit.factor for unit in units])
+    complete = np.isfinite(values).all(axis=0)
+    units = [unit for unit, finite in zip(identification.units, complete, strict=True) if finite]
+    names = [name for name, finite in zip(identification.parameters, complete, strict=True) if finite]
+    return names, units, values[:, complete] / np.array([unit.factor for unit in units])
 
 
-def coordinates(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | None:
-    """Names and values (R, 3 m), mm, of the probed coordinates; None where the runs' plans differ."""
-    probings = campaign.probings
-    linear = [axis for axis in ("X", "Y", "Z") if axis in probings.readings]
-    turning = sorted(set(probings.readings) - set(linear))
-    plan: list[tuple[Any, ...]] | None = None
-    rows_of = []
-    for run in runs:
-        rows = np.flatnonzero(probings.run == run)
-        rows = rows[np.argsort(probings.sequence[rows], kind="stable")]
-        own = [
-            (str(probings.target[row]), *(round(float(probings.readings[axis][row]), 6) for axis in turning))
-            for row in rows
-        ]
-        if plan is not None and own != plan:
-            return None
-        plan = own
-        rows_of.append(rows)
-    assert plan is not None
-    names = []
-    for place, (target, *angles) in enumerate(plan, start=1):
-        where = " ".join(
-            f"{axis.lower()}={angle / DEGREE.factor:g}" for axis, angle in zip(turning, angles, strict=True)
-        )
-        names += [f"{place} ball {target} {where} {axis.lower()}" for axis in linear]
-    values = np.array(
-        [np.stack([probings.readings[axis][rows] for axis in linear], axis=1).ravel() for rows in rows_of]
-    )
-    return names, values
+#: The keys of p-values and false discovery rates.
+_TESTS = ("bartlett_p", "levene_p", "anova_p", "welch_p", "kruskal_p", "anova_q", "bartlett_q")
 
 
-def _number(value: float) -> float | None:
-    return None if not np.isfinite(value) else float(value)
+def _p_values(tests: Homogeneity | None, index: int) -> Mapping[str, float | None]:
+    """p-values and false discovery rates of one parameter; None where a test was not made."""
 
+    def p_value(test: AnalysisOfVariance | GroupTest | None) -> float | None:
+        return None if test is None else finite(test.p_value[index])
 
-def _parameter(pooled: Pooling, tests: Homogeneity | None, place: int, unit: str) -> Document:
-    document: Document = {
-        "unit": unit,
-        "n": pooled.n,
-        "mean": float(pooled.mean[place]),
-        "u_all": float(pooled.u_all[place]),
-        "u_pooled": float(pooled.u_pooled[place]),
-        "u_by_day": {label: _number(pooled.u_by_group[j, place]) for j, label in enumerate(pooled.labels)},
-        "mean_by_day": {
-            label: float(pooled.mean_by_group[j, place]) for j, label in enumerate(pooled.labels)
-        },
-        "dof_all": pooled.dof_all,
-        "dof_pooled": pooled.dof_pooled,
+    def q_value(discoveries: FalseDiscoveries | None) -> float | None:
+        return None if discoveries is None else finite(discoveries.q_value[index])
+
+    if tests is None:
+        return dict.fromkeys(_TESTS)
+    return {
+        "bartlett_p": p_value(tests.bartlett),
+        "levene_p": p_value(tests.levene),
+        "anova_p": p_value(tests.anova),
+        "welch_p": p_value(tests.welch),
+        "kruskal_p": p_value(tests.kruskal),
+        "anova_q": q_value(tests.anova_discoveries),
+        "bartlett_q": q_value(tests.bartlett_discoveries),
     }
-    for name, test in (
-        ("bartlett", tests and tests.bartlett),
-        ("levene", tests and tests.levene),
-        ("anova", tests and tests.anova),
-        ("welch", tests and tests.welch),
-        ("kruskal", tests and tests.kruskal),
-    ):
-        document[f"{name}_p"] = None if not test else _number(float(test.p_value[place]))
-    document["anova_q"] = None if tests is None else _number(float(tests.anova_discoveries.q_value[place]))
-    of_variances = None if tests is None else tests.bartlett_discoveries
-    document["bartlett_q"] = None if of_variances is None else _number(float(of_variances.q_value[place]))
-    return document
+
+
+def _parameter(
+    pooled: Pooling,
+    tests: Homogeneity | None,
+    index: int,
+    unit: str,
+    normality_p: float | None,
+    variances: VarianceComponents | NoVarianceComponents,
+) -> ParameterStatistics:
+    return ParameterStatistics(
+        unit=unit,
+        n=pooled.n,
+        mean=float(pooled.mean[index]),
+        u_all=float(pooled.u_all[index]),
+        u_pooled=float(pooled.u_pooled[index]),
+        u_by_day={label: finite(pooled.u_by_group[j, index]) for j, label in enumerate(pooled.labels)},
+        mean_by_day={label: float(pooled.mean_by_group[j, index]) for j, label in enumerate(pooled.labels)},
+        dof_all=pooled.dof_all,
+        dof_pooled=pooled.dof_pooled,
+        **_p_values(tests, index),
+        normality_p=normality_p,
+        components=variances,
+    )
 
 
 def _identified(db: Database, campaign: Campaign, model: str | None) -> StoredIdentification:
-    """The identification of every run of a campaign; made where it is not there yet."""
+    """The identification of every run of a campaign; computed where it is not stored yet."""
     stored = resolve(db, model, campaign.method)
     try:
-        found = load_identification(db, campaign.name, stored.name, stored.version)
-        if len(found.runs) == len(campaign.runs):
-            return found
+        identification = load_identification(db, campaign.name, stored.name, stored.version)
+        if len(identification.runs) == len(campaign.runs):
+            return identification
     except NotFoundError:
         pass
     identify(db, IdentifyRequest(campaign.name, model))
@@ -125,16 +123,17 @@ def _groups(db: Database, campaign: Campaign, by: str) -> list[str]:
     if by in columns:
         return group_labels(columns, by)
     try:
-        chosen = find_selection(db, by, campaign.name)
+        selection = find_selection(db, by, campaign.name)
     except NotFoundError:
-        # Refuse with the columns that are there, of which there are more than selections.
+        # Refuse with the columns that there are, of which there are more than selections.
         return group_labels(columns, by)
-    return [by if run.run in chosen.runs else f"not {by}" for run in campaign.runs]
+    return [by if run.run in selection.runs else f"not {by}" for run in campaign.runs]
 
 
-def _chosen(db: Database, campaign: Campaign, where: str | None, select: str | None) -> npt.NDArray[np.bool_]:
-    """Which runs are taken: those of a stored selection for which the condition holds."""
-    keep = selected(campaign_columns(campaign), where, len(campaign.runs))
+def _taken(db: Database, campaign: Campaign, request: StatisticsRequest) -> npt.NDArray[np.bool_]:
+    """Which runs take part: those of a stored selection for which the condition holds."""
+    select = request.select
+    meets = selected(campaign_columns(campaign), request.where, len(campaign.runs))
     stored = None if select is None else group(db, select, campaign.name)
     if stored is None and select not in (None, campaign.name):
         raise InputError(
@@ -144,129 +143,76 @@ def _chosen(db: Database, campaign: Campaign, where: str | None, select: str | N
         raise InputError(
             f"--select {select}: that selection is of campaign {stored.campaign}, not {campaign.name}"
         )
-    return keep if stored is None else keep & np.array([run.run in stored.runs for run in campaign.runs])
+    return meets if stored is None else meets & np.array([run.run in stored.runs for run in campaign.runs])
 
 
-def stats(
-    db: Database,
-    campaign: str,
-    by: str = "day",
-    where: str | None = None,
-    model: str | None = None,
-    select: str | None = None,
-    matrices: Path | None = None,
-) -> Document:
-    """Statistics of a campaign's runs, grouped ``by`` a column or a stored selection, restricted to runs ``where`` a
-    condition holds and to those of the stored selection ``select``. Covariance and correlation matrices of the
-    parameters and of the probed coordinates go into CSV files in the folder ``matrices``.
+def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
+    """Compute and store statistics of a campaign's runs.
 
     Identifies the campaign first where that has not been done. Raises InputError for a column, condition or selection
     that the runs do not have, DataError for fewer than two runs.
     """
-    loaded = load_campaign(db, campaign)
-    require(campaign_method(loaded).statistics, loaded, "stats")
-    labels = _groups(db, loaded, by)
-    keep = _chosen(db, loaded, where, select)
-    runs = [run.run for run, kept in zip(loaded.runs, keep, strict=True) if kept]
-    groups = [text for text, kept in zip(labels, keep, strict=True) if kept]
+    campaign = load_campaign(db, request.campaign)
+    require(campaign_method(campaign).statistics, campaign, "stats")
+    labels = _groups(db, campaign, request.by)
+    taken = _taken(db, campaign, request)
+    runs = [run.run for run, take in zip(campaign.runs, taken, strict=True) if take]
+    groups = [label for label, take in zip(labels, taken, strict=True) if take]
     if len(runs) < 2:
         raise DataError(
-            f"statistics need at least two runs, but {len(runs)} of campaign {campaign} are chosen"
+            f"statistics need at least two runs, but {len(runs)} of campaign {campaign.name} are chosen"
         )
-    found = _identified(db, loaded, model)
-    names, units, values = _matrix(found, runs)
-    pooled, tests = _statistics(values, groups, names)
-    parameters = {
-        name: _parameter(pooled, tests, place, units[place].name) for place, name in enumerate(names)
-    }
-    normal, parts = normal_scatter(values, groups), components(values, groups)
-    for place, name in enumerate(names):
-        parameters[name] |= {"normality_p": normal[place], "components": parts[place]}
-    document: Document = {
-        "campaign": campaign,
-        "machine": loaded.machine.id,
-        "by": by,
-        "where": where,
-        "select": select,
-        "groups": {label: int(count) for label, count in zip(pooled.labels, pooled.counts, strict=True)},
-        "parameters": parameters,
-        "vector": vector_tests(values, groups),
-        "drift": session_drift(loaded, found, runs),
-        "coordinates": _coordinates(loaded, runs, groups),
-        "parameter_order": names,
-        "correlation_all": _rows(pooled.covariance_all.correlation),
-        "correlation_pooled": _rows(pooled.covariance_pooled.correlation),
-        "correlation_by_group": {
-            label: {"degrees_of_freedom": one.dof, "correlation": _rows(one.correlation)}
-            for label, one in zip(pooled.labels, pooled.covariance_by_group, strict=True)
-            if one is not None
+    identification = _identified(db, campaign, request.model)
+    names, units, values = _matrix(identification, runs)
+    pooled, tests = pooled_by_group(values, groups, names)
+    normal, variances = normal_scatter(values, groups), components(values, groups)
+    answer = StatisticsAnswer(
+        campaign=campaign.name,
+        machine=campaign.machine.id,
+        by=request.by,
+        where=request.where,
+        select=request.select,
+        groups={label: int(count) for label, count in zip(pooled.labels, pooled.counts, strict=True)},
+        parameters={
+            name: _parameter(pooled, tests, index, units[index].name, normal[index], variances[index])
+            for index, name in enumerate(names)
         },
-        "degrees_of_freedom_all": pooled.dof_all,
-        "degrees_of_freedom_pooled": pooled.dof_pooled,
-        "seed": SEED,
-    }
+        vector=vector_tests(values, groups),
+        drift=session_drift(campaign, identification, runs),
+        coordinates=coordinate_statistics(campaign, runs, groups),
+        parameter_order=tuple(names),
+        correlation_all=pooled.covariance_all.correlation,
+        correlation_pooled=pooled.covariance_pooled.correlation,
+        correlation_by_group={
+            label: GroupCorrelation(covariance.dof, covariance.correlation)
+            for label, covariance in zip(pooled.labels, pooled.covariance_by_group, strict=True)
+            if covariance is not None
+        },
+        degrees_of_freedom_all=pooled.dof_all,
+        degrees_of_freedom_pooled=pooled.dof_pooled,
+        seed=SEED,
+    )
     save_analysis(
-        db, "statistics", document, method=f"by {by}", campaign=campaign,
-        model=found.model, model_version=found.model_version, seed=SEED,
+        db, "statistics", to_document(answer), method=f"by {request.by}", campaign=campaign.name,
+        model=identification.model, model_version=identification.model_version, seed=SEED,
     )  # fmt: skip
-    if matrices is not None:
-        document["matrices"] = write_matrices(matrices, "parameters", pooled, [unit.name for unit in units])
-        probed = _probed(loaded, runs)
-        if not isinstance(probed, str):
-            of_probed = _statistics(1e3 * probed[1], groups, probed[0])[0]
-            document["matrices"] += write_matrices(
-                matrices, "coordinates", of_probed, ["µm"] * len(probed[0])
-            )
-    return document
+    if request.matrices is not None:
+        of_parameters = write_matrices(request.matrices, "parameters", pooled, [unit.name for unit in units])
+        of_coordinates = _coordinate_matrices(request.matrices, campaign, runs, groups)
+        answer = replace(answer, matrices=(*of_parameters, *of_coordinates))
+    if request.figures is not None:
+        # The drawing library takes longer to load than most commands to run.
+        from monitor.workflow.run_statistics.figures import statistics_figure
+
+        drawings = statistics_figure(answer, campaign, identification, request.figures)
+        answer = replace(answer, figures=drawings)
+    return answer
 
 
-def _statistics(values: Array, groups: list[str], names: list[str]) -> tuple[Pooling, Homogeneity | None]:
-    alike = len(set(groups)) < 2 or len(set(groups)) == len(groups)
-    # Groups of one run each tell nothing apart: all runs are one group then.
-    pooled = pool(values, ["all"] * len(groups) if len(set(groups)) == len(groups) else groups, names)
-    return pooled, None if alike else homogeneity(values, groups, names)
-
-
-def _probed(campaign: Campaign, runs: list[int]) -> tuple[list[str], Array] | str:
-    """Names and values (R, 3 m), mm, of the probed coordinates, or why there are none."""
-    comparable = campaign_method(campaign).coordinates
-    if isinstance(comparable, Unable):
-        return comparable.why
-    return coordinates(campaign, runs) or "the runs do not follow one plan"
-
-
-def _coordinates(campaign: Campaign, runs: list[int], groups: list[str]) -> Document:
-    found = _probed(campaign, runs)
-    if isinstance(found, str):
-        return {
-            "n": 0,
-            "why": found,
-            "bartlett_p": [],
-            "anova_p": [],
-            "histograms": {},
-        }
-    names, values = found
-    pooled, tests = _statistics(values, groups, names)
-    p_values: dict[str, list[float | None]] = {"bartlett": [], "anova": []}
-    if tests is not None:
-        p_values["anova"] = [_number(p) for p in tests.anova.p_value]
-        p_values["bartlett"] = [] if tests.bartlett is None else [_number(p) for p in tests.bartlett.p_value]
-    return {
-        "n": len(names),
-        "names": names,
-        "u_all_um": (pooled.u_all * 1e3).tolist(),
-        "u_pooled_um": (pooled.u_pooled * 1e3).tolist(),
-        "u_by_day_um": {
-            label: (u * 1e3).tolist()
-            for label, u in zip(pooled.labels, pooled.u_by_group, strict=True)
-            if np.isfinite(u).all()
-        },
-        "bartlett_p": p_values["bartlett"],
-        "anova_p": p_values["anova"],
-        "normality_p": normal_scatter(values, groups),
-        "histograms": {name: histogram(values) for name, values in p_values.items() if values},
-    }
-
-
-def _rows(matrix: Array) -> list[list[float | None]]:
-    return [[_number(value) for value in row] for row in matrix]
+def _coordinate_matrices(folder: Path, campaign: Campaign, runs: list[int], groups: list[str]) -> list[str]:
+    readings = probed(campaign, runs)
+    if isinstance(readings, str):
+        return []
+    names, values = readings
+    pooled = pooled_by_group(1e3 * values, groups, names)[0]
+    return write_matrices(folder, "coordinates", pooled, ["µm"] * len(names))

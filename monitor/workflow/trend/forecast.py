@@ -62,7 +62,7 @@ def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, str | None]:
     except DataError as error:
         return None, f"no backtest: {error}"
     return ForecastTest(
-        made=test.made, inside=test.covered, share_inside=test.coverage, level=test.level,
+        made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
         bias=test.bias, rms=test.rms, unit=piece.unit,
         method="every day foretold by the days before it since the last change; its first run counts",
     ), None  # fmt: skip

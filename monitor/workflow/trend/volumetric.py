@@ -15,6 +15,10 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics import (
+    ErrorVectors,
+    JointLines,
+    JointSeries,
+    LengthQuestion,
     Trend,
     backtest_longest,
     forecast_longest,
@@ -102,7 +106,8 @@ def _vectors(
     from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
     from monitor.workflow.identify.fitting import machine_problem
     from monitor.workflow.models import resolve
-    from monitor.workflow.volumetric.volumetric import POINTS, poses_of, ranges_of
+    from monitor.workflow.volumetric.error_map import poses_of, ranges_of
+    from monitor.workflow.volumetric.request import POINTS
 
     campaign = load_campaign(db, str(history.campaign[-1]))
     fitted = fit(machine_problem(campaign, resolve(db, model, campaign.method)))
@@ -181,11 +186,13 @@ def _backtest(
         return trend(values[mask, column], t[mask], u=weights, days=days[mask], robust=False)
 
     try:
-        test = backtest_longest(values, t, days, fit, vectors.sensitivity, vectors.at_zero, rng=rng)
+        test = backtest_longest(
+            JointSeries(values, t, days), fit, ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng
+        )
     except DataError as error:
         return None, f"no backtest of the volumetric error: {error}"
     return VolumetricTest(
-        made=test.made, inside=test.covered, share_inside=test.coverage, level=test.level,
+        made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
         bias_um=test.bias, rms_um=test.rms,
     ), None  # fmt: skip
 
@@ -227,9 +234,11 @@ def volumetric_forecast(
     correlation, shrunk, _ = residual_correlation(_residuals(parameters), parameters.days)
     horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
     ahead = forecast_longest(
-        list(parameters.lines.values()), correlation, vectors.sensitivity, vectors.at_zero, limit, now,
-        [max(question.check, now)], rng=rng, reliability=question.reliability, horizon=horizon,
-    )  # fmt: skip
+        JointLines(list(parameters.lines.values()), correlation),
+        ErrorVectors(vectors.sensitivity, vectors.at_zero),
+        LengthQuestion(limit, now, [max(question.check, now)], horizon, question.reliability),
+        rng=rng,
+    )
     test, why_no_test = _backtest(parameters, vectors, rng)
     low, high = (date(t, offset) if t < horizon else None for t in ahead.crossing.interval)
     return replace(

@@ -6,7 +6,7 @@ together, else the stated standard uncertainty, uncorrelated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +15,14 @@ from monitor.discovery import Fit
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.exceptions import DataError, InputError
 from monitor.records import Array, Campaign, LinearAxes
+from monitor.reporting.covariance_source import CovarianceKind, CovarianceSource
 from monitor.uncertainty import Inputs, OutputContribution, overall, pooled_by_day, uncorrelated
 from monitor.uncertainty.linear_axes import row_covariances
-from monitor.uncertainty.row_problem import repeated_readings
-from monitor.uncertainty.run_problem import OneRun, RunProblem
+from monitor.uncertainty.measured_run import MeasuredRun
+from monitor.uncertainty.row_run import repeated_readings
 from monitor.uncertainty.sensitivity import Sensitivity
+from monitor.uncertainty.touched_run import TouchedRun
+from monitor.workflow.selections.readings import SelectedReadings
 
 READINGS = "readings"
 BAR = "scale bar"
@@ -28,93 +31,76 @@ CALIBRATED = "calibrated quantities"
 FEWEST_DEGREES_OF_FREEDOM = 8
 
 
-@dataclass(frozen=True)
-class SelectedReadings:
-    """Readings (runs, 3n) in mm of the runs of the stored selection ``name``, and the day of each."""
-
-    name: str
-    values: Array
-    days: npt.NDArray[np.int64]
-
-
 def reading_inputs(
-    found: Fit, campaign: Campaign, one: OneRun, chosen: SelectedReadings | None
-) -> tuple[Inputs, str]:
-    """Inputs of the readings of a run, and in words where their covariance is from: all runs, or a stored selection."""
-    problem, names = found.problem, one.reading_names
+    fit: Fit, campaign: Campaign, run: MeasuredRun, selected: SelectedReadings | None
+) -> tuple[Inputs, CovarianceSource]:
+    """Inputs of the readings of a run, and where their covariance comes from: all runs, or a stored selection.
+
+    Raises DataError where the selection has too few runs.
+    """
+    names = run.reading_names
     count = len(names)
     units = ("mm",) * count
-    days = {run.run: run.day for run in campaign.runs}
-    labels = np.array([days[int(run)] for run in problem.runs])
-    if chosen is not None:
-        values, labels = chosen.values, chosen.days
-        if len(labels) - 1 < FEWEST_DEGREES_OF_FREEDOM:
-            raise DataError(
-                f"--select {chosen.name}: {len(labels)} runs leave {len(labels) - 1} degrees of freedom for a "
-                f"covariance; at least {FEWEST_DEGREES_OF_FREEDOM} are needed"
-            )
-    else:
-        try:
-            values = repeated_readings(problem)
-        except DataError:
-            values = np.zeros((0, count))
-    runs = len(labels)
-    stated = campaign.probe.standard_uncertainty
-    if len(values) and runs - len(np.unique(labels)) >= FEWEST_DEGREES_OF_FREEDOM:
-        inputs = pooled_by_day(values, labels, names, units, source=READINGS)
-        words = f"repeated runs, pooled by day, {runs - len(np.unique(labels))} degrees of freedom"
+    values, days = _repeated(fit, campaign, count) if selected is None else (selected.values, selected.days)
+    name = None if selected is None else selected.name
+    runs = len(days)
+    if selected is not None and runs - 1 < FEWEST_DEGREES_OF_FREEDOM:
+        raise DataError(
+            f"--select {name}: {runs} runs leave {runs - 1} degrees of freedom for a "
+            f"covariance; at least {FEWEST_DEGREES_OF_FREEDOM} are needed"
+        )
+    within_days = runs - len(np.unique(days))
+    if len(values) and within_days >= FEWEST_DEGREES_OF_FREEDOM:
+        inputs = pooled_by_day(values, days, names, units, source=READINGS)
+        source = CovarianceSource(CovarianceKind.POOLED_BY_DAY, runs, within_days, selection=name)
     elif len(values) and runs - 1 >= FEWEST_DEGREES_OF_FREEDOM:
         inputs = overall(values, names, units, source=READINGS)
-        words = f"all {runs} runs, {runs - 1} degrees of freedom"
+        source = CovarianceSource(CovarianceKind.ALL_RUNS, runs, runs - 1, selection=name)
     else:
-        repeatability = lack_of_fit(found)[1]
-        u = max(stated, repeatability or 0.0)
-        inputs = uncorrelated(names, units, one.inputs[:count], one.stated * (u / stated), source=READINGS)
-        words = f"the probe's stated standard uncertainty of {stated * 1e3:g} µm; too few repeated runs of one plan"
-        if u > stated:
-            words = f"the repeatability of {u * 1e3:.2g} µm, which exceeds the probe's statement; too few runs for more"
-    if chosen is not None:
-        words = f"selection {chosen.name}: {words}"
+        stated = campaign.probe.standard_uncertainty
+        u = max(stated, lack_of_fit(fit)[1] or 0.0)
+        inputs = uncorrelated(names, units, run.inputs[:count], run.stated * (u / stated), source=READINGS)
+        kind = CovarianceKind.REPEATABILITY if u > stated else CovarianceKind.STATED_BY_PROBE
+        source = CovarianceSource(kind, u_um=u * 1e3, selection=name)
     # The estimate is that of the run itself: its results are stated.
-    own = Inputs(
-        inputs.names, inputs.units, one.inputs[:count], inputs.covariance, inputs.sources, inputs.dof
-    )
-    return own, words
+    return replace(inputs, estimate=run.inputs[:count]), source
 
 
-def calibrated_inputs(one: OneRun) -> Inputs | None:
+def _repeated(fit: Fit, campaign: Campaign, count: int) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Readings (runs, count) of all runs and the day of each; no readings where the runs follow different plans."""
+    days = {run.run: run.day for run in campaign.runs}
+    labels = np.array([days[int(run)] for run in fit.problem.runs])
+    try:
+        return repeated_readings(fit.problem), labels
+    except DataError:
+        return np.zeros((0, count)), labels
+
+
+def calibrated_inputs(run: MeasuredRun) -> Inputs | None:
     """Inputs of the calibrated quantities of a run; None where it has none."""
-    names, unit, u = one.calibrated
+    names, unit, u = run.calibrated
     if not names:
         return None
-    count = len(one.reading_names)
-    source = BAR if isinstance(one, RunProblem) else CALIBRATED
-    return uncorrelated(names, (unit,) * len(names), one.inputs[count:], u, source=source)
+    count = len(run.reading_names)
+    source = BAR if isinstance(run, TouchedRun) else CALIBRATED
+    return uncorrelated(names, (unit,) * len(names), run.inputs[count:], u, source=source)
 
 
 def with_linear_axes(
-    one: OneRun, inputs: Inputs, at: Sensitivity, names: tuple[str, ...], axes: LinearAxes
+    run: MeasuredRun, inputs: Inputs, sensitivity: Sensitivity, names: tuple[str, ...], axes: LinearAxes
 ) -> tuple[Inputs, list[OutputContribution]]:
     """The inputs with what errors of the linear axes do to them, and the same by source as lines of the budget."""
-    if isinstance(one, RunProblem):
+    if isinstance(run, TouchedRun):
         raise InputError(
             "--linear-axes is for methods that take the linear axes as known, such as rotary-probing; this method "
             "identifies errors of the linear axes itself"
         )
-    count, rows = len(one.reading_names), at.rows(names)[:, : len(one.reading_names)]
+    count = len(run.reading_names)
+    rows = sensitivity.rows(names)[:, :count]
     covariance = inputs.covariance.copy()
     lines = []
-    for source, of_rows in row_covariances(one, at.unknowns, axes).items():
+    for source, of_rows in row_covariances(run, sensitivity.unknowns, axes).items():
         covariance[:count, :count] += of_rows
         of_outputs = rows @ of_rows @ rows.T
         lines.append(OutputContribution(source, 0.5 * (of_outputs + of_outputs.T)))
-    whole = Inputs(inputs.names, inputs.units, inputs.estimate, covariance, inputs.sources, inputs.dof)
-    return whole, lines
-
-
-def left_out(known: tuple[str, ...], axes_stated: bool) -> str:
-    """What a method takes as known and nobody stated the errors of, for people who read u."""
-    left = [what for what in known if not (axes_stated and what == "the linear axes")]
-    if not left:
-        return ""
-    return f"; errors of {' and '.join(left)} are no part of u: the method takes them as known"
+    return replace(inputs, covariance=covariance), lines

@@ -11,10 +11,11 @@ from threadpoolctl import threadpool_limits
 from monitor.exceptions import InputError
 from monitor.uncertainty import BlockSampler, Inputs, normal_inputs, run_estimator
 from monitor.uncertainty.cluster import cluster
+from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.processes import processes
 from monitor.uncertainty.propagation import Model
-from monitor.uncertainty.run_problem import OneRun
 from monitor.uncertainty.spread import spread
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 # Threads of this process where nothing else was asked for: the trials release the interpreter's lock.
 THREADS = 2
@@ -22,24 +23,20 @@ THREADS = 2
 
 @contextmanager
 def trials_of(
-    one: OneRun,
-    inputs: Inputs,
-    names: tuple[str, ...],
-    seed: int,
-    workers: int | None = None,
-    address: str | None = None,
+    run: MeasuredRun, inputs: Inputs, names: tuple[str, ...], request: UncertaintyRequest
 ) -> Iterator[tuple[Model, BlockSampler, int]]:
     """Model, sampler and number of threads for ``adaptive_monte_carlo``: the same numbers wherever they are made.
 
-    ``workers`` processes of this machine, or the Dask cluster at ``address``, or else threads of this process.
-    Raises InputError where both are asked for.
+    ``request.workers`` processes of this machine, or the Dask cluster at ``request.cluster``, or else threads of this
+    process. Raises InputError where both are asked for.
     """
+    workers, address = request.workers, request.cluster
     if workers is not None and address is not None:
         raise InputError(
             "--workers starts processes here, --cluster uses those of a cluster: choose one of them"
         )
-    recipe = partial(run_estimator, one, inputs, names, seed=seed)
-    sampler = BlockSampler(normal_inputs(inputs), seed=seed)
+    recipe = partial(run_estimator, run, inputs, names, seed=request.seed)
+    sampler = BlockSampler(normal_inputs(inputs), seed=request.seed)
     if workers is None and address is None:
         # As in the workers: with several threads the linear algebra of the recipe may round otherwise.
         with threadpool_limits(1, "blas"):

@@ -1,6 +1,8 @@
-"""What one evaluated run knows of its machine: geometric errors with their covariance, and what it does not know."""
+"""The geometric errors that one evaluated run determines, with their covariance, and those that it does not."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,77 +11,113 @@ from monitor.effects import ChainEffect
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
 from monitor.uncertainty.volumetric import GeometricErrors
-from monitor.workflow.uncertainty.evaluations import Evaluation
+from monitor.workflow.uncertainty.stored import StatedUncertainty
+
+#: Why a parameter is not in the map, besides the reasons for which it has no number in any run.
+NO_NUMBER = "it has no number in this run"
+NO_MACHINE_ERROR = "it is no error of the machine"
+NOT_DETERMINED = "the plan does not determine it"
 
 
-def geometric_errors(found: Evaluation, fit: Fit) -> tuple[GeometricErrors, dict[str, str]]:
+def geometric_errors(evaluated: StatedUncertainty, fit: Fit) -> tuple[GeometricErrors, dict[str, str]]:
     """What is known of the machine from one evaluated run, and what is not, with the reason.
 
     ``fit`` is the evaluated model fitted to the campaign.
     """
     problem, solution = fit.problem, fit.solution
-    context = problem.context
-    run = int(np.flatnonzero(problem.runs == found.run)[0])
-    fixed, coefficients = problem.resolved(solution.common)
-    left_out = {name: why for parameters, why in found.refused for name in parameters}
+    run = int(np.flatnonzero(problem.runs == evaluated.run)[0])
+    of_run, left_out = _of_run(evaluated, fit)
+    shared, places, reasons = _shared(fit)
+    covariance = np.zeros((len(of_run.names) + len(shared.names),) * 2)
+    columns = [evaluated.names.index(name) for name in of_run.names]
+    covariance[: len(columns), : len(columns)] = evaluated.covariance[np.ix_(columns, columns)] * np.outer(
+        of_run.factors, of_run.factors
+    )
+    local = [problem.base_names.index(name) for name in of_run.names]
+    if len(solution.common):
+        covariance += _of_shared(fit, run, local, places)
+    effects = [*of_run.effects, *shared.effects]
+    names = [*of_run.names, *shared.names]
+    estimate = [*of_run.estimate, *shared.estimate]
+    for effect, name in problem.known_errors:
+        # Measured by other means: its uncertainty is the stated one, and what the others share with it is first order.
+        index = problem.local_names.index(name)
+        effects.append(effect)
+        names.append(name)
+        estimate.append(float(solution.local[run, index]))
+        beside = np.zeros(len(covariance))
+        beside[: len(local)] = solution.local_covariance[run, index, local]
+        variance = solution.local_covariance[run, index, index]
+        covariance = np.block([[covariance, beside[:, None]], [beside[None, :], variance]])
+    errors = GeometricErrors(
+        effects=tuple(effects),
+        names=tuple(names),
+        estimate=np.array(estimate),
+        covariance=covariance,
+        context=problem.context,
+        run=evaluated.run,
+        tip=problem.ends(problem.own_of(solution.local))[1][
+            int(np.argmax(problem.context.run == evaluated.run))
+        ],
+        degrees_of_freedom=evaluated.fewest_dof,
+    )
+    return errors, left_out | reasons
+
+
+@dataclass(frozen=True)
+class _Known:
+    """Effects with their parameters: names, estimates in internal units, and what turns display units into these."""
+
+    effects: tuple[ChainEffect, ...]
+    names: tuple[str, ...]
+    estimate: tuple[float, ...]
+    factors: tuple[float, ...]
+
+
+def _of_run(evaluated: StatedUncertainty, fit: Fit) -> tuple[_Known, dict[str, str]]:
+    """The effects whose parameters all have a number in the run, and the other parameters with the reason."""
+    left_out = {name: refusal.why for refusal in evaluated.answer.refused for name in refusal.parameters}
     effects: list[ChainEffect] = []
     names: list[str] = []
     factors: list[float] = []
-    for effect in problem.base:
-        own = effect.parameters(context)
-        if isinstance(effect, ChainEffect) and all(name in found.names for name in own):
+    for effect in fit.problem.base:
+        parameters = effect.parameters(fit.problem.context)
+        if isinstance(effect, ChainEffect) and all(name in evaluated.names for name in parameters):
             effects.append(effect)
-            names += own
-            factors += [effect.unit.factor] * len(own)
+            names += parameters
+            factors += [effect.unit.factor] * len(parameters)
         elif isinstance(effect, ChainEffect):
-            left_out |= {name: "it has no number in this run" for name in own if name not in left_out}
-    places = [found.names.index(name) for name in names]
-    local = [problem.base_names.index(name) for name in names]
-    estimate = [float(found.estimate[place]) * factor for place, factor in zip(places, factors, strict=True)]
-    shared: list[int] = []
-    at = coefficient = 0
-    for one, plain in zip(problem.shared, fixed.added, strict=True):
-        own_places = range(at, at + one.size)
-        at += one.unknowns
+            left_out |= {name: NO_NUMBER for name in parameters if name not in left_out}
+    estimates = evaluated.answer.guf.estimate
+    values = tuple(estimates[name] * factor for name, factor in zip(names, factors, strict=True))
+    return _Known(tuple(effects), tuple(names), values, tuple(factors)), left_out
+
+
+def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, str]]:
+    """The effects that all runs share and the plan determines, the indices of their common unknowns, and the others
+    with the reason."""
+    problem, solution = fit.problem, fit.solution
+    fixed, coefficients = problem.resolved(solution.common)
+    effects: list[ChainEffect] = []
+    names: list[str] = []
+    estimate: list[float] = []
+    indices: list[int] = []
+    left_out: dict[str, str] = {}
+    first = coefficient = 0
+    for shared, plain in zip(problem.shared, fixed.added, strict=True):
+        unknowns = range(first, first + shared.size)
+        first += shared.unknowns
         if not isinstance(plain, ChainEffect):
-            left_out |= dict.fromkeys(one.names(), "it is no error of the machine")
-        elif not all(solution.common_free[list(own_places)]):
-            left_out |= dict.fromkeys(one.names(), "the plan does not determine it")
+            left_out |= dict.fromkeys(shared.names(), NO_MACHINE_ERROR)
+        elif not all(solution.common_free[list(unknowns)]):
+            left_out |= dict.fromkeys(shared.names(), NOT_DETERMINED)
         else:
             effects.append(plain)
-            names += one.effect.parameters(context)
-            estimate += map(float, coefficients[coefficient : coefficient + one.size])
-            shared += own_places
-        coefficient += one.size
-    covariance = np.zeros((len(names), len(names)))
-    covariance[: len(places), : len(places)] = found.covariance[np.ix_(places, places)] * np.outer(
-        factors, factors
-    )
-    if len(solution.common):
-        covariance += _of_shared(fit, run, local, shared)
-    for effect, name in problem.known_errors:
-        # Measured by other means: its uncertainty is the stated one, and what the others share with it is first order.
-        place = problem.local_names.index(name)
-        effects.append(effect)
-        names.append(name)
-        estimate.append(float(solution.local[run, place]))
-        beside = np.zeros(len(covariance))
-        beside[: len(local)] = solution.local_covariance[run, place, local]
-        own_variance = solution.local_covariance[run, place, place]
-        covariance = np.block([[covariance, beside[:, None]], [beside[None, :], own_variance]])
-    return (
-        GeometricErrors(
-            effects=tuple(effects),
-            names=tuple(names),
-            estimate=np.array(estimate),
-            covariance=covariance,
-            context=context,
-            run=found.run,
-            tip=problem.ends(problem.own_of(solution.local))[1][int(np.argmax(context.run == found.run))],
-            degrees_of_freedom=found.fewest_dof,
-        ),
-        left_out,
-    )
+            names += shared.effect.parameters(problem.context)
+            estimate += map(float, coefficients[coefficient : coefficient + shared.size])
+            indices += unknowns
+        coefficient += shared.size
+    return _Known(tuple(effects), tuple(names), tuple(estimate), ()), indices, left_out
 
 
 def _of_shared(fit: Fit, run: int, local: list[int], shared: list[int]) -> Array:
@@ -91,9 +129,9 @@ def _of_shared(fit: Fit, run: int, local: list[int], shared: list[int]) -> Array
     """
     solution = fit.solution
     space = eliminate(solution.last.local[[run]])
-    answer = -(space.inverse[0] @ (space.basis[0].T @ solution.last.common[run]))
+    response = -(space.inverse[0] @ (space.basis[0].T @ solution.last.common[run]))
     count = len(solution.common)
-    both = np.concatenate([answer[local], np.eye(count)[shared]])
+    both = np.concatenate([response[local], np.eye(count)[shared]])
     covariance = np.where(np.isfinite(solution.common_covariance), solution.common_covariance, 0.0)
     added: Array = fit.scale**2 * both @ covariance @ both.T
     return added

@@ -19,7 +19,8 @@ from monitor.methods.chain.least_squares import Linearisation
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
-from monitor.uncertainty.run_problem import OneRun, rows_of, same_plan, touch_run
+from monitor.uncertainty.measured_run import MeasuredRun, rows_of, same_plan
+from monitor.uncertainty.touched_run import touch_run
 
 
 def taken(problem: ChainProblem, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> ChainProblem:
@@ -28,17 +29,17 @@ def taken(problem: ChainProblem, rows: npt.NDArray[np.int64], run: npt.NDArray[n
     Every array of the problem with one entry a row is taken along. A method with other arrays of its own (one entry
     a run) gives its problem a method ``taken(rows, run)``.
     """
-    own = getattr(problem, "taken", None)
-    if own is not None:
-        found: ChainProblem = own(rows, run)
-        return found
-    chosen: dict[str, Any] = {
+    method_taken = getattr(problem, "taken", None)
+    if method_taken is not None:
+        several: ChainProblem = method_taken(rows, run)
+        return several
+    arrays: dict[str, Any] = {
         field.name: value[rows]
         for field in fields(problem)
         if isinstance(value := getattr(problem, field.name), np.ndarray)
         and len(value) == len(problem.context)
     }
-    return replace(problem, context=replace(rows_of(problem.context, rows), run=run), **chosen)
+    return replace(problem, context=replace(rows_of(problem.context, rows), run=run), **arrays)
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class _Shifted:
 
 
 @dataclass(frozen=True)
-class RowProblem(OneRun):
+class RowRun(MeasuredRun):
     """One run of any method: inputs are deviations of what its rows tell, then of its calibrated quantities.
 
     A calibrated quantity has no unit here: its deviation is in standard uncertainties.
@@ -94,7 +95,7 @@ class RowProblem(OneRun):
         return _Shifted(several, self.whitened(inputs).T)
 
 
-def run_problem(problem: ChainProblem, run: int, common: Array | None = None) -> OneRun:
+def measured_run(problem: ChainProblem, run: int, common: Array | None = None) -> MeasuredRun:
     """The problem of one ``run``; ``common`` (c,) defaults to zeros, right where no effect was added.
 
     Raises DataError for a run that is not there.
@@ -105,7 +106,7 @@ def run_problem(problem: ChainProblem, run: int, common: Array | None = None) ->
     if isinstance(problem, TouchProblem):
         return touch_run(problem, run, held)
     rows = np.flatnonzero(problem.context.run == run)
-    return RowProblem(taken(problem, rows, problem.context.run[rows]), held)
+    return RowRun(taken(problem, rows, problem.context.run[rows]), held)
 
 
 def repeated_readings(problem: ChainProblem) -> Array:
@@ -115,14 +116,14 @@ def repeated_readings(problem: ChainProblem) -> Array:
     For rows they are the residuals of every run at one and the same state: only their differences have a meaning.
     Raises DataError where a run probed other targets or indexations than the first.
     """
-    runs = [run_problem(problem, int(run)) for run in problem.runs]
-    for number, one in zip(problem.runs, runs, strict=True):
-        if not same_plan(one.problem, runs[0].problem):
+    runs = [measured_run(problem, int(run)) for run in problem.runs]
+    for number, single in zip(problem.runs, runs, strict=True):
+        if not same_plan(single.problem, runs[0].problem):
             raise DataError(
                 f"run {number} follows another plan than run {problem.runs[0]}; a covariance of the readings needs "
                 f"the same targets and indexations in the same order"
             )
     if isinstance(problem, TouchProblem):
-        return np.array([one.inputs[: len(one.reading_names)] for one in runs])
+        return np.array([single.inputs[: len(single.reading_names)] for single in runs])
     start, common = runs[0].problem.start, problem.common_start
-    return np.array([one.problem.vectors(start, common).ravel() for one in runs])
+    return np.array([single.problem.vectors(start, common).ravel() for single in runs])

@@ -1,0 +1,63 @@
+"""Where the covariance of a run's readings comes from: as data, and as one sentence in each language."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import reduce
+
+from monitor.documents import OMITTED
+from monitor.reporting.texts import Texts, texts_of
+
+
+class CovarianceKind(Enum):
+    """What the covariance was estimated from; the value is its key among the texts of section ``covariance``."""
+
+    POOLED_BY_DAY = "pooled_by_day"
+    ALL_RUNS = "all_runs"
+    STATED_BY_PROBE = "stated_by_probe"
+    REPEATABILITY = "repeatability"
+
+
+class TakenAsKnown(Enum):
+    """What a method takes as known, so that its errors are no part of u; the value is the method's name of it."""
+
+    LINEAR_AXES = "the linear axes"
+    STYLUS_TIP = "the stylus tip"
+
+
+@dataclass(frozen=True)
+class CovarianceSource:
+    """Where the covariance of the readings comes from.
+
+    ``runs`` and ``dof``, the degrees of freedom, belong to a covariance that was estimated from repeated runs, ``u_um``
+    to one that was stated or is the repeatability, in µm. ``selection`` names the stored selection (or campaign) whose
+    runs were taken. ``linear_axes`` says that stated errors of the linear axes were added, ``taken_as_known`` whose
+    errors are no part of u.
+    """
+
+    kind: CovarianceKind
+    runs: int | None = field(default=None, metadata=OMITTED)
+    dof: int | None = field(default=None, metadata=OMITTED)
+    u_um: float | None = field(default=None, metadata=OMITTED)
+    selection: str | None = None
+    linear_axes: bool = False
+    taken_as_known: tuple[TakenAsKnown, ...] = ()
+
+
+def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) -> str:
+    """The source in a sentence without its full stop, in the language of ``texts`` (English without)."""
+    say = texts or texts_of()
+    # Two digits: that is how well the repeatability of few runs is known at most.
+    digits = ".2g" if source.kind is CovarianceKind.REPEATABILITY else "g"
+    u = "" if source.u_um is None else f"{source.u_um:{digits}}".replace(".", say.decimal_sign)
+    sentence = say(f"covariance.{source.kind.value}", runs=source.runs, dof=source.dof, u=u)
+    if source.selection is not None:
+        sentence = say("covariance.selection", name=source.selection, sentence=sentence)
+    if source.linear_axes:
+        sentence = say("covariance.with_linear_axes", sentence=sentence)
+    if source.taken_as_known:
+        names = [say(f"covariance.{known.name.lower()}") for known in source.taken_as_known]
+        both = reduce(lambda first, second: say("covariance.both", first=first, second=second), names)
+        sentence = say("covariance.taken_as_known", sentence=sentence, names=both)
+    return sentence

@@ -1,0 +1,89 @@
+"""The answers to the questions about calibration certificates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from monitor.documents import INLINED, OMITTED
+
+
+@dataclass(frozen=True)
+class CertificateState:
+    """A certificate's present state; ``campaign_withdrawn`` says why its campaign no longer counts."""
+
+    number: str
+    state: str
+    campaign: str
+    campaign_withdrawn: str | None
+    runs: tuple[int, ...]
+    sha256: str
+    software_version: str
+    reason: str | None
+    replaced_by: str | None
+
+
+@dataclass(frozen=True)
+class CertificateShowAnswer:
+    """A certificate's state and its stored record: a ``CertificateRecord`` with ``CertificateInputs``, as written."""
+
+    certificate: CertificateState = field(metadata=INLINED)
+    record: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class CertificatesAnswer:
+    """All certificates in their present state."""
+
+    certificates: tuple[CertificateState, ...]
+
+
+@dataclass(frozen=True)
+class CertificateFileAnswer:
+    """A certificate's state and the file that was written."""
+
+    certificate: CertificateState = field(metadata=INLINED)
+    file: str
+
+
+@dataclass(frozen=True)
+class RemakeAnswer:
+    """Whether a certificate that was made again is the stored one, byte for byte; ``why`` not, where it is not."""
+
+    certificate: CertificateState = field(metadata=INLINED)
+    identical: bool
+    signed: bool
+    file: str | None
+    why: str | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class CertificateChecks:
+    """What a file was checked for; ``signature`` is None where it has none.
+
+    ``hash``: this database knows its content; ``chain``: the database is as written; ``database``: the certificate is
+    issued and its campaign counts.
+    """
+
+    hash: bool
+    chain: bool
+    signature: bool | None
+    database: bool
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed."""
+        return all((self.hash, self.chain, self.signature is not False, self.database))
+
+
+@dataclass(frozen=True)
+class VerificationAnswer:
+    """Whether a file is a genuine and valid certificate of this database; ``faults`` say why not."""
+
+    number: str | None
+    ok: bool
+    state: str | None
+    checks: CertificateChecks
+    signer: str | None
+    faults: tuple[str, ...]

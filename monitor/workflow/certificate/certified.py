@@ -1,0 +1,81 @@
+"""The certified runs: the evaluation of each, stored or new, and what they were computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from monitor import __version__
+from monitor.records import Campaign, LinearAxes
+from monitor.reporting.pdf.layout_engine import engine_versions
+from monitor.store import Database, StoredModel
+from monitor.workflow.certificate.files import HashedFile, font_hashes
+from monitor.workflow.certificate.inputs import CertificateInputs, RunInputs
+from monitor.workflow.certificate.orders import Measured
+from monitor.workflow.certificate.results import StoredMonteCarlo, stored_monte_carlo
+from monitor.workflow.models import label
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.stored import StatedUncertainty, stored_uncertainty
+
+
+@dataclass(frozen=True)
+class CertifiedRun:
+    """A certified run: which state of the machine, its evaluation, the Monte Carlo result stored of it."""
+
+    measured: Measured
+    evaluated: StatedUncertainty
+    monte_carlo: StoredMonteCarlo | None
+
+    @property
+    def inputs(self) -> RunInputs:
+        """What belongs to this run alone."""
+        return RunInputs(
+            run=self.measured.run,
+            seed=None if self.monte_carlo is None else self.monte_carlo.seed,
+            stored_result=self.evaluated.number,
+            stored_monte_carlo=None if self.monte_carlo is None else self.monte_carlo.number,
+        )
+
+
+def certified_run(
+    db: Database, campaign: Campaign, model: StoredModel, measured: Measured, linear_axes: LinearAxes | None
+) -> CertifiedRun:
+    """The run's stored evaluation where there is one, else a new one, with the Monte Carlo result stored of it."""
+    evaluated = stored_uncertainty(db, campaign, measured.run, model, linear_axes)
+    if evaluated is None:
+        evaluated = _evaluated(db, campaign, model, measured.run, linear_axes)
+    return CertifiedRun(measured, evaluated, stored_monte_carlo(db, evaluated))
+
+
+def _evaluated(
+    db: Database, campaign: Campaign, model: StoredModel, run: int, linear_axes: LinearAxes | None
+) -> StatedUncertainty:
+    """The evaluation of a run that has none in the database."""
+    # Solver and compiler take a second to load, for which a stored result need not wait.
+    from monitor.workflow.uncertainty.evaluation import evaluate
+    from monitor.workflow.uncertainty.stating import statement
+
+    version = f"{model.name}@{model.version}"
+    request = UncertaintyRequest(campaign.name, run, model=version, method="guf", linear_axes=linear_axes)
+    return StatedUncertainty(campaign, model, statement(evaluate(db, request)))
+
+
+def inputs_of(
+    runs: Sequence[CertifiedRun], linear_axes: LinearAxes | None, fonts: Sequence[Path]
+) -> CertificateInputs:
+    """What the results were computed from."""
+    evaluated = runs[0].evaluated
+    return CertificateInputs(
+        campaign=evaluated.campaign.name,
+        run=runs[0].inputs,
+        files=tuple(HashedFile(file.name, file.sha256) for file in evaluated.campaign.files),
+        model=label(evaluated.model),
+        model_effects=tuple(evaluated.model.effects),
+        software=f"machine-health-monitor {__version__}",
+        page_made_by=engine_versions(),
+        fonts=font_hashes(fonts),
+        states=tuple(run.measured.state for run in runs),
+        as_left=runs[1].inputs if len(runs) > 1 else None,
+        linear_axes_mm=linear_axes,
+    )

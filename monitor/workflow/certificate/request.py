@@ -1,0 +1,133 @@
+"""The questions about calibration certificates: issue, amend, withdraw, show, write, make again, verify."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from datetime import date
+from pathlib import Path
+
+from monitor.exceptions import InputError
+from monitor.records import LinearAxes
+from monitor.reporting.signature.signing import Key
+
+METHODS = ("guf", "mcm")
+#: Decision rules of a statement of conformity. Each has its words and its risk among the texts: conformity.rule_simple,
+#: conformity.risk_simple, ...
+RULES = ("simple", "guard", "probability")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CertificateOptions:
+    """What a certificate states besides the results, where it goes, and how it is closed.
+
+    ``laboratory`` is the file of what the laboratory states. ``as_left`` is the run that was measured after an
+    adjustment or repair: its results stand beside those as found (ISO/IEC 17025:2017, 7.8.4.1 d), or alone. ``out`` is
+    a folder or a file. ``number`` is the next free one of the year and ``issued_on`` today where None. ``linear_axes``
+    are those of `monitor uncertainty`, for a method that takes these axes as known. ``method``: guf, or mcm for the
+    stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the laboratory's word on
+    conformity. ``with_map`` adds the volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key``
+    signs it.
+
+    Raises InputError for a method or a rule that there is not.
+    """
+
+    laboratory: Path
+    as_left: int | None = None
+    out: Path | None = None
+    number: str | None = None
+    issued_on: date | None = None
+    model: str | None = None
+    linear_axes: LinearAxes | None = None
+    method: str = "guf"
+    draft: bool = False
+    conformity: str | None = None
+    with_map: bool = False
+    fonts: tuple[Path, ...] = ()
+    key: Key | None = None
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise InputError(f"--method {self.method}: a certificate states guf or mcm")
+        if self.conformity not in (None, *RULES):
+            raise InputError(f"there is no decision rule '{self.conformity}'; there are {', '.join(RULES)}")
+
+
+@dataclass(frozen=True)
+class CertificateRequest(CertificateOptions):
+    """A certificate for one ``run`` of a ``campaign``.
+
+    ``run`` may be None where the campaign has one run only, or where ``as_left`` names the only one that is certified.
+    ``replaces`` is the number of the certificate that this one amends, for a ``reason``: it says so on paper (ISO/IEC
+    17025:2017, 7.8.8.3), and the old one is marked with it.
+    """
+
+    campaign: str
+    run: int | None = None
+    replaces: str | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class AmendmentRequest(CertificateOptions):
+    """A new certificate that replaces another, of the same campaign and runs unless others are named."""
+
+    replaces: str
+    reason: str
+    campaign: str | None = None
+    run: int | None = None
+
+    def certificate(self, campaign: str, run: int | None, as_left: int | None) -> CertificateRequest:
+        """The question for the new certificate, of the runs of the old one."""
+        options = {field.name: getattr(self, field.name) for field in fields(CertificateOptions)}
+        return CertificateRequest(
+            campaign, run, self.replaces, self.reason, **(options | {"as_left": as_left})
+        )
+
+
+@dataclass(frozen=True)
+class WithdrawalRequest:
+    """A certificate to be marked as withdrawn, and why."""
+
+    number: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class CertificateShowRequest:
+    """The certificate of a ``number``."""
+
+    number: str
+
+
+@dataclass(frozen=True)
+class CertificatesRequest:
+    """All certificates."""
+
+
+@dataclass(frozen=True)
+class CertificateFileRequest:
+    """A file of the certificate of a ``number``, to be written to ``path``, a folder or a file."""
+
+    number: str
+    path: Path
+
+
+@dataclass(frozen=True)
+class RemakeRequest:
+    """A certificate to be made again from its stored record; written to ``path``, a folder or a file, where named.
+
+    ``fonts`` are those that it was made with besides ours.
+    """
+
+    number: str
+    path: Path | None = None
+    fonts: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True)
+class VerificationRequest:
+    """A ``file`` that may be a certificate of this database; ``trusted`` names the certificates (PEM or DER) that the
+    signer's has to lead to."""
+
+    file: Path
+    trusted: Path | None = None

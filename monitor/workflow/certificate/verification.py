@@ -1,0 +1,93 @@
+"""Verifies that a file is a genuine and valid certificate of this database."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from datetime import UTC
+
+import numpy as np
+
+from monitor.exceptions import InputError, NotFoundError
+from monitor.reporting.signature.signature import SignatureFinding, check_signature, is_signed
+from monitor.store import Database, StoredCertificate, find_certificate, load_certificate, verify_audit
+from monitor.workflow.certificate.answer import CertificateChecks, VerificationAnswer
+from monitor.workflow.certificate.request import VerificationRequest
+
+#: The identifier that a certificate's file bears, its number (ISO 32000-2:2020, 14.4).
+_IDENTIFIER = re.compile(rb"/ID ?\[ ?\(([^()\\]*)\)")
+
+
+def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswer:
+    """Whether a file is a certificate of this database, unaltered, and whether the database is as written.
+
+    The signature is None where the file has none. The signer's certificate has to lead to a trusted one on the day on
+    which the file was stored where it is known to this database, else today. Raises InputError for a file that cannot
+    be read.
+    """
+    file = request.file
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
+    number = find_certificate(db, hashlib.sha256(content).hexdigest())
+    chain = verify_audit(db)
+    stored = None if number is None else load_certificate(db, number)
+    # The chain of entries, not the signer, says when this very file was there.
+    at = stored.made_at.replace(tzinfo=UTC) if stored is not None and chain.ok else None
+    signature = SignatureFinding(None, None, ())
+    if is_signed(content):
+        signature = check_signature(content, request.trusted, at)
+    checks = CertificateChecks(
+        hash=stored is not None,
+        chain=chain.ok,
+        signature=signature.good,
+        database=stored is not None and stored.state == "issued" and stored.campaign_withdrawn is None,
+    )
+    invalid = _unknown(db, file.name, content) if stored is None else _no_longer(stored)
+    return VerificationAnswer(
+        number=number,
+        ok=checks.passed,
+        state=None if stored is None else stored.state,
+        checks=checks,
+        signer=signature.signer,
+        faults=(*([] if invalid is None else [invalid]), *signature.faults, *chain.faults),
+    )
+
+
+def _unknown(db: Database, name: str, content: bytes) -> str:
+    """Why a file that this database does not know is no certificate of it."""
+    why = _claimed(db, content) if content.startswith(b"%PDF-") else "it is no PDF"
+    return f"no certificate of this database has the content of {name}: {why}"
+
+
+def _no_longer(stored: StoredCertificate) -> str | None:
+    """Why a genuine certificate is not valid; None where it is."""
+    if stored.state == "draft":
+        return "it is a draft"
+    if stored.state != "issued":
+        replaced = f", replaced by {stored.replaced_by}" if stored.replaced_by else ""
+        return f"certificate {stored.number} is {stored.state}, no longer valid{replaced}: {stored.reason}"
+    if stored.campaign_withdrawn is None:
+        return None
+    return (
+        f"the campaign {stored.campaign}, which certificate {stored.number} rests on, was withdrawn: "
+        f"{stored.campaign_withdrawn}"
+    )
+
+
+def _claimed(db: Database, content: bytes) -> str:
+    """Which certificate an unknown document claims to be, and where it differs from that one."""
+    for number in {number.decode("utf-8", "replace") for number in _IDENTIFIER.findall(content)}:
+        try:
+            genuine = load_certificate(db, number).pdf
+        except NotFoundError:
+            continue
+        common = min(len(content), len(genuine))
+        starts = (np.frombuffer(file[:common], dtype=np.uint8) for file in (content, genuine))
+        first = next(iter(np.flatnonzero(np.not_equal(*starts))), common)
+        return (
+            f"it bears the number {number}, but differs from the document of that certificate from byte "
+            f"{first} on ({len(content)} bytes, where the genuine one has {len(genuine)})"
+        )
+    return "altered, or not from here"

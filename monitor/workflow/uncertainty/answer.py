@@ -1,0 +1,125 @@
+"""The answer to the question for a run's uncertainty: what is shown, what is stored, what certificates state.
+
+Numbers of a parameter are in its display unit. Nothing heavy is loaded here, so that what only states a stored answer
+waits for neither solver nor compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from monitor.documents import OMITTED
+from monitor.records import Array
+from monitor.reporting.certificate.results import RefusedParameters
+from monitor.reporting.covariance_source import CovarianceSource
+from monitor.workflow.uncertainty.request import Asked
+
+
+@dataclass(frozen=True)
+class RunResiduals:
+    """RMS in µm of what the model leaves over of the whole campaign, what is expected of it, and of the run by target.
+
+    A target that was touched once a run (the bar's) is followed exactly by its own coordinates, and left out.
+    """
+
+    rms_um: float
+    expected_rms_um: float
+    something_is_missing: bool
+    by_target_um: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameworkAnswer:
+    """Results of the GUM framework (JCGM 102:2011, 6) by parameter; ``correlation`` (m, m) in their order.
+
+    ``k_p`` and ``k_q`` are those of 6.5 for normal outputs; those ``with_degrees_of_freedom`` are what so few runs
+    allow to claim, and belong to the ``expanded`` uncertainty. None: infinite, or no joint region. ``budget`` has the
+    part of every source in the variance of every parameter. ``joint_coverage_of_k_2_each`` takes half a second of
+    sampling and is left out where nobody reads it.
+    """
+
+    estimate: Mapping[str, float]
+    u: Mapping[str, float]
+    correlation: Array
+    k_p: float
+    k_q: float
+    lambda_max: float
+    rank: int
+    degrees_of_freedom: float | None
+    fewest_degrees_of_freedom: float | None
+    k_p_with_degrees_of_freedom: float | None
+    k_q_with_degrees_of_freedom: float | None
+    expanded: Mapping[str, float]
+    budget: Mapping[str, Mapping[str, float]]
+    joint_coverage_of_k_2_each: float | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MonteCarloAnswer:
+    """Results of the adaptive Monte Carlo (JCGM 102:2011, 7.8); ``seconds`` are no part of what is stored."""
+
+    estimate: Mapping[str, float]
+    u: Mapping[str, float]
+    correlation: Array
+    k_p: float
+    k_q: float
+    lambda_max: float
+    trials: int
+    not_converged: int
+    seconds: float | None = field(default=None, metadata=OMITTED)
+    stable: bool
+    seed: int
+
+
+@dataclass(frozen=True)
+class ValidationAnswer:
+    """Whether Monte Carlo confirms the framework (JCGM 102:2011, 8), quantity by quantity: ``u EA0B``, ``k_q``."""
+
+    passed: bool
+    verdict: str
+    differences: Mapping[str, float]
+    tolerances: Mapping[str, float]
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """The quantities that differ by more than their tolerance."""
+        return tuple(
+            name for name, difference in self.differences.items() if abs(difference) > self.tolerances[name]
+        )
+
+
+@dataclass(frozen=True)
+class LackOfFitCause:
+    """An effect that lack of fit may come from, with its probability."""
+
+    effect: str
+    probability: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class UncertaintyAnswer:
+    """The uncertainty of one run's geometric errors.
+
+    ``units`` are the display units by parameter. ``input_covariance`` says in a sentence where the covariance of the
+    readings comes from, ``input_covariance_source`` as data; None in an answer that an earlier version stored, until it
+    is restored (``stored.restored``). ``refused`` are parameters without a number. ``mcm`` and ``validation`` are left
+    out where no Monte Carlo was asked for.
+    """
+
+    campaign: str
+    machine: str
+    run: int
+    model: str
+    p: float
+    asked: Asked | None = field(default=None, metadata=OMITTED)
+    parameters: tuple[str, ...]
+    units: Mapping[str, str]
+    input_covariance: str
+    input_covariance_source: CovarianceSource | None = field(default=None, metadata=OMITTED)
+    refused: tuple[RefusedParameters, ...]
+    residuals: RunResiduals
+    guf: FrameworkAnswer
+    lack_of_fit_causes: tuple[LackOfFitCause, ...] | None = field(default=None, metadata=OMITTED)
+    mcm: MonteCarloAnswer | None = field(default=None, metadata=OMITTED)
+    validation: ValidationAnswer | None = field(default=None, metadata=OMITTED)

@@ -1,0 +1,71 @@
+"""The question for the uncertainty of a run's geometric errors."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+from datetime import datetime
+
+from monitor.exceptions import InputError
+from monitor.records import LinearAxes
+
+#: Coverage probability of what is certified, and of results where no other is asked for.
+COVERAGE = 0.95
+METHODS = ("guf", "mcm", "both")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What decides the numbers of an evaluation by the GUM framework besides run and model; stored with its answer.
+
+    Only an evaluation that was asked for the same answers a later question.
+    """
+
+    p: float = COVERAGE
+    select: str | None = None
+    model_uncertainty: bool = True
+    linear_axes: LinearAxes | None = None
+
+
+@dataclass(frozen=True)
+class UncertaintyRequest:
+    """The uncertainty of one ``run`` of a campaign (the last by default) under a ``model`` (default: the method's own).
+
+    ``method``: guf (GUM framework), mcm (Monte Carlo) or both, with the validation. The Monte Carlo result is stable to
+    ``digits`` significant digits. ``select`` names a stored selection, or a campaign of the same plan: its runs give
+    the covariance of the readings. ``model_uncertainty`` adds what lack of fit leaves. ``linear_axes`` adds what errors
+    of the linear axes do, for a method that takes those axes as known. Runs that began at or after ``before`` (local
+    time without a zone) take no part. The trials go to ``workers`` processes or the Dask scheduler at the address
+    ``cluster``, else to threads.
+
+    Raises InputError for a method, digits, seed or probability that cannot be.
+    """
+
+    campaign: str
+    run: int | None = None
+    _: KW_ONLY
+    model: str | None = None
+    method: str = "both"
+    digits: int = 2
+    seed: int = 1
+    p: float = COVERAGE
+    model_uncertainty: bool = True
+    select: str | None = None
+    before: datetime | None = None
+    linear_axes: LinearAxes | None = None
+    workers: int | None = None
+    cluster: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise InputError(f"--method {self.method}: choose guf, mcm or both")
+        if not 1 <= self.digits <= 4:
+            raise InputError(f"--digits {self.digits}: choose 1 to 4 significant digits")
+        if not 0 <= self.seed < 2**63:
+            raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 to 9223372036854775807")
+        if not 0.0 < self.p < 1.0:
+            raise InputError(f"-p {self.p}: a coverage probability lies between 0 and 1")
+
+    @property
+    def asked(self) -> Asked:
+        """The part of the question that decides the numbers of the GUM framework."""
+        return Asked(self.p, self.select, self.model_uncertainty, self.linear_axes)

@@ -1,0 +1,35 @@
+"""What an evaluation of one run's uncertainty leaves: the fit, the framework's result, the Monte Carlo result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from monitor.discovery import Fit
+from monitor.methods.chain.identification import Refusal
+from monitor.records import Campaign
+from monitor.reporting.covariance_source import CovarianceSource
+from monitor.store import StoredModel
+from monitor.uncertainty import FrameworkResult, MonteCarloResult, Validation
+from monitor.units import Unit
+from monitor.workflow.uncertainty.request import Asked
+
+
+@dataclass(frozen=True)
+class RunUncertainty:
+    """The evaluated uncertainty of one run; ``units`` are the display units of ``framework.names``.
+
+    ``causes`` are the effects that lack of fit may come from, with their probabilities.
+    """
+
+    campaign: Campaign
+    model: StoredModel
+    fit: Fit
+    run: int
+    asked: Asked
+    framework: FrameworkResult
+    units: tuple[Unit, ...]
+    refused: tuple[Refusal, ...]
+    covariance_source: CovarianceSource
+    monte_carlo: MonteCarloResult | None
+    validation: Validation | None
+    causes: tuple[tuple[str, float], ...]

@@ -1,0 +1,154 @@
+"""States an evaluated uncertainty as the answer that is shown, stored and certified."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from monitor.discovery import Verdict, compare
+from monitor.records import Array
+from monitor.reporting.certificate.results import RefusedParameters
+from monitor.reporting.covariance_source import covariance_sentence
+from monitor.uncertainty.coverage import ellipsoid_factor, joint_coverage, rectangle_factor
+from monitor.uncertainty.validation import Comparison, Validation
+from monitor.units import MICROMETRE
+from monitor.workflow.models import label
+from monitor.workflow.uncertainty.answer import (
+    FrameworkAnswer,
+    LackOfFitCause,
+    MonteCarloAnswer,
+    RunResiduals,
+    UncertaintyAnswer,
+    ValidationAnswer,
+)
+from monitor.workflow.uncertainty.result import RunUncertainty
+
+#: So many effects that lack of fit may come from are named.
+MOST_CAUSES = 5
+
+
+def answer_of(result: RunUncertainty) -> UncertaintyAnswer:
+    """The answer as people see it."""
+    answer = statement(result)
+    coverage = joint_coverage(result.framework.correlation).value
+    return replace(answer, guf=replace(answer.guf, joint_coverage_of_k_2_each=coverage))
+
+
+def statement(result: RunUncertainty) -> UncertaintyAnswer:
+    """As ``answer_of``, without what k = 2 each covers: half a second of sampling that no certificate states."""
+    causes = tuple(LackOfFitCause(effect, probability) for effect, probability in result.causes[:MOST_CAUSES])
+    return UncertaintyAnswer(
+        campaign=result.campaign.name,
+        machine=result.campaign.machine.id,
+        run=result.run,
+        model=label(result.model),
+        p=result.framework.p,
+        asked=result.asked,
+        parameters=result.framework.names,
+        units={name: unit.name for name, unit in zip(result.framework.names, result.units, strict=True)},
+        input_covariance=covariance_sentence(result.covariance_source),
+        input_covariance_source=result.covariance_source,
+        refused=tuple(RefusedParameters(refusal.parameters, refusal.why) for refusal in result.refused),
+        residuals=_residuals(result),
+        guf=_framework(result),
+        lack_of_fit_causes=causes or None,
+        mcm=_monte_carlo(result),
+        validation=None if result.validation is None else _validation(result, result.validation),
+    )
+
+
+def _displayed(result: RunUncertainty, values: Iterable[float]) -> dict[str, float]:
+    """Values (m,) in internal units by parameter, in display units."""
+    return {
+        name: unit.to_display(float(value))
+        for name, unit, value in zip(result.framework.names, result.units, values, strict=True)
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _framework(result: RunUncertainty) -> FrameworkAnswer:
+    framework = result.framework
+    return FrameworkAnswer(
+        estimate=_displayed(result, framework.estimate),
+        u=_displayed(result, framework.u),
+        correlation=framework.correlation,
+        # JCGM 102:2011 6.5 as it stands: normal outputs. Beside them what so few runs allow to claim.
+        k_p=ellipsoid_factor(framework.rank, framework.p),
+        k_q=rectangle_factor(len(framework.names), framework.p),
+        lambda_max=framework.lambda_max,
+        rank=framework.rank,
+        degrees_of_freedom=_finite(framework.dof),
+        fewest_degrees_of_freedom=_finite(float(np.min(framework.dof_by_output, initial=np.inf))),
+        k_p_with_degrees_of_freedom=_finite(framework.k_p),
+        k_q_with_degrees_of_freedom=_finite(framework.k_q),
+        expanded=_displayed(result, framework.expanded),
+        budget={
+            line.source: dict(zip(framework.names, map(float, shares), strict=True))
+            for line, shares in zip(framework.budget, framework.budget_shares(), strict=True)
+        },
+    )
+
+
+def _monte_carlo(result: RunUncertainty) -> MonteCarloAnswer | None:
+    sampled = result.monte_carlo
+    if sampled is None:
+        return None
+    return MonteCarloAnswer(
+        estimate=_displayed(result, sampled.estimate),
+        u=_displayed(result, sampled.u),
+        correlation=sampled.correlation,
+        k_p=sampled.k_p,
+        k_q=sampled.k_q,
+        lambda_max=sampled.lambda_max,
+        trials=sampled.trials,
+        not_converged=sampled.not_converged,
+        seconds=sampled.seconds,
+        stable=sampled.stable,
+        seed=sampled.seed,
+    )
+
+
+def _validation(result: RunUncertainty, validation: Validation) -> ValidationAnswer:
+    units = dict(zip(result.framework.names, result.units, strict=True))
+
+    def displayed(comparison: Comparison, value: float) -> float:
+        return units[comparison.output].to_display(value) if comparison.output else float(value)
+
+    return ValidationAnswer(
+        passed=validation.passed,
+        verdict=validation.verdict.value,
+        differences={
+            _quantity(comparison): displayed(comparison, comparison.difference)
+            for comparison in validation.comparisons
+        },
+        tolerances={
+            _quantity(comparison): displayed(comparison, comparison.tolerance)
+            for comparison in validation.comparisons
+        },
+    )
+
+
+def _quantity(comparison: Comparison) -> str:
+    return f"{comparison.quantity} {comparison.output}".strip()
+
+
+def _rms(vectors: Array) -> float:
+    return MICROMETRE.to_display(float(np.sqrt(np.mean(vectors**2))))
+
+
+def _residuals(result: RunUncertainty) -> RunResiduals:
+    compared = compare(result.fit, result.campaign.name, result.model.name)
+    context, vectors = result.fit.problem.context, result.fit.vectors
+    of_run = context.run == result.run
+    touched = {str(name): of_run & (context.target == name) for name in result.fit.problem.targets}
+    return RunResiduals(
+        rms_um=MICROMETRE.to_display(compared.rms),
+        expected_rms_um=MICROMETRE.to_display(compared.expected_rms),
+        something_is_missing=compared.verdict is Verdict.SOMETHING_IS_MISSING,
+        by_target_um={name: _rms(vectors[rows]) for name, rows in touched.items() if int(np.sum(rows)) > 1},
+    )
