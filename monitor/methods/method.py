@@ -126,11 +126,10 @@ class AngleCandidates(Protocol):
 
 @dataclass(frozen=True)
 class Nouns:
-    """What a ``target`` and a ``row`` of a campaign are called, and ``tool_point`` where an effect is seen largest."""
+    """What a ``target`` and a ``row`` of a campaign are called, in the singular."""
 
     target: str
     row: str
-    tool_point: str
 
 
 @dataclass(frozen=True)
