@@ -39,7 +39,7 @@ class Fault:
     """One fault of an input file.
 
     ``line`` counts from 1 (the header is line 1); ``column`` is the column's or key's name. Either may be
-    None where the fault has no such place.
+    None where the fault has none.
     """
 
     file: str
@@ -48,19 +48,19 @@ class Fault:
     message: str
 
     def __str__(self) -> str:
-        place = self.file
+        text = self.file
         if self.line is not None:
-            place += f", line {self.line}"
+            text += f", line {self.line}"
         if self.column is not None:
-            place += f", column {self.column}"
-        return f"{place}: {self.message}"
+            text += f", column {self.column}"
+        return f"{text}: {self.message}"
 
 
 class CampaignError(InputError):
     """A campaign folder that was refused as a whole; ``faults`` holds everything that is wrong with it."""
 
     SHOWN_IN_FULL = 20
-    #: More faults with the same words in one column are told once, with their number.
+    #: More faults with the same message in one column are listed once, with their number.
     ALIKE_IN_FULL = 5
 
     def __init__(self, folder: str, faults: Sequence[Fault]) -> None:
@@ -71,17 +71,17 @@ class CampaignError(InputError):
         alike: dict[tuple[str, str | None, str], list[Fault]] = {}
         for fault in self.faults:
             alike.setdefault((fault.file, fault.column, fault.message), []).append(fault)
-        told: list[list[Fault]] = []
+        groups: list[list[Fault]] = []
         for group in alike.values():
-            told += [group] if len(group) > self.ALIKE_IN_FULL else [[fault] for fault in group]
-        places = {fault: place for place, fault in enumerate(self.faults)}
-        shown = sorted(told, key=lambda group: places[group[0]])[: self.SHOWN_IN_FULL]
+            groups += [group] if len(group) > self.ALIKE_IN_FULL else [[fault] for fault in group]
+        positions = {fault: position for position, fault in enumerate(self.faults)}
+        shown = sorted(groups, key=lambda group: positions[group[0]])[: self.SHOWN_IN_FULL]
         for first, *more in shown:
             last = f" (and {len(more)} more like it, to line {more[-1].line})" if more else ""
             lines.append(f"  {first}{last}")
-        left = count - sum(len(group) for group in shown)
-        if left:
-            lines.append(f"  ... and {left} more.")
+        remaining = count - sum(len(group) for group in shown)
+        if remaining:
+            lines.append(f"  ... and {remaining} more.")
         super().__init__("\n".join(lines))
 
 

@@ -72,7 +72,7 @@ class Machine:
     ``chain`` holds the axes of a machine that places them freely, the work branch from the bed outwards, then
     the tool branch; ``topology`` then only names them in their order. It is empty where the letters of
     ``topology`` say everything. ``gravity`` is the direction of gravity in the machine's frame, None where the
-    file does not tell it.
+    file does not state it.
     """
 
     id: str
@@ -88,9 +88,9 @@ class Machine:
 
     def is_linear(self, axis: str) -> bool:
         """Whether an axis travels rather than turns."""
-        for one in self.chain:
-            if one.name == axis:
-                return one.kind == "linear"
+        for chain_axis in self.chain:
+            if chain_axis.name == axis:
+                return chain_axis.kind == "linear"
         return axis[:1] in LINEAR_LETTERS
 
 
@@ -145,7 +145,7 @@ class SelfCalibration:
 
     ``nodes`` maps a linear axis to the readings in mm at which its errors are unknowns. ``conditions`` are the
     boundary conditions, each a parameter that is zero by choice (``EYX(0)``) or a word of the method; empty
-    means the method's own. ``length`` is the one error that has to be known, for the unit of length.
+    means the method's own. ``length`` is the one error that must be measured by other means, for the unit of length.
     """
 
     nodes: Mapping[str, tuple[float, ...]]
@@ -197,8 +197,8 @@ class LShape:
 
     @property
     def reference(self) -> int:
-        """Place of the reference module."""
-        return min(range(len(self.modules)), key=lambda place: sum(c**2 for c in self.modules[place].centre))
+        """Index of the reference module."""
+        return min(range(len(self.modules)), key=lambda index: sum(c**2 for c in self.modules[index].centre))
 
 
 @dataclass(frozen=True)
@@ -244,15 +244,15 @@ class Probings:
     def __len__(self) -> int:
         return len(self.run)
 
-    def rows(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> Probings:
-        """The chosen rows (a mask or indices), in order."""
+    def rows(self, selection: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> Probings:
+        """Return the selected rows (a mask or indices), in order."""
         return Probings(
-            self.run[chosen],
-            self.sequence[chosen],
-            self.time[chosen],
-            self.target[chosen],
-            {axis: values[chosen] for axis, values in self.readings.items()},
-            {name: values[chosen] for name, values in self.channels.items()},
+            self.run[selection],
+            self.sequence[selection],
+            self.time[selection],
+            self.target[selection],
+            {axis: values[selection] for axis, values in self.readings.items()},
+            {name: values[selection] for name, values in self.channels.items()},
         )
 
 

@@ -25,14 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
     try:
-        for text in typed:
-            if not text.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in text):
-                raise InputError(f"{text!a} is not UTF-8 text; rename it, or type it in UTF-8")
-        options = parse(typed)
-        status = int(options.run(options))
-        # What is still in the buffer is written now, where a reader who went away is no fault.
-        sys.stdout.flush()
-        return status
+        return _run(typed)
     except MonitorError as error:
         print(f"monitor: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -44,18 +37,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _let_go_of_output()
         return DONE
     except Exception as error:
-        if isinstance(error, OSError) and error.filename is None and error.errno is not None:
-            _let_go_of_output()
-            print(f"monitor: the output could not be written: {os.strerror(error.errno)}", file=sys.stderr)
-            return BAD_INPUT
-        if os.environ.get("MONITOR_DEBUG"):
-            raise
-        print(
-            f"monitor: this is a fault of the software, please report it: {type(error).__name__}: {error} "
-            "(with MONITOR_DEBUG=1 it shows where)",
-            file=sys.stderr,
-        )
-        return OUR_FAULT
+        return _unexpected(error)
+
+
+def _run(typed: Sequence[str]) -> int:
+    for text in typed:
+        if not text.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in text):
+            raise InputError(f"{text!a} is not UTF-8 text; rename it, or type it in UTF-8")
+    options = parse(typed)
+    status = int(options.run(options))
+    # What is still in the buffer is written now, where a reader who went away is no fault.
+    sys.stdout.flush()
+    return status
+
+
+def _unexpected(error: Exception) -> int:
+    """Report a full disk under the output, or a fault of the software, which MONITOR_DEBUG raises."""
+    if isinstance(error, OSError) and error.filename is None and error.errno is not None:
+        _let_go_of_output()
+        print(f"monitor: the output could not be written: {os.strerror(error.errno)}", file=sys.stderr)
+        return BAD_INPUT
+    if os.environ.get("MONITOR_DEBUG"):
+        raise error
+    print(
+        f"monitor: this is a fault of the software, please report it: {type(error).__name__}: {error} "
+        "(with MONITOR_DEBUG=1 it shows where)",
+        file=sys.stderr,
+    )
+    return OUR_FAULT
 
 
 def _let_go_of_output() -> None:

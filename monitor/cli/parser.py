@@ -6,7 +6,7 @@ import argparse
 import importlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from monitor import __version__
@@ -55,7 +55,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def _help() -> str:
-    lines = [f"  {verb:<12} {words}" for verb, words in VERBS.items()]
+    lines = [f"  {verb:<12} {summary}" for verb, summary in VERBS.items()]
     return (
         "verbs:\n"
         + "\n".join(lines)
@@ -64,7 +64,7 @@ def _help() -> str:
 
 
 def common(parser: argparse.ArgumentParser, *, database: bool = True) -> None:
-    """The options that every verb has."""
+    """Add the options that every verb has."""
     if database:
         parser.add_argument("--db", metavar="PATH", default=argparse.SUPPRESS, help="the database file")
     parser.add_argument(
@@ -72,18 +72,18 @@ def common(parser: argparse.ArgumentParser, *, database: bool = True) -> None:
     )
 
 
-def told(words: str, example: str) -> dict[str, Any]:
-    """What a subverb is added with: its words in the list and in its own help, with an example."""
+def described(summary: str, example: str) -> dict[str, Any]:
+    """Return what a subverb is added with: its summary in the list and in its own help, with an example."""
     return {
-        "help": words,
-        "description": f"{words[0].upper()}{words[1:]}.",
+        "help": summary,
+        "description": f"{summary[0].upper()}{summary[1:]}.",
         "epilog": f"example:\n  {example}",
         "formatter_class": argparse.RawDescriptionHelpFormatter,
     }
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """The verb's options with its function in ``run``. Ends the program with status 2 on bad usage.
+    """Return the verb's options with its function in ``run``. Ends the program with status 2 on bad usage.
 
     Raises InputError, NotFoundError for a database that is not there.
     """
@@ -110,22 +110,28 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         sys.exit(2 if arguments else 0)
     if head.verb not in VERBS:
         first.error(f"there is no verb '{head.verb}'; there are {', '.join(VERBS)}")
-    module = importlib.import_module(f"monitor.cli.verbs.{head.verb}_")
-    verb = Parser(
-        prog=f"monitor {head.verb}",
+    parser, run = verb_parser(head.verb)
+    database = argparse.Namespace(db=head.db)
+    try:
+        # People write options before, between and behind the other words.
+        options = parser.parse_intermixed_args(head.rest, database)
+    except TypeError:
+        # A verb with verbs of its own cannot be read so.
+        options = parser.parse_args(head.rest, database)
+    if not hasattr(options, "run"):
+        options.run = run
+    check_path(options.db, may_be_new=head.verb in WITHOUT_DATABASE)
+    return options
+
+
+def verb_parser(verb: str) -> tuple[Parser, Callable[[argparse.Namespace], int] | None]:
+    """Return the parser of a verb and its function; verbs with verbs of their own set ``run`` themselves."""
+    module = importlib.import_module(f"monitor.cli.verbs.{verb}_")
+    parser = Parser(
+        prog=f"monitor {verb}",
         description=module.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog=f"example:\n  {module.EXAMPLE}",
     )
-    module.options(verb)
-    given = argparse.Namespace(db=head.db)
-    try:
-        # People write options before, between and behind the other words.
-        found = verb.parse_intermixed_args(head.rest, given)
-    except TypeError:
-        # A verb with verbs of its own cannot be read so.
-        found = verb.parse_args(head.rest, given)
-    if not hasattr(found, "run"):
-        found.run = module.run
-    check_path(found.db, may_be_new=head.verb in WITHOUT_DATABASE)
-    return found
+    module.options(parser)
+    return parser, getattr(module, "run", None)

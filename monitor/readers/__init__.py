@@ -1,4 +1,4 @@
-"""Campaigns from and to files: bytes in, a campaign out, or every fault of the folder in one refusal.
+"""Reads and writes campaigns: bytes in, a campaign out, or every fault of the folder in one refusal.
 
 ``read_campaign`` reads a folder in any format that is registered; ``write_campaign`` writes campaign folder
 format 1, for virtual campaigns and for handing data on. A format is one file in ``formats``, a method's rules

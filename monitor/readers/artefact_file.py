@@ -18,7 +18,7 @@ LARGEST_REFERENCE_DEGC = 200.0
 
 
 def read_probe(top: Table) -> Probe | None:
-    """The ``[probe]`` table."""
+    """Read the ``[probe]`` table."""
     table = top.table("probe", required=True)
     if table is None:
         return None
@@ -42,7 +42,7 @@ def read_probe(top: Table) -> Probe | None:
 
 
 def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:
-    """The ``[artefact]`` table and the ids of its balls; without one, an artefact of no balls.
+    """Read the ``[artefact]`` table and the ids of its balls; without one, an artefact of no balls.
 
     The artefact is None if anything in it is wrong, the ids are None if anything of a ball is.
     """
@@ -70,7 +70,7 @@ def read_artefact(top: Table) -> tuple[Artefact | None, list[str] | None]:
 
 
 def _reflectors(artefact: Table) -> tuple[Reflector, ...]:
-    found: dict[str, Reflector] = {}
+    reflectors: dict[str, Reflector] = {}
     for row in artefact.tables("reflectors"):
         identity = row.text("id", required=True, example='"R1"')
         fixed = row.raw("fixed", required=False, example="true")
@@ -79,11 +79,11 @@ def _reflectors(artefact: Table) -> tuple[Reflector, ...]:
                 "fixed", f"{quoted(fixed)} is neither true (beside the machine) nor false (on the tool)"
             )
         row.finish()
-        if identity is not None and identity in found:
+        if identity is not None and identity in reflectors:
             row.fault("id", f"reflector {quoted(identity)} is listed twice; give every reflector its own id")
         elif identity is not None:
-            found[identity] = Reflector(identity, fixed is True)
-    return tuple(found.values())
+            reflectors[identity] = Reflector(identity, fixed is True)
+    return tuple(reflectors.values())
 
 
 def _ball(table: Table) -> Ball | None:

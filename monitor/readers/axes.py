@@ -1,11 +1,12 @@
-"""The axes that a topology string names, and the column that each one's readings stand in.
+"""The axes that a topology string names, and the columns of their readings.
 
-Only the words of the string are checked here; what the chain means is the machine room's.
+Only the parts of the string are checked here; the room ``machine`` gives the chain its meaning.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from monitor.readers.faults import quoted
@@ -36,7 +37,7 @@ class Axis:
 
     @property
     def suffix(self) -> str:
-        """What the axis' column ends in."""
+        """The end of the name of the axis' column."""
         return "mm" if self.kind == "linear" else "deg"
 
     @property
@@ -51,41 +52,47 @@ class Axis:
 
 
 def axes_of_machine(machine: Machine) -> tuple[Axis, ...]:
-    """The axes of a machine, whether it places them freely or names them by letters; none where it cannot be read."""
+    """Return the axes of a machine, freely positioned or named by letters; none where the topology cannot be read."""
     if machine.chain:
         return tuple(Axis(axis.name, axis.kind) for axis in machine.chain)
     return axes_of(machine.topology)[0]
 
 
 def axes_of(topology: str) -> tuple[tuple[Axis, ...], str | None]:
-    """The axes that a topology string names, and what is wrong with the string (None if nothing is).
+    """Return the axes that a topology string names, and the fault of the string (None if there is none).
 
-    With a fault the axes are those that could be made out, none where that would mislead.
+    With a fault the axes are those that could be read, none where that would mislead.
     """
-    words: list[str] = []
+    parts: list[str] = []
     axes: list[Axis] = []
     for bracket, name, mark, wrong in TOKEN.findall(topology):
         if wrong:
             return (), f"{quoted(wrong)} has no meaning in a topology; {EXAMPLE}"
-        words.append(mark or (f"({name})" if bracket else name))
+        parts.append(mark or (f"({name})" if bracket else name))
         if not name:
             continue
         if name[0] not in (ROTARY if bracket else LINEAR + ROTARY):
-            what = "a spindle" if bracket else "an axis"
+            subject = "a spindle" if bracket else "an axis"
             letters = "A, B, C" if bracket else "X, Y, Z, U, V, W (linear) and A, B, C (rotary)"
-            return (), f"{what} cannot be called {name[:20]}; the letters are {letters}"
+            return (), f"{subject} cannot be called {name[:20]}; the letters are {letters}"
         axes.append(Axis(name, "spindle" if bracket else "linear" if name[0] in LINEAR else "rotary"))
+    fault = _fault_of(parts, axes)
+    return (tuple(axes), None) if fault is None else ((), fault)
+
+
+def _fault_of(parts: Sequence[str], axes: Sequence[Axis]) -> str | None:
+    """Return the fault in the order of the parts of a topology; None if there is none."""
     names = [axis.name for axis in axes]
     twice = sorted({name for name in names if names.count(name) > 1})
-    if [words.count(mark) for mark in "wbt"] != [1, 1, 1]:
-        return (), f"name w (workpiece), b (bed) and t (tool) once each; {EXAMPLE}"
-    if words[0] != "w" or words[-1] != "t":
-        return (), f"the topology must begin with w and end with t; {EXAMPLE}"
+    if [parts.count(mark) for mark in "wbt"] != [1, 1, 1]:
+        return f"name w (workpiece), b (bed) and t (tool) once each; {EXAMPLE}"
+    if parts[0] != "w" or parts[-1] != "t":
+        return f"the topology must begin with w and end with t; {EXAMPLE}"
     if not axes:
-        return (), f"the topology has no axis; {EXAMPLE}"
+        return f"the topology has no axis; {EXAMPLE}"
     if twice:
-        return (), f"axis {twice[0][:20]} appears twice; name each axis once"
-    spindles = [place for place, axis in enumerate(axes) if axis.kind == "spindle"]
-    if spindles and (len(spindles) > 1 or words[-2] != f"({names[-1]})"):
-        return (), f"the spindle in brackets stands once, just before t; {EXAMPLE}"
-    return tuple(axes), None
+        return f"axis {twice[0][:20]} appears twice; name each axis once"
+    spindles = [axis for axis in axes if axis.kind == "spindle"]
+    if spindles and (len(spindles) > 1 or parts[-2] != f"({names[-1]})"):
+        return f"the spindle in brackets stands once, just before t; {EXAMPLE}"
+    return None

@@ -1,4 +1,4 @@
-"""``campaign.toml`` from the records of a campaign."""
+"""Writes ``campaign.toml`` from the records of a campaign."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from monitor.units import MICROMETRE, MICRORADIAN
 
 
 def campaign_toml(campaign: Campaign) -> str:
-    """The text of the file; keys that the records leave open are left out."""
+    """Return the text of the file, without the keys that the records leave open."""
     lines = [
         "format = 1",
         f"campaign = {_text(campaign.name)}",
@@ -114,15 +114,15 @@ def _scale_bar(bar: ScaleBar | None) -> Iterator[str]:
         yield f"reference_temperature_degC = {float(bar.reference_temperature)!r}"
 
 
-def _self_calibration(made: SelfCalibration | None) -> Iterator[str]:
-    if made is None:
+def _self_calibration(calibration: SelfCalibration | None) -> Iterator[str]:
+    if calibration is None:
         return
     yield from ("", "[artefact.self_calibration]")
-    if made.conditions:
-        yield f"conditions = [{', '.join(map(_text, made.conditions))}]"
+    if calibration.conditions:
+        yield f"conditions = [{', '.join(map(_text, calibration.conditions))}]"
     yield from ("", "[artefact.self_calibration.nodes_mm]")
-    yield from (f"{_text(axis)} = {_numbers(places)}" for axis, places in made.nodes.items())
-    length = made.length
+    yield from (f"{_text(axis)} = {_numbers(places)}" for axis, places in calibration.nodes.items())
+    length = calibration.length
     yield from ("", "[artefact.self_calibration.length]", f"parameter = {_text(length.parameter)}")
     yield f"error_um = {decimal_in(MICROMETRE)(length.value)}"
     yield f"standard_uncertainty_um = {decimal_in(MICROMETRE)(length.standard_uncertainty)}"

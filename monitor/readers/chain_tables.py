@@ -1,4 +1,4 @@
-"""Axes that ``campaign.toml`` names and places freely: ``[[machine.work_chain]]`` and ``[[machine.tool_chain]]``."""
+"""Axes that ``campaign.toml`` positions freely: ``[[machine.work_chain]]`` and ``[[machine.tool_chain]]``."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ MOST_JOINTS = 9
 # A name stands inside ISO 230-1 symbols (EA0J2) and in columns (j2_deg): it begins with a letter, so that the
 # 0 of a location error before it stays readable.
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9]{0,15}")
+KINDS: tuple[Kind, ...] = ("linear", "rotary", "spindle")
 LETTERS: dict[str, Vector] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 #: A vector typed with four decimals is a unit vector to a ten-thousandth; further off it is something else.
 TYPED_TO = 1e-3
@@ -23,7 +24,7 @@ UP = "write X, Y, Z or a unit vector such as [0.0, 0.7071, 0.7071]"
 
 
 def read_chain(machine: Table) -> tuple[ChainAxis, ...] | None:
-    """The axes of both branches, bed outwards, the work branch first; empty where there is no such table.
+    """Read the axes of both branches, bed outwards, the work branch first; empty where there is no such table.
 
     None if anything in them is wrong; the faults are noted.
     """
@@ -72,9 +73,9 @@ def _axis(table: Table, branch: Branch) -> ChainAxis | None:
 
 def _kind(table: Table) -> Kind | None:
     value = table.text("kind", required=True, example='"rotary"')
-    for known in ("linear", "rotary", "spindle"):
-        if value == known:
-            return known
+    for kind in KINDS:
+        if value == kind:
+            return kind
     if value is not None:
         table.fault("kind", f"{quoted(value)} is no kind of axis; write linear, rotary or spindle")
     return None
@@ -103,23 +104,23 @@ def _direction(table: Table, kind: Kind | None) -> Vector | None:
 
 
 def unit_vector(table: Table, key: str) -> Vector | None:
-    """The unit vector under a key, its length made 1 to the last bit where it was typed with a few decimals."""
+    """Read the unit vector under a key, its length made 1 to the last bit where it was typed with a few decimals."""
     if not isinstance(table.data.get(key), list) or len(table.data[key]) != 3:
         table.fault(key, f"{quoted(table.data.get(key))} is no direction; {UP}")
         return None
-    found = table.numbers(key, 3, largest=FARTHEST_MM, unit="1", example="[0.0, 0.0, 1.0]")
-    if found is None:
+    vector = table.numbers(key, 3, largest=FARTHEST_MM, unit="1", example="[0.0, 0.0, 1.0]")
+    if vector is None:
         return None
-    length = math.hypot(*found)
+    length = math.hypot(*vector)
     if abs(length - 1.0) > TYPED_TO:
         if length == 0.0:
-            told = f"the direction has no length; {UP}"
+            message = f"the direction has no length; {UP}"
         else:
-            right = ", ".join(f"{part / length:.6g}" for part in found)
-            told = f"the direction has the length {length:.6g}; a unit vector has 1: write [{right}]"
-        table.fault(key, told)
+            right = ", ".join(f"{part / length:.6g}" for part in vector)
+            message = f"the direction has the length {length:.6g}; a unit vector has 1: write [{right}]"
+        table.fault(key, message)
         return None
     # Divided once: a vector that is of length 1 but for rounding stays as it is, so that it reads back the same.
     if abs(length - 1.0) > ROUNDING:
-        found = tuple(part / length for part in found)
-    return (found[0], found[1], found[2])
+        vector = tuple(part / length for part in vector)
+    return (vector[0], vector[1], vector[2])

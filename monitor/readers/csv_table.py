@@ -31,14 +31,14 @@ class CsvTable:
 
 
 def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
-    """RFC 4180 with one line a row. None where there is no header to go by; the faults are noted."""
+    """Parse RFC 4180 with one line a row. None where the header cannot be used; the faults are noted."""
     if text.count("\n") > MOST_LINES:
         faults.add(file, None, None, f"the file has more than {MOST_LINES} lines; split the campaign")
         return None
     lines = text.split("\n")
     while lines and not lines[-1].strip("\r"):
         lines.pop()
-    longest = max(range(len(lines)), key=lambda place: len(lines[place]), default=None)
+    longest = max(range(len(lines)), key=lambda index: len(lines[index]), default=None)
     if longest is None:
         faults.add(file, 1, None, "the file is empty; its first line names the columns")
         return None
@@ -61,25 +61,25 @@ def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> 
         if column not in table.columns:
             unused = [name for name in table.columns if name not in required]
             hint = near(column, unused).replace("did you mean", "is it")
-            told = "the column is missing; "
-            faults.add(table.file, 1, column, f"{told}{hint}the header needs {one_of(required)}")
+            message = f"the column is missing; {hint}the header needs {one_of(required)}"
+            faults.add(table.file, 1, column, message)
 
 
 def _header_is_sound(file: str, header: list[str], faults: Faults) -> bool:
     sound = True
-    seen: set[str] = set()
-    for place, name in enumerate(header, start=1):
+    names: set[str] = set()
+    for number, name in enumerate(header, start=1):
         wrong = None
         if not name:
-            wrong = f"the header's cell {place} is empty; name the column or remove it"
-        elif name in seen:
+            wrong = f"the header's cell {number} is empty; name the column or remove it"
+        elif name in names:
             wrong = f"the header names the column {quoted(name)} twice; name each column once"
         elif not name.isprintable() or name != name.strip():
             wrong = f"the column name {quoted(name)} holds spaces or characters that cannot be printed"
         if wrong is not None:
             faults.add(file, 1, name if name and name.isprintable() else None, wrong)
             sound = False
-        seen.add(name)
+        names.add(name)
     if sound and len(header) == 1 and any(mark in header[0] for mark in ";\t|"):
         faults.add(file, 1, None, "the header has one cell; separate the cells by commas")
         return False
@@ -112,7 +112,7 @@ def _body(file: str, header: list[str], lines: list[str], faults: Faults) -> Csv
 
 
 def _rows(lines: list[str]) -> Iterator[tuple[int, list[str] | csv.Error]]:
-    """Every line after the header with its number. A quote has to close on its line."""
+    """Yield every line after the header with its number. A quote has to close on its line."""
     body = lines[1:]
     if not any('"' in line or "\r" in line[:-1] for line in body):
         yield from enumerate(csv.reader(body), start=2)
@@ -129,11 +129,11 @@ def _cells(line: str) -> list[str]:
 
 
 def _what(error: csv.Error) -> str:
-    told = str(error)
-    if "unexpected end of data" in told:
+    reason = str(error)
+    if "unexpected end of data" in reason:
         return 'a quote is opened and not closed on this line; close it, and write a quote in a cell as ""'
-    if "expected after" in told:
+    if "expected after" in reason:
         return 'text follows a closing quote; put a comma there, or write a quote in a cell as ""'
-    if "new-line" in told:
+    if "new-line" in reason:
         return "a carriage return inside the line; end lines with LF or CRLF"
-    return f"the line cannot be read: {told}"
+    return f"the line cannot be read: {reason}"

@@ -21,7 +21,7 @@ LARGEST_WHOLE = 2**31 - 1
 # needs other characters, so a column that keeps to these can be handed to float() as it is.
 NUMBER_CHARACTERS = frozenset("0123456789+-.eE\n")
 DIGITS = frozenset("0123456789\n")
-# Dashes that word processors put in place of a minus.
+# Dashes that word processors put in row of a minus.
 TYPOGRAPHIC_MINUS = "\u2212\u2013\u2014\u2010\u2011\ufe63\uff0d"
 
 
@@ -42,7 +42,7 @@ class Wholes:
 
 
 def numbers(table: CsvTable, column: str, faults: Faults, *, may_be_empty: bool = False) -> Numbers:
-    """The column as finite numbers; empty cells are NaN where they are allowed."""
+    """Read the column as finite numbers; empty cells are NaN where they are allowed."""
     cells = table.columns[column]
     if set("\n".join(cells)) <= NUMBER_CHARACTERS:
         try:
@@ -61,21 +61,21 @@ def numbers(table: CsvTable, column: str, faults: Faults, *, may_be_empty: bool 
 
 
 def wholes(table: CsvTable, column: str, faults: Faults) -> Wholes:
-    """The column as whole numbers from 0."""
+    """Read the column as whole numbers from 0."""
     cells = table.columns[column]
     if cells and all(cells) and max(map(len, cells)) < 10 and set("\n".join(cells)) <= DIGITS:
         return Wholes(np.array(list(map(int, cells)), dtype=np.int64), np.ones(len(cells), dtype=np.bool_))
     values = np.full(len(cells), -1, dtype=np.int64)
-    for place, cell in enumerate(cells):
+    for row, cell in enumerate(cells):
         if re.fullmatch(r"[0-9]{1,20}", cell) and int(cell) <= LARGEST_WHOLE:
-            values[place] = int(cell)
+            values[row] = int(cell)
         else:
-            told = "the cell is empty" if not cell else f"{quoted(cell)} is not a whole number"
+            fault = "the cell is empty" if not cell else f"{quoted(cell)} is not a whole number"
             faults.add(
                 table.file,
-                table.lines[place],
+                table.lines[row],
                 column,
-                f"{told}; write digits only, from 0 to {LARGEST_WHOLE}",
+                f"{fault}; write digits only, from 0 to {LARGEST_WHOLE}",
             )
     return Wholes(values, values >= 0)
 
@@ -85,21 +85,21 @@ def _numbers_one_by_one(
 ) -> Numbers:
     values = np.full(len(cells), math.nan)
     good = np.zeros(len(cells), dtype=np.bool_)
-    for place, cell in enumerate(cells):
+    for row, cell in enumerate(cells):
         if not cell and may_be_empty:
-            good[place] = True
+            good[row] = True
             continue
         wrong = what_is_wrong(cell)
         if wrong is None:
-            values[place] = float(cell)
-            good[place] = True
+            values[row] = float(cell)
+            good[row] = True
         else:
-            faults.add(table.file, table.lines[place], column, wrong)
+            faults.add(table.file, table.lines[row], column, wrong)
     return Numbers(values, good)
 
 
 def what_is_wrong(cell: str) -> str | None:
-    """Why a cell is not a finite decimal number, and what to write; None if it is one."""
+    """Return why a cell is no finite decimal number, and what to write; None if it is one."""
     if not cell:
         return "the cell is empty; a number is needed"
     shown = quoted(cell)

@@ -20,7 +20,7 @@ OTHER_DATE = re.compile(r"\s*\d{1,2}[./]\d{1,2}[./](\d{4}|\d\d)\b")
 
 
 def days_of(cells: Sequence[str]) -> Array | None:
-    """Days since the first row, of dates in ISO 8601 with or without a time; None where they are none."""
+    """Return the days since the first row, of dates in ISO 8601 with or without a time; None where they are none."""
     moments = []
     for cell in cells:
         if not re.match(r"\d{4}-\d\d-\d\d", cell):
@@ -38,7 +38,7 @@ def days_of(cells: Sequence[str]) -> Array | None:
 
 
 def are_dates(cells: Sequence[str]) -> bool:
-    """Whether most cells are meant as dates: one mistyped date does not make a column of words."""
+    """Return whether most cells are meant as dates: one mistyped date does not make a column of words."""
     return 2 * sum(bool(OTHER_DATE.match(cell)) or _what_is_wrong(cell) is None for cell in cells) > len(
         cells
     )
@@ -76,20 +76,20 @@ def _what_is_wrong(cell: str) -> str | None:
 
 def refuse_enormous(table: CsvTable, name: str, values: Array, faults: Faults) -> None:
     """Note every number beyond LARGEST_NUMBER; NaN, a cell refused already, is passed over."""
-    for place in np.flatnonzero(np.abs(values) > LARGEST_NUMBER).tolist():
+    for row in np.flatnonzero(np.abs(values) > LARGEST_NUMBER).tolist():
         faults.add(
             table.file,
-            table.lines[place],
+            table.lines[row],
             name,
-            f"{quoted(table.columns[name][place])} is beyond {LARGEST_NUMBER:g}, which no measurement is; correct "
+            f"{quoted(table.columns[name][row])} is beyond {LARGEST_NUMBER:g}, which no measurement is; correct "
             "it, or write the column in a larger unit",
         )
 
 
 def refuse_copies(table: CsvTable, time: str | None, faults: Faults) -> None:
-    """Note a table whose rows are all there more than once, to the last character of their time.
+    """Note a table that has every row more than once, to the last character of their time.
 
-    Equal readings of a coarse instrument do occur, so copies are only told where every moment has one reading
+    Equal readings of a coarse instrument do occur, so copies are only refused where every moment has one reading
     otherwise.
     """
     if time is None:

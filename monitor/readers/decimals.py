@@ -1,4 +1,4 @@
-"""The decimal of a file's unit that reads back as the same internal double."""
+"""Writes the decimal of a file's unit that reads back as the same internal double."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from monitor.units import Unit
 
 
 def decimal_in(unit: Unit) -> Callable[[float], str]:
-    """A function that writes an internal value in the unit, with as few digits as read back the same.
+    """Return a function that writes an internal value in the unit, with the fewest digits that read back the same.
 
     Multiplying by the unit's factor rounds, so some doubles are the image of no decimal: then the nearest.
     """

@@ -1,4 +1,4 @@
-"""The list that every fault of a folder goes into, and the words that faults share."""
+"""Collects the faults of a folder, and has the phrases that their messages share."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ SHOWN = 40
 
 
 class Faults:
-    """Faults of one folder, collected so that all of them are told together."""
+    """Faults of one folder, collected so that all of them are reported together."""
 
     def __init__(self, files: Iterable[str]) -> None:
-        self._order = {name: place for place, name in enumerate(files)}
-        self._found: list[Fault] = []
+        self._order = {name: index for index, name in enumerate(files)}
+        self._faults: list[Fault] = []
 
     def __len__(self) -> int:
-        return len(self._found)
+        return len(self._faults)
 
     def add(self, file: str, line: int | None, column: str | None, message: str) -> None:
         """Note one fault."""
-        self._found.append(Fault(file, line, column, message))
+        self._faults.append(Fault(file, line, column, message))
 
     def extend(self, faults: Iterable[Fault]) -> None:
         """Note several faults."""
-        self._found.extend(faults)
+        self._faults.extend(faults)
 
     def sorted(self) -> list[Fault]:
-        """All faults, by file and line."""
-        return sorted(self._found, key=lambda f: (self._order.get(f.file, -1), f.line or 0))
+        """Return all faults, by file and line."""
+        return sorted(self._faults, key=lambda fault: (self._order.get(fault.file, -1), fault.line or 0))
 
 
 def quoted(value: object) -> str:
-    """A user's own text, repeated in a message: printable, and not longer than it helps."""
+    """Return a user's text for a message: printable, and shortened."""
     try:
         text = repr(value)
     except (
@@ -48,12 +48,12 @@ def quoted(value: object) -> str:
 
 
 def one_of(names: Iterable[str]) -> str:
-    """Names in a row, for the end of a message."""
+    """Return names in a row, for the end of a message."""
     return ", ".join(names) or "none"
 
 
-def near(name: str, known: Iterable[str]) -> str:
-    """A hint ("did you mean 'x_mm'? ") where a known name is close, else nothing."""
-    by_folded = {candidate.casefold(): candidate for candidate in known}
+def near(name: str, names: Iterable[str]) -> str:
+    """Return a hint ("did you mean 'x_mm'? ") where a known name is close, else nothing."""
+    by_folded = {candidate.casefold(): candidate for candidate in names}
     close = difflib.get_close_matches(name[:100].casefold(), list(by_folded), n=1, cutoff=0.7)
     return f"did you mean '{by_folded[close[0]]}'? " if close else ""

@@ -1,4 +1,4 @@
-"""Bytes of a campaign folder's files, within limits that keep memory bounded."""
+"""Reads the files of a campaign folder, within limits that keep memory bounded."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LARGEST_TOML = 1024**2
 
 
 def read_bytes(folder: Path, name: str, largest: int, faults: Faults) -> bytes | None:
-    """The content of one file, or None with a fault noted."""
+    """Read one file; None with a fault noted where it cannot be read."""
     path = folder / name
     try:
         status = path.stat()
@@ -37,7 +37,7 @@ def read_bytes(folder: Path, name: str, largest: int, faults: Faults) -> bytes |
 
 
 def decode(name: str, content: bytes, faults: Faults) -> str | None:
-    """UTF-8 text without its byte-order mark, or None with a fault that names the line of the bad byte."""
+    """Decode UTF-8 without its byte-order mark; None with a fault that names the line of the bad byte."""
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -1,4 +1,4 @@
-"""Which campaign and machine a folder speaks of, as far as it tells: for a folder that is refused otherwise."""
+"""Reads the names of campaign and machine from a folder that is refused otherwise."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ _FILE = "campaign.toml"
 
 
 def names_in(folder: Path) -> tuple[str | None, str | None]:
-    """Names of campaign and machine in the folder's ``campaign.toml``; None where it cannot be read that far."""
+    """Return the names of campaign and machine in ``campaign.toml``; None where it cannot be read that far."""
     try:
         path = folder / _FILE
         if not path.is_file() or path.stat().st_size > LARGEST_TOML:
             return None, None
-        found = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        document = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except (OSError, ValueError, RecursionError):  # not TOML and not UTF-8 are ValueErrors
         return None, None
-    machine = found.get("machine")
-    return _text(found.get("campaign")), _text(machine.get("id")) if isinstance(machine, dict) else None
+    machine = document.get("machine")
+    return _text(document.get("campaign")), _text(machine.get("id")) if isinstance(machine, dict) else None
 
 
 def _text(value: object) -> str | None:

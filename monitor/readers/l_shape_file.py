@@ -15,7 +15,7 @@ LARGEST_URAD = 10_000.0
 
 
 def read_l_shape(artefact: Table) -> LShape | None:
-    """The table, or None where there is none or anything in it is wrong."""
+    """Read the table; None where there is none, or anything in it is wrong."""
     table = artefact.table("l_shape")
     if table is None:
         return None
@@ -26,7 +26,7 @@ def read_l_shape(artefact: Table) -> LShape | None:
     curvature = table.number(
         "paraboloid_mm", required=True, positive=True, largest=FARTHEST_MM, unit="mm", example="57.0"
     )
-    place = table.number(
+    position = table.number(
         "place_standard_uncertainty_um", required=True, positive=True, largest=1e3, unit="um", example="0.1"
     )
     tilt = table.number(
@@ -37,8 +37,10 @@ def read_l_shape(artefact: Table) -> LShape | None:
         unit="urad",
         example="0.5",
     )
-    modules = [one for row in table.tables("modules") if (one := _module(row)) is not None]
-    placements = [laid for row in table.tables("placements") if (laid := _placement(row)) is not None]
+    modules = [module for row in table.tables("modules") if (module := _module(row)) is not None]
+    placements = [
+        placement for row in table.tables("placements") if (placement := _placement(row)) is not None
+    ]
     if len(table.faults) == before:
         _judge(table, modules, placements)
     table.finish()
@@ -46,12 +48,12 @@ def read_l_shape(artefact: Table) -> LShape | None:
         return None
     assert focal is not None
     assert curvature is not None
-    assert place is not None
+    assert position is not None
     assert tilt is not None
     return LShape(
         focal,
         curvature,
-        MICROMETRE.to_internal(place),
+        MICROMETRE.to_internal(position),
         MICRORADIAN.to_internal(tilt),
         tuple(modules),
         tuple(placements),
@@ -86,9 +88,9 @@ def _judge(table: Table, modules: list[Module], placements: list[Placement]) -> 
         table.fault("modules", f"{len(modules)} modules are no L; list the corner and those of both arms")
     if not placements:
         table.fault("placements", "no placement is listed; add [[artefact.l_shape.placements]], one a plane")
-    for what, names in (
-        ("modules", [one.id for one in modules]),
-        ("placements", [one.plane for one in placements]),
+    for key, names in (
+        ("modules", [module.id for module in modules]),
+        ("placements", [placement.plane for placement in placements]),
     ):
-        for name in sorted({one for one in names if names.count(one) > 1}):
-            table.fault(what, f"{quoted(name)} is listed twice; list it once")
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            table.fault(key, f"{quoted(name)} is listed twice; list it once")

@@ -1,4 +1,4 @@
-"""A file of what is left of the errors of a machine's linear axes, as standard uncertainties (TOML).
+"""Reads a file of the residual errors of a machine's linear axes, as standard uncertainties (TOML).
 
 For methods that take the linear axes as known: ``monitor uncertainty CAMPAIGN --linear-axes FILE``.
 """
@@ -22,12 +22,12 @@ PER_METRE = 1e-6
 
 
 def read_linear_axes(path: Path) -> LinearAxes:
-    """The file's standard uncertainties. Raises InputError with all its faults."""
+    """Read the standard uncertainties of a file. Raises InputError with all its faults."""
     faults = Faults([path.name])
     content = read_bytes(path.parent, path.name, LARGEST_TOML, faults)
     text = None if content is None else decode(path.name, content, faults)
     top = None if text is None else parse_toml(path.name, text, faults)
-    found: dict[str, LinearAxisErrors] = {}
+    errors: dict[str, LinearAxisErrors] = {}
     spacing = None
     if top is not None:
         spacing = top.numbers(
@@ -40,14 +40,14 @@ def read_linear_axes(path: Path) -> LinearAxes:
         axes = top.table("axes", required=True)
         if axes is not None:
             for name in axes.data:
-                found[name] = _axis(axes, name)
+                errors[name] = _axis(axes, name)
             axes.finish()
         top.finish()
     if len(faults):
-        told = "\n".join(f"  {fault}" for fault in faults.sorted())
-        raise InputError(f"{path} cannot be used:\n{told}")
+        listed = "\n".join(f"  {fault}" for fault in faults.sorted())
+        raise InputError(f"{path} cannot be used:\n{listed}")
     assert spacing is not None
-    return LinearAxes(found, (spacing[0], spacing[1]))
+    return LinearAxes(errors, (spacing[0], spacing[1]))
 
 
 def _axis(axes: Table, name: str) -> LinearAxisErrors:

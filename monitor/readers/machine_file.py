@@ -9,7 +9,7 @@ from monitor.readers.axes import FARTHEST_MM, Axis, axes_of
 from monitor.readers.chain_tables import read_chain, unit_vector
 from monitor.readers.faults import near, one_of, quoted
 from monitor.readers.toml_table import Table
-from monitor.records import AxisSettings, Machine, topology_of
+from monitor.records import AxisSettings, ChainAxis, Machine, topology_of
 
 # ISO 230-1:2012, 3.4: E, then the direction (X, Y, Z) or rotation (A, B, C), then the axis; 0 for a location.
 TERM = re.compile(r"E([XYZABC])(0?)([A-Za-z][A-Za-z0-9]*)")
@@ -19,7 +19,7 @@ LARGEST_RATIO = 1e4
 
 @dataclass(frozen=True)
 class MachinePart:
-    """What is known of the machine: None for the record if a required key is wrong.
+    """The machine as far as it could be read: no record if a required key is wrong.
 
     ``axes`` is None where the topology cannot be read; ``strokes`` are in the units of the file.
     """
@@ -30,7 +30,7 @@ class MachinePart:
 
 
 def read_machine(top: Table) -> MachinePart:
-    """The ``[machine]`` table."""
+    """Read the ``[machine]`` table."""
     table = top.table("machine", required=True)
     if table is None:
         return MachinePart(None, None, {})
@@ -38,22 +38,11 @@ def read_machine(top: Table) -> MachinePart:
     free = [key for key in ("work_chain", "tool_chain") if key in table.data]
     topology = table.text("topology", required=not free, example='"w C B X b Z Y (C1) t"')
     chain = read_chain(table)
-    words = {key: table.text(key) for key in ("manufacturer", "model", "serial_number", "location")}
-    axes: tuple[Axis, ...] | None = None
+    plate = {key: table.text(key) for key in ("manufacturer", "model", "serial_number", "location")}
     if free:
-        if topology is not None:
-            told = f"[[machine.{free[0]}]] places the axes already; leave out topology, or these tables"
-            table.fault("topology", told)
-        elif chain:
-            topology = topology_of(chain)
-            axes = tuple(Axis(axis.name, axis.kind) for axis in chain)
-        elif chain is not None:
-            table.fault(free[0], "the chain has no axis; write [[machine.tool_chain]] above each of them")
-    elif topology is not None:
-        found, wrong = axes_of(topology)
-        if wrong is not None:
-            table.fault("topology", f"{quoted(topology)} cannot be parsed: {wrong}")
-        axes = None if wrong is not None else found
+        topology, axes = _free_axes(table, free[0], topology, chain)
+    else:
+        axes = None if topology is None else _named_axes(table, topology)
     signed = {axis.name for axis in chain or () if axis.sign is not None}
     settings, strokes = _settings(table, axes, signed)
     tolerances = _tolerances(table, axes)
@@ -68,9 +57,33 @@ def read_machine(top: Table) -> MachinePart:
         tolerances=tolerances,
         chain=chain or (),
         gravity=gravity,
-        **words,
+        **plate,
     )
     return MachinePart(machine, axes, strokes)
+
+
+def _free_axes(
+    table: Table, key: str, topology: str | None, chain: tuple[ChainAxis, ...] | None
+) -> tuple[str | None, tuple[Axis, ...] | None]:
+    """Return topology and axes of freely positioned axes; no axes where they cannot be read."""
+    if topology is not None:
+        message = f"[[machine.{key}]] places the axes already; leave out topology, or these tables"
+        table.fault("topology", message)
+        return topology, None
+    if chain:
+        return topology_of(chain), tuple(Axis(axis.name, axis.kind) for axis in chain)
+    if chain is not None:
+        table.fault(key, "the chain has no axis; write [[machine.tool_chain]] above each of them")
+    return None, None
+
+
+def _named_axes(table: Table, topology: str) -> tuple[Axis, ...] | None:
+    """Return the axes that a topology names by letters; None where it cannot be parsed."""
+    axes, fault = axes_of(topology)
+    if fault is None:
+        return axes
+    table.fault("topology", f"{quoted(topology)} cannot be parsed: {fault}")
+    return None
 
 
 def _settings(
@@ -81,37 +94,44 @@ def _settings(
     outer = machine.table("axes")
     if outer is None or axes is None:
         return settings, strokes
-    known = {axis.name: axis for axis in axes}
+    by_name = {axis.name: axis for axis in axes}
     for name in outer.data:
-        axis = known.get(name)
+        axis = by_name.get(name)
         if axis is None:
-            hint = near(name, known)
-            outer.fault(name, f"the topology has no axis {quoted(name)}; {hint}its axes are {one_of(known)}")
+            hint = near(name, by_name)
+            outer.fault(
+                name, f"the topology has no axis {quoted(name)}; {hint}its axes are {one_of(by_name)}"
+            )
             continue
         table = outer.table(name)
-        if table is None:
-            continue
-        sign = table.sign("sign")
-        if sign is not None and name in signed:
-            table.fault("sign", f"the chain gives axis {name} a sign already; write it in one place")
-        stroke = _stroke(table, axis)
-        pitch = table.number("scale_pitch_mm", positive=True, largest=FARTHEST_MM, unit="mm", example="0.02")
-        ratio = None
-        if axis.kind != "linear":
-            ratio = table.number(
-                "gear_ratio",
-                positive=True,
-                largest=LARGEST_RATIO,
-                unit="turns of the motor a turn",
-                example="121.0",
-            )
-        table.finish()
-        inside = None
-        if stroke is not None:
-            strokes[name] = stroke
-            inside = (axis.unit.to_internal(stroke[0]), axis.unit.to_internal(stroke[1]))
-        settings[name] = AxisSettings(name, sign, inside, pitch, ratio)
+        if table is not None:
+            settings[name], stroke = _axis_settings(table, axis, name in signed)
+            if stroke is not None:
+                strokes[name] = stroke
     return settings, strokes
+
+
+def _axis_settings(table: Table, axis: Axis, signed: bool) -> tuple[AxisSettings, tuple[float, float] | None]:
+    """Return the settings of an axis, and its stroke in the unit of the file; ``signed`` where the chain has a sign."""
+    sign = table.sign("sign")
+    if sign is not None and signed:
+        table.fault("sign", f"the chain gives axis {axis.name} a sign already; write it in one place")
+    stroke = _stroke(table, axis)
+    pitch = table.number("scale_pitch_mm", positive=True, largest=FARTHEST_MM, unit="mm", example="0.02")
+    ratio = None
+    if axis.kind != "linear":
+        ratio = table.number(
+            "gear_ratio",
+            positive=True,
+            largest=LARGEST_RATIO,
+            unit="turns of the motor a turn",
+            example="121.0",
+        )
+    table.finish()
+    internal = (
+        None if stroke is None else (axis.unit.to_internal(stroke[0]), axis.unit.to_internal(stroke[1]))
+    )
+    return AxisSettings(axis.name, sign, internal, pitch, ratio), stroke
 
 
 def _stroke(table: Table, axis: Axis) -> tuple[float, float] | None:
@@ -154,7 +174,7 @@ def _tolerances(machine: Table, axes: tuple[Axis, ...] | None) -> dict[str, floa
         elif axes is not None and match[3] not in {axis.name for axis in axes}:
             table.fault(
                 name,
-                f"the topology has no axis {match[3][:20]}; its axes are {one_of(a.name for a in axes)}",
+                f"the topology has no axis {match[3][:20]}; its axes are {one_of(axis.name for axis in axes)}",
             )
         else:
             limit = table.number(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from monitor.readers.axes import FARTHEST_DEG, FARTHEST_MM, Axis
 from monitor.readers.csv_table import CsvTable, refuse_missing
-from monitor.readers.csv_values import Mask, Numbers, numbers, wholes
+from monitor.readers.csv_values import Mask, Numbers, Wholes, numbers, wholes
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.method_rules import MethodRules
 from monitor.readers.probings_order import refuse_disorder
@@ -33,164 +33,161 @@ class ProbingsPart:
     damaged_runs: frozenset[int]
 
 
-def read_probings(
-    table: CsvTable,
-    axes: Sequence[Axis] | None,
-    strokes: dict[str, tuple[float, float]],
-    targets: Sequence[str] | None,
-    runs: dict[int, int] | None,
-    rules: MethodRules | None,
-    faults: Faults,
-) -> ProbingsPart | None:
-    """The probings, or None where a column is missing or the axes are not known.
+@dataclass(frozen=True)
+class Expected:
+    """What the other files of the folder ask of the probings; None where it could not be read, or is free.
 
-    ``axes``, ``targets``, ``runs`` and ``rules`` are None where they could not be read, or are free; what does
-    not depend on them is checked all the same.
+    ``strokes`` are in the units of the file; ``runs`` has the line of every run that is listed.
     """
-    columns = {axis.column: axis for axis in axes or ()}
-    allowed = MethodRules("") if rules is None else rules
-    required = (*FIRST, *columns, *allowed.measured_columns)
-    refuse_missing(table, required, faults)
-    odd = [name for name in table.columns if READING.fullmatch(name) and name not in columns]
-    if axes is not None:
-        for name in odd:
-            told = f"the topology has no axis for {quoted(name)}; its columns are {one_of(columns)}"
-            faults.add(FILE, 1, name, told)
-    names = recorded_columns(table, [*required, *odd], faults, allowed.suffixes, allowed.plain_columns)
 
-    good: Mask = np.ones(len(table), dtype=np.bool_)
-    readings: dict[str, Numbers] = {}
-    for name in [*columns, *(odd if axes is None else ())]:
-        if name in table.columns:
-            readings[name] = numbers(table, name, faults)
-            good &= readings[name].good & _within(
-                table, name, readings[name], columns.get(name), strokes, faults
-            )
-    channels = {name: numbers(table, name, faults, may_be_empty=True) for name in names}
-    for channel in channels.values():
-        good &= channel.good
-    for name in allowed.measured_columns:
-        if name in table.columns:
-            channels[name] = numbers(table, name, faults)
-            good &= channels[name].good & _within(table, name, channels[name], None, strokes, faults)
+    axes: Sequence[Axis] | None
+    strokes: Mapping[str, tuple[float, float]]
+    targets: Sequence[str] | None
+    runs: Mapping[int, int] | None
+    rules: MethodRules | None
+
+    @property
+    def allowed(self) -> MethodRules:
+        """The rules of the method, those that hold for all where it could not be read."""
+        return MethodRules("") if self.rules is None else self.rules
+
+    @property
+    def columns(self) -> dict[str, Axis]:
+        """The axes by the column of their readings."""
+        return {axis.column: axis for axis in self.axes or ()}
+
+
+def read_probings(table: CsvTable, expected: Expected, faults: Faults) -> ProbingsPart | None:
+    """Read the probings; None where a column is missing or the axes could not be read.
+
+    What does not depend on the missing column is checked all the same.
+    """
+    required = (*FIRST, *expected.columns, *expected.allowed.measured_columns)
+    refuse_missing(table, required, faults)
+    readings, channels = _cells(table, required, expected, faults)
     time = numbers(table, "time_s", faults) if "time_s" in table.columns else None
     sequence = wholes(table, "sequence", faults) if "sequence" in table.columns else None
-    for column in (time, sequence):
-        if column is not None:
-            good &= column.good
-    target = np.array(table.columns.get("target", ()), dtype=np.str_)
-    if "target" in table.columns:
-        good &= _known_targets(table, targets, faults)
+    known_target = _known_targets(table, expected.targets, faults)
     if "run" not in table.columns:
         return None
     run = wholes(table, "run", faults)
-    placed = run.good & _known_runs(table, run.values, run.good, runs, faults)
-    good &= placed
-    if time is not None:
-        good &= refuse_disorder(table, run, sequence, time, faults)
-    if (
-        axes is None
-        or time is None
-        or sequence is None
-        or any(name not in table.columns for name in required)
-    ):
+    known_run = run.good & _known_runs(table, run, expected.runs, faults)
+    in_order = run.good if time is None else refuse_disorder(table, run, sequence, time, faults)
+    complete = expected.axes is not None and all(name in table.columns for name in required)
+    if not complete or time is None or sequence is None:
         return None
-
+    columns: list[Numbers | Wholes] = [*readings.values(), *channels.values(), time, sequence]
+    good: Mask = np.logical_and.reduce(
+        [*(column.good for column in columns), known_target, known_run, in_order]
+    )
     probings = Probings(
         run.values,
         sequence.values,
         time.values,
-        target,
-        {axis.name: readings[axis.column].values * axis.unit.factor for axis in axes},
+        np.array(table.columns["target"], dtype=np.str_),
+        {axis.name: readings[name].values * axis.unit.factor for name, axis in expected.columns.items()},
         {name: channel.values for name, channel in channels.items()},
     )
-    damaged = _damaged_runs(table, run.values, placed, good)
+    damaged = _damaged_runs(table, run.values, known_run, good)
     if not good.all():
         probings = probings.rows(good)
     return ProbingsPart(probings, np.array(table.lines, dtype=np.int64)[good], frozenset(damaged))
 
 
-def _within(
-    table: CsvTable,
-    column: str,
-    read: Numbers,
-    axis: Axis | None,
-    strokes: dict[str, tuple[float, float]],
-    faults: Faults,
-) -> Mask:
+def _cells(
+    table: CsvTable, required: Sequence[str], expected: Expected, faults: Faults
+) -> tuple[dict[str, Numbers], dict[str, Numbers]]:
+    """Return the readings and the channels by column; readings of an axis that is not in the topology are refused."""
+    columns, allowed = expected.columns, expected.allowed
+    odd = [name for name in table.columns if READING.fullmatch(name) and name not in columns]
+    if expected.axes is not None:
+        for name in odd:
+            message = f"the topology has no axis for {quoted(name)}; its columns are {one_of(columns)}"
+            faults.add(FILE, 1, name, message)
+    names = recorded_columns(table, [*required, *odd], faults, allowed.suffixes, allowed.plain_columns)
+    readings = {}
+    for name in [*columns, *(odd if expected.axes is None else ())]:
+        if name in table.columns:
+            axis = columns.get(name)
+            stroke = None if axis is None else expected.strokes.get(axis.name)
+            readings[name] = _within(table, name, stroke, faults)
+    channels = {name: numbers(table, name, faults, may_be_empty=True) for name in names}
+    for name in allowed.measured_columns:
+        if name in table.columns:
+            channels[name] = _within(table, name, None, faults)
+    return readings, channels
+
+
+def _within(table: CsvTable, column: str, stroke: tuple[float, float] | None, faults: Faults) -> Numbers:
+    """Read a column of lengths or angles; those beyond the stroke, or beyond any machine, are refused."""
+    cells = numbers(table, column, faults)
     unit = column.rpartition("_")[2]
     limit = FARTHEST_MM if unit == "mm" else FARTHEST_DEG
-    low, high = -limit, limit
-    stroke = strokes.get(axis.name) if axis is not None else None
+    low, high = stroke or (-limit, limit)
     if stroke is not None:
-        low, high = stroke
-        what = f"the stroke of axis {column.rpartition('_')[0].upper()}, {low:g} to {high:g} {unit}"
+        range_text = f"the stroke of axis {column.rpartition('_')[0].upper()}, {low:g} to {high:g} {unit}"
     else:
-        what = f"{limit:g} {unit} (no stroke is given); is its unit {unit}?"
-    outside = (read.values < low) | (read.values > high)
-    for place in np.flatnonzero(outside).tolist():
-        shown = table.columns[column][place]
-        faults.add(FILE, table.lines[place], column, f"{quoted(shown)} is beyond {what}")
-    return ~outside
+        range_text = f"{limit:g} {unit} (no stroke is given); is its unit {unit}?"
+    outside = (cells.values < low) | (cells.values > high)
+    for row in np.flatnonzero(outside).tolist():
+        cell = quoted(table.columns[column][row])
+        faults.add(FILE, table.lines[row], column, f"{cell} is beyond {range_text}")
+    return Numbers(cells.values, cells.good & ~outside)
 
 
 def _known_targets(table: CsvTable, targets: Sequence[str] | None, faults: Faults) -> Mask:
-    cells = table.columns["target"]
-    lines: dict[str, list[int]] = {}
+    """Return which rows name a target that there is; a name that is unknown is reported once, with its lines."""
+    cells = table.columns.get("target", ())
     wrong = {
         cell for cell in set(cells) if not _is_name(cell) or (targets is not None and cell not in targets)
     }
     if not wrong:
-        return np.ones(len(cells), dtype=np.bool_)
+        return np.ones(len(table), dtype=np.bool_)
+    lines: dict[str, list[int]] = {}
     for line, cell in zip(table.lines, cells, strict=True):
         if cell in wrong:
             lines.setdefault(cell, []).append(line)
-    for cell, at in lines.items():
+    for cell, cell_lines in lines.items():
         if not _is_name(cell):
-            told = f"{quoted(cell)} is not a name; name what was probed"
+            message = f"{quoted(cell)} is not a name; name what was probed"
         else:
-            told = f"there is no target {quoted(cell)}; the targets are {one_of(targets or ())}"
-        faults.add(FILE, at[0], "target", told + _and_more(at))
+            message = f"there is no target {quoted(cell)}; the targets are {one_of(targets or ())}"
+        faults.add(FILE, cell_lines[0], "target", message + _and_more(cell_lines))
     return np.array([cell not in wrong for cell in cells], dtype=np.bool_)
 
 
-def _known_runs(
-    table: CsvTable,
-    values: npt.NDArray[np.int64],
-    good: Mask,
-    runs: dict[int, int] | None,
-    faults: Faults,
-) -> Mask:
-    if runs is None:
-        return good
-    known = np.isin(values, np.fromiter(runs, dtype=np.int64, count=len(runs)))
+def _known_runs(table: CsvTable, run: Wholes, listed: Mapping[int, int] | None, faults: Faults) -> Mask:
+    """Return which rows belong to a listed run; runs that are not listed, or not probed, are refused."""
+    if listed is None:
+        return run.good
+    is_listed: Mask = np.isin(run.values, np.fromiter(listed, dtype=np.int64, count=len(listed)))
     unknown: dict[int, list[int]] = {}
-    for place in np.flatnonzero(good & ~known).tolist():
-        unknown.setdefault(int(values[place]), []).append(table.lines[place])
-    for run, at in unknown.items():
-        told = f"run {run} is not listed in runs.csv; list it there, or correct the number{_and_more(at)}"
-        faults.add(FILE, at[0], "run", told)
-    probed = set(values[good].tolist()) | _runs_of(table)
-    for run, line in runs.items():
-        if run not in probed:
-            told = f"run {run} has no row in {FILE}; remove the run, or add its probings"
-            faults.add("runs.csv", line, "run", told)
-    return known
+    for row in np.flatnonzero(run.good & ~is_listed).tolist():
+        unknown.setdefault(int(run.values[row]), []).append(table.lines[row])
+    for number, lines in unknown.items():
+        message = f"run {number} is not listed in runs.csv; list it there, or correct the number"
+        faults.add(FILE, lines[0], "run", message + _and_more(lines))
+    probed = set(run.values[run.good].tolist()) | _runs_of(table)
+    for number, line in listed.items():
+        if number not in probed:
+            message = f"run {number} has no row in {FILE}; remove the run, or add its probings"
+            faults.add("runs.csv", line, "run", message)
+    return is_listed
 
 
 def _runs_of(table: CsvTable) -> set[int]:
-    """The runs of rows with a wrong number of cells; -1 where the cell cannot be made out."""
-    place = list(table.columns).index("run")
-    cells = [row[place] if len(row) > place else "" for row in table.damaged]
+    """Return the runs of rows with a wrong number of cells; -1 where the cell cannot be read."""
+    index = list(table.columns).index("run")
+    cells = [row[index] if len(row) > index else "" for row in table.damaged]
     return {int(cell) if re.fullmatch(r"[0-9]{1,10}", cell) else -1 for cell in cells}
 
 
-def _damaged_runs(table: CsvTable, runs: npt.NDArray[np.int64], placed: Mask, good: Mask) -> set[int]:
-    """Runs that a faulty row belongs to, or may belong to: a missing ball there may be that row."""
+def _damaged_runs(table: CsvTable, runs: npt.NDArray[np.int64], known_run: Mask, good: Mask) -> set[int]:
+    """Return the runs that a faulty row belongs to, or may belong to: a ball missing from a run may be that row."""
     damaged = set(runs[~good].tolist()) | _runs_of(table)
     if -1 in _runs_of(table):
         return damaged | set(runs.tolist())
-    lost = np.flatnonzero(~placed)
+    lost = np.flatnonzero(~known_run)
     around = np.concatenate([lost - 1, lost + 1])
     return damaged | set(runs[around[(around >= 0) & (around < len(runs))]].tolist())
 

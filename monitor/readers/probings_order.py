@@ -13,12 +13,12 @@ from monitor.readers.faults import Faults
 def refuse_disorder(
     table: CsvTable, run: Wholes, sequence: Wholes | None, time: Numbers, faults: Faults
 ) -> Mask:
-    """Which rows are in order. Time must not run backwards from row to row nor from sequence to sequence."""
+    """Return which rows are in order. Time must not run backwards from row to row nor from sequence to sequence."""
     fine: Mask = np.ones(len(table), dtype=np.bool_)
     early = time.good & (time.values < 0.0)
-    for place in np.flatnonzero(early).tolist():
-        told = "time_s counts from the start of the run; it must be 0 or more"
-        faults.add(table.file, table.lines[place], "time_s", told)
+    for row in np.flatnonzero(early).tolist():
+        message = "time_s counts from the start of the run; it must be 0 or more"
+        faults.add(table.file, table.lines[row], "time_s", message)
     fine &= ~early
 
     rows = np.flatnonzero(run.good & time.good & ~early)
@@ -26,40 +26,41 @@ def refuse_disorder(
     if sequence is not None:
         both = rows[sequence.good[rows]]
         by_sequence = both[np.lexsort((sequence.values[both], run.values[both]))]
-        fine[_refuse_twice(table, by_sequence, run, sequence, faults)] = False
+        fine[_refuse_repeated(table, by_sequence, run, sequence, faults)] = False
         if not late:
             late = _backwards(by_sequence, run, time)
-    for before, place in late:
-        then, now = float(time.values[before]), float(time.values[place])
+    for before, after in late:
+        earlier, later = float(time.values[before]), float(time.values[after])
         faults.add(
             table.file,
-            table.lines[place],
+            table.lines[after],
             "time_s",
-            f"time runs backwards in run {run.values[place]}: {now!r} s after {then!r} s on line "
+            f"time runs backwards in run {run.values[after]}: {later!r} s after {earlier!r} s on line "
             f"{table.lines[before]}; keep the order in which the points were probed",
         )
-        fine[place] = False
+        fine[after] = False
     return fine
 
 
 def _backwards(rows: npt.NDArray[np.intp], run: Wholes, time: Numbers) -> list[tuple[int, int]]:
-    """Pairs of rows, next to each other in a run, of which the second is earlier."""
+    """Return pairs of rows, next to each other in a run, of which the second is earlier."""
     before, after = rows[:-1], rows[1:]
     wrong = (run.values[before] == run.values[after]) & (time.values[after] < time.values[before])
     return list(zip(before[wrong].tolist(), after[wrong].tolist(), strict=True))
 
 
-def _refuse_twice(
+def _refuse_repeated(
     table: CsvTable, rows: npt.NDArray[np.intp], run: Wholes, sequence: Wholes, faults: Faults
 ) -> list[int]:
+    """Note every sequence number that a run has twice; return the second rows."""
     before, after = rows[:-1], rows[1:]
     same = (run.values[before] == run.values[after]) & (sequence.values[before] == sequence.values[after])
-    for first, place in zip(before[same].tolist(), after[same].tolist(), strict=True):
+    for first, again in zip(before[same].tolist(), after[same].tolist(), strict=True):
         faults.add(
             table.file,
-            table.lines[place],
+            table.lines[again],
             "sequence",
-            f"sequence {sequence.values[place]} stands twice in run {run.values[place]}, also on line "
+            f"sequence {sequence.values[again]} stands twice in run {run.values[again]}, also on line "
             f"{table.lines[first]}; number the probings of a run one by one",
         )
     repeated: list[int] = after[same].tolist()

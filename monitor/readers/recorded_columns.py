@@ -10,7 +10,7 @@ from monitor.units import CONDITION_SUFFIXES, column_unit
 
 
 def has_unit(column: str, suffixes: Sequence[str]) -> bool:
-    """Whether a name ends in one of the units: ``ambient_degC``."""
+    """Return whether a name ends in one of the units: ``ambient_degC``."""
     return column_unit(column) is not None and column.rpartition("_")[2] in suffixes
 
 
@@ -21,16 +21,16 @@ def recorded_columns(
     suffixes: Sequence[str] = CONDITION_SUFFIXES,
     plain: Sequence[str] = (),
 ) -> list[str]:
-    """The columns that are not ``taken``, in order; those whose unit is not known are noted and left out.
+    """Return the columns that are not ``taken``, in order; those of an unknown unit are noted and left out.
 
     ``suffixes`` are the units allowed, ``plain`` the columns without a unit that a method allows.
     """
-    kept = []
+    columns = []
     for column in table.columns:
         if column in taken:
             continue
         if has_unit(column, suffixes) or column in plain:
-            kept.append(column)
+            columns.append(column)
             continue
         ends = ", ".join(f"_{suffix}" for suffix in suffixes)
         hint = near(column, [*taken, *plain]) or near(column.rpartition("_")[2], suffixes)
@@ -40,4 +40,4 @@ def recorded_columns(
             column,
             f"the unit of {quoted(column)} is not known; {hint}end the name of a recorded column in {ends}",
         )
-    return kept
+    return columns

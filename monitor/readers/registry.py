@@ -1,4 +1,4 @@
-"""The formats and the methods that are known, and the door to all of them.
+"""Registers the formats and the rules of the methods, and reads a campaign in any of the formats.
 
 Built-in formats and methods are the files of ``formats`` and ``methods``; a plug-in gives a ``Reader`` or a
 ``MethodRules`` through an entry point of the group ``monitor.readers``.
@@ -35,7 +35,7 @@ T = TypeVar("T", Reader, MethodRules)
 
 
 def read_campaign(folder: Path) -> Campaign | CurveCampaign:
-    """The campaign of a folder, in internal units.
+    """Read the campaign of a folder, in internal units.
 
     Raises CampaignError, with every fault of the folder, if anything in it is wrong.
     """
@@ -45,46 +45,46 @@ def read_campaign(folder: Path) -> Campaign | CurveCampaign:
     except (ValueError, OSError):  # a NUL in the name, or a name longer than the system allows
         is_folder = False
     if not is_folder:
-        told = "there is no such folder; give a folder with campaign.toml, runs.csv and probings.csv"
+        message = "there is no such folder; give a folder with campaign.toml, runs.csv and probings.csv"
         if _exists(folder):
-            told = "this is a file; give the folder that holds campaign.toml, runs.csv and probings.csv"
-        raise CampaignError(str(folder), [Fault(str(folder), None, None, told)])
-    known = readers()
-    chosen = next((reader for reader in known if reader.recognises(folder)), known[-1])
-    return chosen.read(folder)
+            message = "this is a file; give the folder that holds campaign.toml, runs.csv and probings.csv"
+        raise CampaignError(str(folder), [Fault(str(folder), None, None, message)])
+    formats = readers()
+    reader = next((reader for reader in formats if reader.recognises(folder)), formats[-1])
+    return reader.read(folder)
 
 
 @cache
 def readers() -> tuple[Reader, ...]:
-    """All formats, plug-ins first, so that one can take a folder that the built-in would refuse."""
+    """Return all formats, plug-ins first, so that one can take a folder that the built-in would refuse."""
     return (*_plugged_in(Reader), *_built_in("formats", "READER", Reader))
 
 
 @cache
 def method_rules() -> dict[str, MethodRules]:
-    """The rules of every method, by its name."""
+    """Return the rules of every method, by its name."""
     rules = (*_built_in("methods", "RULES", MethodRules), *_plugged_in(MethodRules))
     return {rule.name: rule for rule in rules}
 
 
 def _built_in(room: str, attribute: str, kind: type[T]) -> Iterator[T]:
     package = importlib.import_module(f"monitor.readers.{room}")
-    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda found: found.name):
-        found = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), attribute)
-        assert isinstance(found, kind), f"{module.name}.{attribute} must be a {kind.__name__}"
-        yield found
+    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda module: module.name):
+        entry = getattr(importlib.import_module(f"{package.__name__}.{module.name}"), attribute)
+        assert isinstance(entry, kind), f"{module.name}.{attribute} must be a {kind.__name__}"
+        yield entry
 
 
 def _plugged_in(kind: type[T]) -> Iterator[T]:
     for point in entry_points(group=GROUP):
         try:
-            found = point.load()
+            entry = point.load()
         except Exception as error:
             raise InputError(f"the plug-in {point.name} ({point.value}) cannot be loaded: {error}") from error
-        if not isinstance(found, Reader | MethodRules):
+        if not isinstance(entry, Reader | MethodRules):
             raise InputError(f"the plug-in {point.name} ({point.value}) must be a Reader or a MethodRules")
-        if isinstance(found, kind):
-            yield found
+        if isinstance(entry, kind):
+            yield entry
 
 
 def _exists(path: Path) -> bool:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
 from monitor.readers.csv_table import CsvTable, refuse_missing
-from monitor.readers.csv_values import numbers, wholes
+from monitor.readers.csv_values import Numbers, Wholes, numbers, wholes
 from monitor.readers.faults import Faults, quoted
 from monitor.readers.recorded_columns import recorded_columns
 from monitor.records import Run
@@ -35,60 +35,65 @@ class RunsPart:
 
 
 def read_runs(table: CsvTable, faults: Faults) -> RunsPart | None:
-    """The runs, or None where the columns that the plan needs are missing."""
+    """Read the runs; None where the column of their numbers is missing."""
     required = (*PLAN, AMBIENT)
     refuse_missing(table, required, faults)
     names = [AMBIENT] if AMBIENT in table.columns else []
     names += recorded_columns(table, required, faults)
     conditions = {name: numbers(table, name, faults, may_be_empty=name != AMBIENT) for name in names}
     day = wholes(table, "day", faults) if "day" in table.columns else None
-    warm = _truths(table, faults) if "warm_up" in table.columns else None
+    warm_up = _truths(table, faults) if "warm_up" in table.columns else None
     started = _moments(table, faults) if "started_at" in table.columns else None
     if "run" not in table.columns:
         return None
-    run = wholes(table, "run", faults)
-    lines: dict[int, int] = {}
+    rows = _rows_of_runs(table, wholes(table, "run", faults), faults)
+    lines = {number: table.lines[row] for number, row in rows.items()}
+    if day is None or warm_up is None or started is None:
+        return RunsPart((), lines)
     runs: list[Run] = []
-    for place, number in enumerate(run.values.tolist()):
-        if not run.good[place]:
-            continue
-        line = table.lines[place]
-        if number in lines:
-            faults.add(
-                FILE,
-                line,
-                "run",
-                f"run {number} is listed twice, first on line {lines[number]}; list it once",
-            )
-            continue
-        lines[number] = line
-        if day is None or warm is None or started is None:
-            continue
-        moment, hot = started[place], warm[place]
-        if moment is None or hot is None or not day.good[place]:
-            continue
-        told = {name: float(column.values[place]) for name, column in conditions.items()}
-        told = {name: value for name, value in told.items() if not math.isnan(value)}
-        runs.append(Run(number, moment, int(day.values[place]), hot, told))
+    for number, row in rows.items():
+        moment, warm = started[row], warm_up[row]
+        if moment is not None and warm is not None and day.good[row]:
+            runs.append(Run(number, moment, int(day.values[row]), warm, _recorded(conditions, row)))
     return RunsPart(tuple(runs), lines)
 
 
+def _recorded(conditions: Mapping[str, Numbers], row: int) -> dict[str, float]:
+    """Return the conditions of a run whose cells are not empty."""
+    values = {name: float(column.values[row]) for name, column in conditions.items()}
+    return {name: value for name, value in values.items() if not math.isnan(value)}
+
+
+def _rows_of_runs(table: CsvTable, run: Wholes, faults: Faults) -> dict[int, int]:
+    """Return the row of every run number; one that is listed again is refused."""
+    rows: dict[int, int] = {}
+    for row, number in enumerate(run.values.tolist()):
+        if not run.good[row]:
+            continue
+        if number in rows:
+            first = table.lines[rows[number]]
+            message = f"run {number} is listed twice, first on line {first}; list it once"
+            faults.add(FILE, table.lines[row], "run", message)
+        else:
+            rows[number] = row
+    return rows
+
+
 def _truths(table: CsvTable, faults: Faults) -> list[bool | None]:
-    found: list[bool | None] = []
-    for line, cell in zip(table.lines, table.columns["warm_up"], strict=True):
-        found.append({"true": True, "false": False}.get(cell))
-        if found[-1] is None:
+    truths = [{"true": True, "false": False}.get(cell) for cell in table.columns["warm_up"]]
+    for line, cell, truth in zip(table.lines, table.columns["warm_up"], truths, strict=True):
+        if truth is None:
             faults.add(FILE, line, "warm_up", f"{quoted(cell)} is neither; write true or false")
-    return found
+    return truths
 
 
 def _moments(table: CsvTable, faults: Faults) -> list[datetime | None]:
-    found = [
+    moments = [
         _moment(line, cell, faults)
         for line, cell in zip(table.lines, table.columns["started_at"], strict=True)
     ]
-    _refuse_backwards(table.lines, found, faults)
-    return found
+    _refuse_backwards(table.lines, moments, faults)
+    return moments
 
 
 def _moment(line: int, cell: str, faults: Faults) -> datetime | None:

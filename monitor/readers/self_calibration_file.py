@@ -17,7 +17,7 @@ MOST_NODES = 99
 
 
 def read_self_calibration(artefact: Table) -> SelfCalibration | None:
-    """The table, or None where there is none or anything in it is wrong."""
+    """Read the table; None where there is none, or anything in it is wrong."""
     table = artefact.table("self_calibration")
     if table is None:
         return None
@@ -34,37 +34,37 @@ def _nodes(table: Table) -> dict[str, tuple[float, ...]] | None:
     inner = table.table("nodes_mm", required=True)
     if inner is None:
         return None
-    found = {axis: _places(inner, axis) for axis in inner.data}
+    nodes = {axis: _nodes_of_axis(inner, axis) for axis in inner.data}
     inner.finish()
-    kept = {axis: places for axis, places in found.items() if places is not None}
-    return kept if len(kept) == len(found) else None
+    sound = {axis: readings for axis, readings in nodes.items() if readings is not None}
+    return sound if len(sound) == len(nodes) else None
 
 
-def _places(table: Table, axis: str) -> tuple[float, ...] | None:
+def _nodes_of_axis(table: Table, axis: str) -> tuple[float, ...] | None:
     value = table.raw(axis, required=True, example=NODES)
     if not isinstance(value, list) or not 2 <= len(value) <= MOST_NODES:
         table.fault(
             axis, f"{quoted(value)} is not a list of 2 to {MOST_NODES} readings in mm, such as {NODES}"
         )
         return None
-    places = table.numbers(axis, len(value), largest=FARTHEST_MM, unit="mm", example=NODES)
-    if places is None:
+    readings = table.numbers(axis, len(value), largest=FARTHEST_MM, unit="mm", example=NODES)
+    if readings is None:
         return None
-    for before, after in pairwise(places):
+    for before, after in pairwise(readings):
         if after <= before:
             table.fault(axis, f"{after:g} does not lie beyond {before:g}; list the nodes in rising order")
             return None
-    return places
+    return readings
 
 
 def _conditions(table: Table) -> tuple[str, ...] | None:
     value = table.raw("conditions", required=False, example=CONDITIONS)
     if value is None:
         return ()
-    if not isinstance(value, list) or not value or not all(isinstance(one, str) for one in value):
+    if not isinstance(value, list) or not value or not all(isinstance(condition, str) for condition in value):
         table.fault("conditions", f"{quoted(value)} is not a list of conditions, such as {CONDITIONS}")
         return None
-    twice = sorted({one for one in value if value.count(one) > 1})
+    twice = sorted({condition for condition in value if value.count(condition) > 1})
     if twice:
         table.fault("conditions", f"{quoted(twice[0])} is listed twice; list every condition once")
         return None

@@ -1,4 +1,4 @@
-"""Where a key of a TOML file stands: the standard parser tells no lines, and a message must name one."""
+"""Finds the line of a key of a TOML file, which the standard parser does not report."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ KEY = re.compile(rf"[ \t]*({DOTTED})[ \t]*=")
 
 
 def lines_of_keys(text: str) -> dict[Path, int]:
-    """Line (from 1) of every table header and of every key that begins a line.
+    """Return the line (from 1) of every table header and of every key that begins a line.
 
     A path is the keys from the top; an element of an array of tables is its index from 0. Keys inside an
     inline table have no entry: ``line_of`` falls back to the table's own line.
     """
-    found: dict[Path, int] = {}
+    lines: dict[Path, int] = {}
     arrays: dict[Path, int] = {}
     table: Path = ()
     for number, line in enumerate(text.split("\n"), start=1):
@@ -31,17 +31,17 @@ def lines_of_keys(text: str) -> dict[Path, int]:
             if match[1] == "[[":
                 arrays[table] = arrays.get(table, -1) + 1
             table = _entered(table, arrays)
-            found.setdefault(table, number)
+            lines.setdefault(table, number)
         elif match := KEY.match(line):
             path = table
             for part in _parts(match[1]):
                 path = (*path, part)
-                found.setdefault(path, number)
-    return found
+                lines.setdefault(path, number)
+    return lines
 
 
 def line_of(path: Path, lines: dict[Path, int]) -> int | None:
-    """Line of a key, or of the closest table around it; None at the top of the file."""
+    """Return the line of a key, or of the closest table around it; None at the top of the file."""
     while path:
         if path in lines:
             return lines[path]

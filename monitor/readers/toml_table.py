@@ -31,22 +31,26 @@ class Table:
         self.data = data
         self.path = path
         self._lines = lines
-        self._known: list[str] = []
+        self._asked_for: list[str] = []
 
     def fault(self, key: str | None, message: str) -> None:
         """Note a fault of a key, or of the table itself."""
         path = self.path if key is None else (*self.path, key)
         self.faults.add(self.file, line_of(path, self._lines), name_of(path) or None, message)
 
+    def section(self, key: str) -> Table:
+        """Return an empty table in the place of one that was read already: for faults of its keys."""
+        return Table(self.file, self.faults, {}, self._lines, (*self.path, key))
+
     def raw(self, key: str, *, required: bool, example: str) -> Any:
-        """The value as TOML has it, or None."""
-        self._known.append(key)
+        """Return the value as TOML has it, or None."""
+        self._asked_for.append(key)
         if key not in self.data and required:
             self.fault(key, f"this key is missing; write for example {key} = {example}")
         return self.data.get(key)
 
     def text(self, key: str, *, required: bool = False, example: str = '"..."') -> str | None:
-        """A text of one line."""
+        """Return a text of one line."""
         value = self.raw(key, required=required, example=example)
         if value is None:
             return None
@@ -72,26 +76,26 @@ class Table:
         unit: str,
         example: str,
     ) -> float | None:
-        """A finite number, positive and at most ``largest`` where that is asked for."""
+        """Return a finite number, positive and at most ``largest`` where that is asked for."""
         value = self.raw(key, required=required, example=example)
         return None if value is None else self._number(key, value, positive, largest, unit, example)
 
     def numbers(
         self, key: str, count: int, *, required: bool = False, largest: float, unit: str, example: str
     ) -> tuple[float, ...] | None:
-        """Exactly ``count`` finite numbers."""
+        """Return exactly ``count`` finite numbers."""
         value = self.raw(key, required=required, example=example)
         if value is None:
             return None
         if not isinstance(value, list) or len(value) != count:
             self.fault(key, f"{quoted(value)} is not {count} numbers; write for example {key} = {example}")
             return None
-        found = [self._number(key, item, False, largest, unit, example) for item in value]
-        kept = tuple(item for item in found if item is not None)
-        return kept if len(kept) == count else None
+        parsed = [self._number(key, item, False, largest, unit, example) for item in value]
+        sound = tuple(number for number in parsed if number is not None)
+        return sound if len(sound) == count else None
 
     def sign(self, key: str) -> int | None:
-        """+1 or -1, where the key is there."""
+        """Return +1 or -1; None where the key is absent."""
         value = self.raw(key, required=False, example="1")
         if value is not None and (type(value) is not int or value not in (1, -1)):
             self.fault(key, f"{quoted(value)} is not a sign; write {key} = 1 or {key} = -1")
@@ -99,8 +103,8 @@ class Table:
         return value
 
     def table(self, key: str, *, required: bool = False) -> Table | None:
-        """The table under a key."""
-        self._known.append(key)
+        """Return the table under a key."""
+        self._asked_for.append(key)
         value = self.data.get(key)
         inner = (*self.path, key)
         if value is None:
@@ -113,24 +117,24 @@ class Table:
         return Table(self.file, self.faults, value, self._lines, inner)
 
     def tables(self, key: str) -> list[Table]:
-        """The tables of an array of tables; none where the key is absent."""
-        self._known.append(key)
+        """Return the tables of an array of tables; none where the key is absent."""
+        self._asked_for.append(key)
         value = self.data.get(key, [])
         inner = (*self.path, key)
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             self.fault(key, f"this is not a list of tables; write [[{name_of(inner)}]] above each of them")
             return []
         return [
-            Table(self.file, self.faults, item, self._lines, (*inner, place))
-            for place, item in enumerate(value)
+            Table(self.file, self.faults, item, self._lines, (*inner, index))
+            for index, item in enumerate(value)
         ]
 
     def finish(self) -> None:
         """Refuse every key that was not asked for."""
         for key in self.data:
-            if key not in self._known:
-                hint = near(key, self._known)
-                self.fault(key, f"this key is not known; {hint}the keys here are {one_of(self._known)}")
+            if key not in self._asked_for:
+                hint = near(key, self._asked_for)
+                self.fault(key, f"this key is not known; {hint}the keys here are {one_of(self._asked_for)}")
 
     def _number(
         self, key: str, value: Any, positive: bool, largest: float | None, unit: str, example: str
@@ -154,7 +158,7 @@ class Table:
 
 
 def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
-    """The top table, or None with the syntax error noted."""
+    """Parse a file; None with the syntax error noted."""
     try:
         data = tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
@@ -163,17 +167,17 @@ def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
         message = str(error)
         match = PLACE.search(message)
         line = int(match[1]) if match and match[1] else text.count("\n") + 1 if match else None
-        told = message[: match.start()] if match else message
-        told = told if told.isprintable() else told.encode("ascii", "backslashreplace").decode()
+        reason = message[: match.start()] if match else message
+        reason = reason if reason.isprintable() else reason.encode("ascii", "backslashreplace").decode()
         where = f" at character {match[2]}" if match and match[2] else ""
-        faults.add(file, line, None, f"this is not TOML{where}: {told[:200]}")
+        faults.add(file, line, None, f"this is not TOML{where}: {reason[:200]}")
     else:
         return Table(file, faults, data, lines_of_keys(text))
     return None
 
 
 def name_of(path: Iterable[str | int]) -> str:
-    """A path as it is written in a message; elements of an array of tables count from 1 as people do."""
+    """Return a path as a message has it; elements of an array of tables count from 1."""
     name = ""
     for part in path:
         if isinstance(part, int):

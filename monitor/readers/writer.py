@@ -1,4 +1,4 @@
-"""A campaign as a folder of format 1, such that reading it gives the same numbers to the last bit."""
+"""Writes a campaign as a folder of format 1, so that reading it gives the same numbers to the last bit."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ def write_campaign(campaign: Campaign, folder: Path) -> Path:
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=f".{folder.name[:50]}-", dir=folder.parent) as around:
-            made = Path(around) / "campaign"
-            made.mkdir()
+            draft = Path(around) / "campaign"
+            draft.mkdir()
             for name, text in _texts(campaign).items():
-                (made / name).write_bytes(text.encode("utf-8"))
+                (draft / name).write_bytes(text.encode("utf-8"))
             try:
-                read_campaign(made)
+                read_campaign(draft)
             except CampaignError as error:
                 raise CampaignError(str(folder), error.faults) from None
-            shutil.move(made, folder)
+            shutil.move(draft, folder)
     except UnicodeEncodeError as error:
         raise InputError(
             f"{folder} cannot be written: a name holds half a character ({error.reason})"
@@ -76,13 +76,13 @@ def _runs(campaign: Campaign) -> Iterable[list[str]]:
     further = [name for name in names if name not in FIRST_OF_RUNS]
     yield [*FIRST_OF_RUNS, *further]
     for run in campaign.runs:
-        told = [run.conditions.get(name, math.nan) for name in (FIRST_OF_RUNS[-1], *further)]
+        conditions = [run.conditions.get(name, math.nan) for name in (FIRST_OF_RUNS[-1], *further)]
         yield [
             str(run.run),
             run.started_at.isoformat(),
             str(run.day),
             "true" if run.warm_up else "false",
-            *map(_number, told),
+            *map(_number, conditions),
         ]
 
 

@@ -1,4 +1,4 @@
-"""How a result is rounded and written: the last step before paper, never before.
+"""Rounds and writes a result: the last step before paper, never before.
 
 The expanded uncertainty keeps two significant digits and the estimate is rounded to the same place
 (GUM 7.2.6; ILAC-P14:09/2020, 5.4). Numbers are rounded as written in decimal, so that 2.675 is a tie although the
@@ -39,14 +39,14 @@ class Rounded:
 
 
 def decimal_of(value: float, what: str = "the number") -> Decimal:
-    """The shortest decimal number that means this double. Raises DataError for NaN and infinities."""
+    """Return the shortest decimal number that means this double. Raises DataError for NaN and infinities."""
     if not math.isfinite(value):
         raise DataError(f"{what} must be finite to be printed, but is {value}")
     return Decimal(repr(float(value)))
 
 
 def round_uncertainty(uncertainty: float, digits: int = DIGITS, direction: Direction = "nearest") -> Decimal:
-    """An uncertainty at so many significant digits; ``up`` never makes it smaller.
+    """Round an uncertainty to so many significant digits; ``up`` never makes it smaller.
 
     Raises DataError where it is negative, zero (no digit is significant) or not finite, or digits below 1.
     """
@@ -61,9 +61,9 @@ def round_uncertainty(uncertainty: float, digits: int = DIGITS, direction: Direc
     return rounded
 
 
-def round_to_place(value: float, place: Decimal) -> Decimal:
-    """``value`` at the last decimal place of ``place``, ties to the even digit; zero has no sign."""
-    unit = Decimal(1).scaleb(_exponent(place))
+def round_to_place(value: float, reference: Decimal) -> Decimal:
+    """Round a value at the last decimal place of ``reference``, ties to the even digit; zero has no sign."""
+    unit = Decimal(1).scaleb(_exponent(reference))
     rounded = decimal_of(value, "an estimate").quantize(unit, ROUND_HALF_EVEN, context=_EXACT)
     return abs(rounded) if rounded.is_zero() else rounded
 
@@ -71,19 +71,19 @@ def round_to_place(value: float, place: Decimal) -> Decimal:
 def round_result(
     estimate: float, uncertainty: float, digits: int = DIGITS, direction: Direction = "nearest"
 ) -> Rounded:
-    """The estimate at the place of the rounded uncertainty. Raises DataError as ``round_uncertainty``."""
+    """Round an estimate at the place of the rounded uncertainty. Raises DataError as ``round_uncertainty``."""
     rounded = round_uncertainty(uncertainty, digits, direction)
     return Rounded(round_to_place(estimate, rounded), rounded)
 
 
 def written(number: Decimal, decimal_sign: str = ".") -> str:
-    """A decimal number as printed: fixed notation, a true minus sign, the decimal sign of the language."""
+    """Write a decimal number: fixed notation, a true minus sign, the decimal sign of the language."""
     text = f"{number:f}"
     return text.replace("-", MINUS).replace(".", decimal_sign)
 
 
 def written_correlation(coefficient: float, decimal_sign: str = ".") -> str:
-    """A correlation coefficient: two decimals, and more where two would print 1 or -1 (GUM 7.2.6)."""
+    """Write a correlation coefficient: two decimals, and more where two would print 1 or -1 (GUM 7.2.6)."""
     exact = decimal_of(coefficient, "a correlation coefficient")
     if abs(exact) > 1 + _UNITY:
         raise DataError(f"a correlation coefficient lies between -1 and 1, but is {coefficient}")
@@ -96,12 +96,12 @@ def written_correlation(coefficient: float, decimal_sign: str = ".") -> str:
 
 
 def written_factor(factor: float, decimal_sign: str = ".") -> str:
-    """A coverage factor with two decimals, 2.45."""
+    """Write a coverage factor with two decimals, 2.45."""
     return written(round_to_place(factor, Decimal("0.01")), decimal_sign)
 
 
 def written_probability(p: float, decimal_sign: str = ".") -> str:
-    """A coverage probability in percent, without zeros that say nothing: 95 %, 99.73 %."""
+    """Write a coverage probability in percent, without trailing zeros: 95 %, 99.73 %."""
     percent = (decimal_of(p, "a probability") * 100).normalize()
     return f"{written(percent, decimal_sign)}\N{NO-BREAK SPACE}%"
 

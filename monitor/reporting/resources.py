@@ -1,4 +1,4 @@
-"""Where templates and fonts are: packed inside ``monitor`` when installed, at the checkout's top otherwise."""
+"""Finds templates and fonts: packed inside ``monitor`` when installed, at the checkout's top otherwise."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FONT_FILES = (("DejaVu Sans", 400, "DejaVuSans.ttf"), ("DejaVu Sans", 700, "Deja
 
 
 def report_folder() -> Traversable:
-    """The folder that holds the templates, style sheets and ``fonts/``."""
+    """Return the folder that holds the templates, style sheets and ``fonts/``."""
     try:
         return resources.files("monitor.reports")
     except ModuleNotFoundError:
@@ -20,10 +20,10 @@ def report_folder() -> Traversable:
 
 
 def report_text(name: str) -> str:
-    """A template or style sheet as text."""
+    """Return a template or style sheet as text."""
     return report_folder().joinpath(name).read_text(encoding="utf-8")
 
 
 def font_bytes(file: str) -> bytes:
-    """A font of ours."""
+    """Return the bytes of a font of the project."""
     return report_folder().joinpath("fonts", file).read_bytes()

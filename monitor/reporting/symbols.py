@@ -1,4 +1,4 @@
-"""What the ISO 230-1 symbol of a parameter means, in the few words that a table has room for."""
+"""Describes the ISO 230-1 symbol of a parameter, in the few words that a table has room for."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DIRECTIONS = {
     "B": ("Y", True),
     "C": ("Z", True),
 }
-#: An error of a table at a place, ``EXX(-88)``, and a point of a shape, ``shape(W7)``.
+#: An error of a table at a node, ``EXX(-88)``, and a point of a shape, ``shape(W7)``.
 _AT = re.compile(r"(?P<symbol>E[XYZABC]0?(?P<axis>[XYZUVWABC]\d*))\((?P<place>[^()]+)\)")
 _SHAPE = re.compile(r"shape\((?P<point>.+)\)")
 #: ``J2`` is a joint of a robot: the name does not say along which direction its axis lies.
@@ -25,7 +25,7 @@ _SYMBOL = re.compile(
 
 
 def describe(symbol: str, texts: Texts | None = None) -> str:
-    """A symbol such as ``EA0B``, ``EXX`` or ``EYX:poly2`` in words; a symbol of another kind stays as it is.
+    """Describe a symbol such as ``EA0B``, ``EXX`` or ``EYX:poly2``; a symbol of another kind stays as it is.
 
     Location errors after ISO 230-1:2012 3.7 (orientation and position of an axis), error motions after 3.4
     to 3.6. A first-order positioning error of a linear axis is its gain. In English without ``texts``.
@@ -43,7 +43,7 @@ def describe(symbol: str, texts: Texts | None = None) -> str:
     direction, turns = _DIRECTIONS[match["direction"]]
     axis, rest = match["axis"], match["rest"]
     if axis[0] == "J" and not match["location"]:
-        return symbol  # its roll, tilts and displacements cannot be told apart by the name
+        return symbol  # the name does not say which are its roll, tilts and displacements
     spindle = len(axis) > 1 and axis[0] in "ABC"
     named = say("terms.spindle" if spindle else "terms.axis", name=axis)
     kind = (

@@ -22,9 +22,15 @@ from monitor.statistics.fdr import FalseDiscoveries, control_false_discoveries
 from monitor.statistics.forecast import Crossing, Forecast, forecast, predict
 from monitor.statistics.groups import Selection, group_by, select_runs
 from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
-from monitor.statistics.joint_backtest import LengthBacktest, backtest_longest
-from monitor.statistics.joint_forecast import LengthForecast, forecast_longest, residual_correlation
-from monitor.statistics.longest_vector import longest, may_be_longest
+from monitor.statistics.joint_backtest import JointSeries, LengthBacktest, backtest_longest
+from monitor.statistics.joint_forecast import (
+    JointLines,
+    LengthForecast,
+    LengthQuestion,
+    forecast_longest,
+    residual_correlation,
+)
+from monitor.statistics.longest_vector import ErrorVectors, longest, may_be_longest
 from monitor.statistics.means import AnalysisOfVariance, GroupTest, anova, kruskal_wallis, welch_anova
 from monitor.statistics.monotone import MonotoneTrend, mann_kendall
 from monitor.statistics.multivariate import VectorTest, box_m, manova
@@ -46,14 +52,18 @@ __all__ = [
     "CusumChart",
     "Cycle",
     "Dependence",
+    "ErrorVectors",
     "FalseDiscoveries",
     "Forecast",
     "GroupTest",
     "Histogram",
     "History",
     "Homogeneity",
+    "JointLines",
+    "JointSeries",
     "LengthBacktest",
     "LengthForecast",
+    "LengthQuestion",
     "MonotoneTrend",
     "Normality",
     "Pooling",

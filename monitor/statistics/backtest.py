@@ -1,4 +1,4 @@
-"""How good were forecasts of the drift? Every day foretold by what was known before it, all days at once.
+"""Backtest of forecasts of the drift: every day foretold by the days before it, all days at once.
 
 The line of ``trend``, fitted anew to the history before every forecast day. Such a line depends on the days alone
 (their weights, means and times), so the fits of all origins are sums over the same days and are solved together: the
@@ -26,12 +26,12 @@ BLOCK = 128
 
 @dataclass(frozen=True)
 class Backtest:
-    """Forecasts of held-out days: ``covered`` of ``made`` runs lay in their prediction interval (``level``).
+    """Forecasts of held-out days: ``covered`` of ``forecasts`` runs lay in their prediction interval (``level``).
 
-    ``bias`` and ``rms`` of observed less predicted; ``z`` (made,) the same in units of the stated uncertainty.
+    ``bias`` and ``rms`` of observed less predicted; ``z`` (forecasts,) the same in units of the stated uncertainty.
     """
 
-    made: int
+    forecasts: int
     covered: int
     level: float
     bias: float
@@ -41,7 +41,7 @@ class Backtest:
     @property
     def coverage(self) -> float:
         """Share of held-out runs inside."""
-        return self.covered / self.made
+        return self.covered / self.forecasts
 
 
 class _Days(NamedTuple):
@@ -91,20 +91,23 @@ class _Lines(NamedTuple):
     spread: Array
 
 
-def _lines(days: _Days, known: npt.NDArray[np.bool_], variance: Array) -> _Lines:
-    """Lines through the ``known`` (k, d) days with a component of ``variance`` (k,), in units of the scatter."""
-    d = known.shape[1]
+def _lines(days: _Days, is_past: npt.NDArray[np.bool_], variance: Array) -> _Lines:
+    """Return lines through the past days, ``is_past`` (k, d), with a component of ``variance`` (k,) of the scatter."""
+    d = is_past.shape[1]
     t, m = days.time[:d], days.mean[:d]
-    weight = known * (days.weight[:d] / (1.0 + variance[:, np.newaxis] * days.weight[:d]))
+    weight = is_past * (days.weight[:d] / (1.0 + variance[:, np.newaxis] * days.weight[:d]))
     # About the mean of each origin: a few early days may lie close together, and their scatter far below their level.
     total = weight.sum(axis=1)
     at, level = weight @ t / total, weight @ m / total
-    time, left = t - at[:, np.newaxis], m - level[:, np.newaxis]
+    time, residual = t - at[:, np.newaxis], m - level[:, np.newaxis]
     spread = np.einsum("kd,kd,kd->k", weight, time, time)
-    slope = np.einsum("kd,kd,kd->k", weight, time, left) / spread
-    left -= slope[:, np.newaxis] * time
-    weighted = weight * left
-    chi_square, derivative = np.einsum("kd,kd->k", weighted, left), -np.einsum("kd,kd->k", weighted, weighted)
+    slope = np.einsum("kd,kd,kd->k", weight, time, residual) / spread
+    residual -= slope[:, np.newaxis] * time
+    weighted = weight * residual
+    chi_square, derivative = (
+        np.einsum("kd,kd->k", weighted, residual),
+        -np.einsum("kd,kd->k", weighted, weighted),
+    )
     return _Lines(at, level, slope, chi_square, derivative, total, spread)
 
 
@@ -119,9 +122,9 @@ def _forecasts(days: _Days, past: npt.NDArray[np.intp], t: Array) -> tuple[Array
     unit = np.where(repeated, within / np.where(repeated, runs - past, 1.0), 1.0)
     inside = np.where(repeated, within, 0.0)
     goal = (runs - 2.0) * unit
-    known = np.arange(int(past.max())) < past[:, np.newaxis]
+    is_past = np.arange(int(past.max())) < past[:, np.newaxis]
     variance = np.zeros(len(past))
-    lines = _lines(days, known, variance)
+    lines = _lines(days, is_past, variance)
     open_ = (lines.chi_square + inside > goal) & (goal > 0.0) & (past > 2)
     most = LARGEST / np.maximum.accumulate(days.weight)[last]
     for _ in range(STEPS):
@@ -131,15 +134,15 @@ def _forecasts(days: _Days, past: npt.NDArray[np.intp], t: Array) -> tuple[Array
         excess = lines.chi_square + inside - goal
         step = lines.chi_square * excess / ((goal - inside) * -np.where(open_, lines.derivative, -1.0))
         variance = np.where(open_, np.minimum(variance + step, most), variance)
-        lines = _lines(days, known, variance)
-        left = lines.chi_square + inside - goal
-        open_ &= (left > 1e-13 * goal) & (step > 1e-14 * variance) & (variance < most)
+        lines = _lines(days, is_past, variance)
+        excess_after = lines.chi_square + inside - goal
+        open_ &= (excess_after > 1e-13 * goal) & (step > 1e-14 * variance) & (variance < most)
     factor = (lines.chi_square + inside) / (runs - 2.0)
-    own = np.where(repeated, unit, factor) * days.u_squared[last] / runs
+    run_variance = np.where(repeated, unit, factor) * days.u_squared[last] / runs
     away = t - lines.at
     of_line = factor * (1.0 / lines.total + away**2 / lines.spread)
     dof = np.clip(past - 2.0, 1.0, runs - 2.0)
-    return lines.level + lines.slope * away, np.sqrt(of_line + own + variance * unit), dof
+    return lines.level + lines.slope * away, np.sqrt(of_line + run_variance + variance * unit), dof
 
 
 def backtest(
@@ -152,7 +155,7 @@ def backtest(
     first: int = 5,
     level: float = 0.95,
 ) -> Backtest:
-    """Forecasts each day from the ``first`` on by what was known ``ahead`` days before it.
+    """Forecast each day from the ``first`` on by the history up to ``ahead`` days before it.
 
     Arguments as in ``trend``. Only the first run of a forecast day counts, so that the counted errors are
     not copies of one day's. Raises ``DataError`` where the history has fewer than first + ahead days, or the first
@@ -161,7 +164,7 @@ def backtest(
     """
     y = as_vector(values, "values", least=3)
     t = as_vector(times, "times", length=len(y))
-    own = None if u is None else as_positive(u, "u", length=len(y))
+    run_u = None if u is None else as_positive(u, "u", length=len(y))
     as_probability(level, "level")
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     count = int(index.max()) + 1
@@ -171,15 +174,15 @@ def backtest(
         )
     if count < first + ahead:
         raise DataError(f"the history has {count} days; first + ahead = {first + ahead} are needed.")
-    known = _by_day(y, t, own, index)
-    if np.ptp(known.time[:first]) == 0.0:
+    day_sums = _by_day(y, t, run_u, index)
+    if np.ptp(day_sums.time[:first]) == 0.0:
         raise DataError("the first days have the same mean time; a trend needs days that differ.")
     targets = np.arange(first + ahead - 1, count)
-    seen = known.first[targets]
+    target_runs = day_sums.first[targets]
     blocks = [slice(start, start + BLOCK) for start in range(0, len(targets), BLOCK)]
-    found = [_forecasts(known, targets[block] - ahead + 1, t[seen[block]]) for block in blocks]
-    predicted, spread, dof = (np.concatenate(part) for part in zip(*found, strict=True))
-    errors = y[seen] - predicted
+    forecasts = [_forecasts(day_sums, targets[block] - ahead + 1, t[target_runs[block]]) for block in blocks]
+    predicted, spread, dof = (np.concatenate(part) for part in zip(*forecasts, strict=True))
+    errors = y[target_runs] - predicted
     z = errors / np.maximum(spread, 1e-300)
     inside = int((np.abs(z) <= -special.stdtrit(dof, (1.0 - level) / 2.0)).sum())
     return Backtest(len(z), inside, level, float(errors.mean()), float(np.sqrt((errors**2).mean())), z)

@@ -1,6 +1,6 @@
-"""Since when is the machine another one? Steps and changes of slope with a stated false-alarm probability.
+"""When did the machine change? Steps and changes of slope with a stated false-alarm probability.
 
-A step is preferred over a trend where it explains more; a history that known events split is searched
+A step is preferred over a trend where it explains more; a history that recorded events split is searched
 piece by piece; several parameters share one false-alarm probability. For a change that many parameters
 share, none of which shows it alone, use ``common_change.joint_change``.
 """
@@ -70,13 +70,13 @@ class _Series:
         return len(self.y) >= 2 * EDGE + 2 and bool(np.ptp(self.y) > 0.0)
 
     def part(self, start: int, stop: int) -> _Series:
-        own = None if self.u is None else self.u[start:stop]
+        part_u = None if self.u is None else self.u[start:stop]
         day = None if self.day is None else np.unique(self.day[start:stop], return_inverse=True)[1]
-        return _Series(self.name, self.y[start:stop], self.t[start:stop], own, _repeated(day))
+        return _Series(self.name, self.y[start:stop], self.t[start:stop], part_u, _repeated(day))
 
 
 def _repeated(day: npt.NDArray[np.intp] | None) -> npt.NDArray[np.intp] | None:
-    """The days where a day component can be told from the scatter of the runs: several days, one with two runs."""
+    """Return the days where they have a component beside the scatter of runs: several days, one with two runs."""
     return None if day is None or not 0 < int(day.max()) < len(day) - 1 else day
 
 
@@ -95,51 +95,51 @@ def when(t: Array, places: npt.NDArray[np.int64], deviance: Array, fitted: int) 
     return float(t[max(int(inside.min()) - 1, 0)]), float(t[min(int(inside.max()), len(t) - 1)])
 
 
-def _size(series: _Series, found: Scan, base: Base) -> tuple[float, float]:
+def _size(series: _Series, best: Scan, base: Base) -> tuple[float, float]:
     """Generalised least squares: size of the change and its standard uncertainty, place and correlation as known."""
     t = series.t
     columns = [np.ones_like(t)] if base == "constant" else [np.ones_like(t), t - t.mean()]
-    after = (np.arange(len(t)) >= found.at).astype(np.float64)
-    if found.kind == "step":
+    after = (np.arange(len(t)) >= best.at).astype(np.float64)
+    if best.kind == "step":
         columns.append(after)
-    elif found.kind == "slope":
-        columns.append(after * (t - t[found.at - 1]))
-    elif found.kind == "transient":
-        columns.append(found.column)
+    elif best.kind == "slope":
+        columns.append(after * (t - t[best.at - 1]))
+    elif best.kind == "transient":
+        columns.append(best.column)
     else:
         columns.append(t - t.mean())
     both = np.column_stack([*columns, series.y - series.y.mean()])
-    rows = found.shape.whiten(found.root[:, np.newaxis] * both)
+    rows = best.shape.whiten(best.root[:, np.newaxis] * both)
     design, y = rows[:, :-1], rows[:, -1]
     norm = np.sqrt((design**2).sum(axis=0))
     solution = np.linalg.lstsq(design / norm, y, rcond=None)[0]
-    left = y - design / norm @ solution
-    variance = float(left @ left) / max(len(t) - len(columns), 1)
+    residual = y - design / norm @ solution
+    variance = float(residual @ residual) / max(len(t) - len(columns), 1)
     inverse = np.linalg.inv((design / norm).T @ (design / norm))
     return float(solution[-1] / norm[-1]), float(np.sqrt(variance * inverse[-1, -1]) / norm[-1])
 
 
-def _change(series: _Series, found: Scan, base: Base, offset: int) -> Change:
-    size, u = _size(series, found, base)
-    if found.kind in ("trend", "transient"):
+def _change(series: _Series, best: Scan, base: Base, offset: int) -> Change:
+    size, u = _size(series, best, base)
+    if best.kind in ("trend", "transient"):
         between = (float(series.t[0]), float(series.t[-1]))
     else:
-        same = np.array([kind == found.kind for kind in found.kinds])
-        between = when(series.t, found.positions[same], found.deviance[same], 3 if base == "constant" else 4)
+        same = np.array([kind == best.kind for kind in best.kinds])
+        between = when(series.t, best.positions[same], best.deviance[same], 3 if base == "constant" else 4)
     return Change(
         series.name,
-        found.kind,
-        offset + found.at,
-        float(series.t[found.at]),
+        best.kind,
+        offset + best.at,
+        float(series.t[best.at]),
         between,
         size,
         u,
-        found.p_value,
+        best.p_value,
     )
 
 
 class _Search:
-    """One search with its scanners kept: parameters with the same plan share the preparation."""
+    """One search that reuses its scanners: parameters with the same plan share the preparation."""
 
     def __init__(self, rng: np.random.Generator, trials: int) -> None:
         self.rng, self.trials = rng, trials
@@ -148,7 +148,7 @@ class _Search:
 
     def scanner(self, series: _Series, base: Base) -> Scanner:
         plan = (series.t, series.u, series.day)
-        key = (base, *(None if one is None else one.tobytes() for one in plan))
+        key = (base, *(None if column is None else column.tobytes() for column in plan))
         if key not in self._kept:
             self._kept[key] = Scanner(series.t, series.u, base, series.day)
         return self._kept[key]
@@ -167,9 +167,9 @@ class _Search:
         """Names of the parameters for which wide day components are allowed for, by what all pieces of all show."""
         support: dict[str, Array] = {}
         for series in every:
-            own = self.scanner(series, "constant").day_support(series.y) if series.searched else None
-            if own is not None:
-                support[series.name] = support.get(series.name, 0.0) + own
+            day_support = self.scanner(series, "constant").day_support(series.y) if series.searched else None
+            if day_support is not None:
+                support[series.name] = support.get(series.name, 0.0) + day_support
         if not support:
             return set()
         wide = shows_wide_days(np.array(list(support.values())))
@@ -179,33 +179,45 @@ class _Search:
         wide = series.name in self.wide
         return self.scanner(series, base).scan(series.y, self.rng, self.trials, level, wide)
 
+    def pieces(self, parts: Sequence[tuple[_Series, int]], level: float) -> tuple[list[Change], list[Change]]:
+        """Return changes and trends of all pieces, each with the index of its first run."""
+        self.look([part for part, _ in parts])
+        self.wide = self.wide_days([part for part, _ in parts])
+        changes: list[Change] = []
+        trends: list[Change] = []
+        for part, start in parts:
+            piece_changes, slopes = self.piece(part, start, level)
+            changes += piece_changes
+            trends += slopes
+        return changes, trends
+
     def piece(self, series: _Series, offset: int, level: float) -> tuple[list[Change], list[Change]]:
-        """Changes and trends of one piece of history, split again at every step found."""
+        """Return changes and trends of one piece of history, split again at every step."""
         if not series.searched:
             return [], []
-        found = self.scan(series, "constant", level)
-        if found.p_value > level:
+        best = self.scan(series, "constant", level)
+        if best.p_value > level:
             return [], []
         base: Base = "constant"
         trends: list[Change] = []
-        if found.kind == "transient":
+        if best.kind == "transient":
             bent = self.scan(series, "line", level)
             # Two coefficients and a place more must earn their keep (Schwarz's criterion).
-            gain = float(found.deviance.min() - bent.deviance.min())
+            gain = float(best.deviance.min() - bent.deviance.min())
             if bent.p_value > level or gain < 3.0 * np.log(len(series.y)):
-                return [], [_change(series, found, base, offset)]
-            found = replace(found, kind="trend", at=0)
-        if found.kind == "trend":
-            trends = [_change(series, found, base, offset)]
+                return [], [_change(series, best, base, offset)]
+            best = replace(best, kind="trend", at=0)
+        if best.kind == "trend":
+            trends = [_change(series, best, base, offset)]
             base = "line"
-            found = self.scan(series, base, level)
-            if found.p_value > level:
+            best = self.scan(series, base, level)
+            if best.p_value > level:
                 return [], trends
-        change = _change(series, found, base, offset)
-        if found.kind == "slope":
+        change = _change(series, best, base, offset)
+        if best.kind == "slope":
             return [change], trends
         changes = [change]
-        for start, stop in ((0, found.at), (found.at, len(series.y))):
+        for start, stop in ((0, best.at), (best.at, len(series.y))):
             inner, slopes = self.piece(series.part(start, stop), offset + start, level)
             changes += inner
             trends += slopes
@@ -225,10 +237,10 @@ def find_changes(
 ) -> History:
     """Steps and changes of slope of several parameters (name to (n,)) over ``times`` (n,), any unit, rising.
 
-    ``events`` are times of known changes (crash, repair, compensation): the history is split there, and the
+    ``events`` are times of recorded changes (crash, repair, compensation): the history is split there, and the
     change at an event is no finding. ``u`` (name to (n,)) weighs the runs; ``days`` (n,) are labels whose runs
     may share a component. ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
-    holds for whatever dependence among them; inside a piece every step that is found splits it again at the
+    holds for whatever dependence among them; inside a piece every detected step splits it again at the
     same level. It holds for runs whose neighbours correlate by up to 0.7 and for day components up to the
     scatter of a run, up to four times of it where several parameters show such: whatever of these a series
     does not refute is allowed for (see ``scan`` and ``day_evidence``), so for independent runs the rate is
@@ -237,16 +249,7 @@ def find_changes(
     level, or non-finite values.
     """
     t = as_vector(times, "times", least=2 * EDGE + 2)
-    if (np.diff(t) < 0.0).any():
-        raise DataError(
-            f"times falls at index {int(np.argmax(np.diff(t) < 0.0)) + 1}; sort the runs by time."
-        )
-    if not values:
-        raise DataError("values holds no parameter; at least one is needed.")
-    as_probability(false_alarm, "false_alarm")
-    unknown = sorted(set(u or {}) - set(values))
-    if unknown:
-        raise DataError(f"u names {unknown[0]!r}; values has {', '.join(values)}.")
+    _check(values, t, u or {}, false_alarm)
     bounds = [
         0,
         *np.unique(np.searchsorted(t, np.sort(as_vector(events, "events", least=0)))).tolist(),
@@ -260,21 +263,28 @@ def find_changes(
             f"{int(np.ceil(1.0 / level)) - 1}."
         )
     day = None if days is None else label_groups(days, len(t))[1]
-    search = _Search(rng, trials)
-    changes: list[Change] = []
-    trends: list[Change] = []
     parts = []
     for name, recorded in values.items():
         y = as_vector(recorded, name, length=len(t))
-        own = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
-        series = _Series(name, y, t, own, _repeated(day))
+        run_u = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
+        series = _Series(name, y, t, run_u, _repeated(day))
         parts += [(series.part(start, stop), start) for start, stop in pieces]
-    search.look([part for part, _ in parts])
-    search.wide = search.wide_days([part for part, _ in parts])
-    for part, start in parts:
-        found, slopes = search.piece(part, start, level)
-        changes += found
-        trends += slopes
+    changes, trends = _Search(rng, trials).pieces(parts, level)
     order = {name: i for i, name in enumerate(values)}
     changes.sort(key=lambda c: (c.index, order[c.parameter]))
     return History(tuple(changes), tuple(trends), false_alarm, trials)
+
+
+def _check(
+    values: Mapping[str, npt.ArrayLike], t: Array, u: Mapping[str, npt.ArrayLike], false_alarm: float
+) -> None:
+    if (np.diff(t) < 0.0).any():
+        raise DataError(
+            f"times falls at index {int(np.argmax(np.diff(t) < 0.0)) + 1}; sort the runs by time."
+        )
+    if not values:
+        raise DataError("values holds no parameter; at least one is needed.")
+    as_probability(false_alarm, "false_alarm")
+    unknown = sorted(set(u) - set(values))
+    if unknown:
+        raise DataError(f"u names {unknown[0]!r}; values has {', '.join(values)}.")

@@ -1,7 +1,7 @@
 """What a parameter depends on: temperature, warm-up time, any recorded channel, cycles of day and year.
 
 All coefficients are estimated together with the drift, so a machine that was measured in ever warmer weeks
-shows neither as the other; where they cannot be told apart the correlation of the estimates says so.
+shows neither as the other; where they cannot be separated the correlation of the estimates says so.
 """
 
 from __future__ import annotations
@@ -90,6 +90,34 @@ def _per(unit: Unit | None, channel: Unit | None) -> Unit | None:
     return unit.per(KELVIN if channel == DEGREE_CELSIUS else channel)
 
 
+def _design(
+    t: Array, channels: Mapping[str, npt.ArrayLike], cycles: Mapping[str, float], drift: bool
+) -> tuple[tuple[str, ...], Array]:
+    """Return the names of the q terms and their columns (n, q): level, drift, channels, cosine and sine of cycles."""
+    origin = float(t.mean())
+    terms, columns = ["level"], [np.ones_like(t)]
+    if drift:
+        if np.ptp(t) == 0.0:
+            raise DataError(f"all times are {t[0]}; leave out the drift or give times that differ.")
+        terms.append("drift")
+        columns.append(t - origin)
+    for name, recorded in channels.items():
+        channel = as_vector(recorded, f"channel {name}", length=len(t))
+        if np.ptp(channel) == 0.0:
+            raise DataError(f"channel {name} is {channel[0]} in every run; nothing can depend on it.")
+        terms.append(name)
+        columns.append(channel - channel.mean())
+    for name, period in cycles.items():
+        if not 0.0 < period <= 2.0 * np.ptp(t):
+            raise DataError(
+                f"cycle {name} has period {period}; the times span {np.ptp(t)}, half of it is needed."
+            )
+        terms += [f"{name} cosine", f"{name} sine"]
+        angle = 2.0 * np.pi * (t - origin) / period
+        columns += [np.cos(angle), np.sin(angle)]
+    return tuple(terms), np.column_stack(columns)
+
+
 def dependence(
     values: npt.ArrayLike,
     times: npt.ArrayLike,
@@ -114,31 +142,12 @@ def dependence(
     y = as_vector(values, "values", least=4)
     t = as_vector(times, "times", length=len(y))
     as_probability(level, "level")
-    own = None if u is None else as_positive(u, "u", length=len(y))
+    run_u = None if u is None else as_positive(u, "u", length=len(y))
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     origin = float(t.mean())
-    terms, columns = ["level"], [np.ones_like(t)]
-    if drift:
-        if np.ptp(t) == 0.0:
-            raise DataError(f"all times are {t[0]}; leave out the drift or give times that differ.")
-        terms.append("drift")
-        columns.append(t - origin)
-    for name, recorded in channels.items():
-        channel = as_vector(recorded, f"channel {name}", length=len(y))
-        if np.ptp(channel) == 0.0:
-            raise DataError(f"channel {name} is {channel[0]} in every run; nothing can depend on it.")
-        terms.append(name)
-        columns.append(channel - channel.mean())
-    for name, period in (cycles or {}).items():
-        if not 0.0 < period <= 2.0 * np.ptp(t):
-            raise DataError(
-                f"cycle {name} has period {period}; the times span {np.ptp(t)}, half of it is needed."
-            )
-        terms += [f"{name} cosine", f"{name} sine"]
-        angle = 2.0 * np.pi * (t - origin) / period
-        columns += [np.cos(angle), np.sin(angle)]
-    fit = fit_with_days(y, np.column_stack(columns), own, index)
-    weight = np.ones_like(y) if own is None else 1.0 / own**2
+    terms, design = _design(t, channels, cycles or {}, drift)
+    fit = fit_with_days(y, design, run_u, index)
+    weight = np.ones_like(y) if run_u is None else 1.0 / run_u**2
     about = y - np.average(y, weights=weight)
     total = float((weight * about**2).sum())
     units = channel_units or {}
@@ -154,7 +163,7 @@ def dependence(
             for i, (name, period) in enumerate((cycles or {}).items())
         ),
         drift=_coefficient(fit, 1, "drift", None, level) if drift else None,
-        terms=tuple(terms),
+        terms=terms,
         correlation=fit.covariance / np.where(scale > 0.0, scale, 1.0),
         explained=1.0 - float((weight * fit.residual**2).sum()) / total if total > 0.0 else 0.0,
         within=fit.within,

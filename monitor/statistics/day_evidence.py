@@ -31,12 +31,12 @@ def shows_wide_days(support: Array) -> npt.NDArray[np.bool_]:
     assert support.shape[1] == usual + len(WIDE_DAYS)
     # As if one parameter more had shown a usual component.
     before = np.concatenate([np.full(usual, 1.0 / usual), np.zeros(len(WIDE_DAYS))])
-    found = np.zeros(len(support), dtype=np.bool_)
-    for i, own in enumerate(support):
+    shown = np.zeros(len(support), dtype=np.bool_)
+    for i, log_likelihood in enumerate(support):
         others = np.delete(support, i, axis=0)
         share = np.full(support.shape[1], 1.0 / support.shape[1])
         for _ in range(STEPS):
             share = (before + special.softmax(others + np.log(share), axis=1).sum(axis=0)) / (1 + len(others))
             share = np.maximum(share, 1e-300)
-        found[i] = special.softmax(own + np.log(share))[usual:].sum() >= LIKELY
-    return found
+        shown[i] = special.softmax(log_likelihood + np.log(share))[usual:].sum() >= LIKELY
+    return shown

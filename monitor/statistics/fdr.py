@@ -33,7 +33,7 @@ class FalseDiscoveries:
 def control_false_discoveries(
     p_values: npt.ArrayLike, *, rate: float = 0.05, method: Method = "benjamini-hochberg"
 ) -> FalseDiscoveries:
-    """q-values of ``p_values`` (m,) with the false discovery rate controlled at ``rate``.
+    """Return the q-values of ``p_values`` (m,) with the false discovery rate controlled at ``rate``.
 
     A NaN (a test that could not be made) stays NaN, is never called and is not counted among the tests.
     Raises ``DataError`` for a p-value outside 0 to 1, a rate outside 0 to 1 or an unknown method. Sources:
@@ -50,10 +50,10 @@ def control_false_discoveries(
     if method not in ("benjamini-hochberg", "benjamini-yekutieli"):
         raise DataError(f"method is {method!r}; there are 'benjamini-hochberg' and 'benjamini-yekutieli'.")
     q = np.full_like(p, np.nan)
-    made = np.flatnonzero(~np.isnan(p))
-    m = made.size
+    tested = np.flatnonzero(~np.isnan(p))
+    m = tested.size
     if m:
-        order = made[np.argsort(p[made], kind="stable")]
+        order = tested[np.argsort(p[tested], kind="stable")]
         rank = np.arange(1, m + 1)
         price = 1.0 if method == "benjamini-hochberg" else float((1.0 / rank).sum())
         step_up = np.minimum.accumulate((p[order] * m * price / rank)[::-1])[::-1]

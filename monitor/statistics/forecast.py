@@ -2,7 +2,7 @@
 
 Extrapolates the drift of ``trend`` (run it on the piece since the last change). The predicted quantity is
 the result of one run on a day of its own: line, day component and scatter of the run together. How good
-such forecasts were is told by ``backtest`` on history that was held out.
+such forecasts were is reported by ``backtest`` on history that was held out.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ class Forecast:
     """``crossing`` of the limit that is reached first (None without drift towards one).
 
     ``probability`` (c,) of a run in tolerance at each of ``checks`` (c,); ``recommended_interval`` is the
-    time from ``now`` (infinite beyond ``horizon``), by ``method``, at ``reliability``.
+    time from ``origin`` (infinite beyond ``horizon``), by ``method``, at ``reliability``.
     """
 
-    now: float
+    origin: float
     crossing: Crossing
     checks: Array
     predicted: Array
@@ -65,11 +65,11 @@ def predict(line: Trend, times: npt.ArrayLike) -> tuple[Array, Array, Array]:
     return line.level_at + line.slope * t, of_line, np.hypot(of_line, line.run_sd)
 
 
-def _crossing(line: Trend, limit: float, now: float, horizon: float) -> Crossing:
-    """First time from ``now`` on at which the line, and each side of its band, reaches the limit."""
+def _crossing(line: Trend, limit: float, origin: float, horizon: float) -> Crossing:
+    """Return the first time from ``origin`` on at which the line, and each side of its band, reaches the limit."""
     factor = float(-scipy.special.stdtrit(line.dof, (1.0 - line.confidence) / 2.0))
-    side = 1.0 if limit > float(predict(line, now)[0]) else -1.0
-    grid = now + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 400)]) * (horizon - now)
+    side = 1.0 if limit > float(predict(line, origin)[0]) else -1.0
+    grid = origin + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 400)]) * (horizon - origin)
 
     def first(multiple: float) -> float:
         def gap(t: npt.ArrayLike) -> Array:
@@ -100,43 +100,43 @@ def _probability(line: Trend, times: npt.ArrayLike, lower: float, upper: float) 
 def forecast(
     line: Trend,
     limits: tuple[float, float],
-    now: float,
+    origin: float,
     checks: npt.ArrayLike,
     *,
     reliability: float = 0.95,
     horizon: float | None = None,
 ) -> Forecast:
-    """Forecast of a drift ``line`` against ``limits`` (lower, upper) in the unit of its values.
+    """Forecast a drift ``line`` against ``limits`` (lower, upper) in the unit of its values.
 
-    ``now``, ``checks`` (c,) and ``horizon`` in the unit of its times; without a horizon ten times the span of the
-    history (from its mean time to now, doubled). An open side is an infinite limit. Raises ``DataError`` for
+    ``origin`` (now), ``checks`` (c,) and ``horizon`` in the unit of its times; without a horizon ten times the span of
+    the history (from its mean time to now, doubled). An open side is an infinite limit. Raises ``DataError`` for
     limits that do not rise, a check before now. Neglected: changes yet to come; see ``backtest``.
     """
     lower, upper = (float(x) for x in limits)
     if not lower < upper:
         raise DataError(f"limits is ({lower}, {upper}); the lower must be below the upper.")
-    if not (np.isfinite(now) and now >= line.at):
-        raise DataError(f"now is {now}; it must not lie before the mean time of the history, {line.at}.")
+    if not (np.isfinite(origin) and origin >= line.at):
+        raise DataError(f"now is {origin}; it must not lie before the mean time of the history, {line.at}.")
     at = as_vector(checks, "checks", least=0)
-    if at.size and at.min() < now:
-        raise DataError(f"checks holds {at.min()}; a planned check cannot lie before now, {now}.")
+    if at.size and at.min() < origin:
+        raise DataError(f"checks holds {at.min()}; a planned check cannot lie before now, {origin}.")
     as_probability(reliability, "reliability")
-    end = now + 20.0 * max(now - line.at, 1e-9) if horizon is None else float(horizon)
-    if not end > now:
-        raise DataError(f"horizon is {end}; it must lie after now, {now}.")
-    sides = [_crossing(line, x, now, end) for x in (lower, upper) if np.isfinite(x)]
+    end = origin + 20.0 * max(origin - line.at, 1e-9) if horizon is None else float(horizon)
+    if not end > origin:
+        raise DataError(f"horizon is {end}; it must lie after now, {origin}.")
+    sides = [_crossing(line, limit, origin, end) for limit in (lower, upper) if np.isfinite(limit)]
     sides.sort(key=lambda c: (np.inf if c.at is None else c.at, c.interval[0]))
-    grid = now + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 2000)]) * (end - now)
+    grid = origin + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, 2000)]) * (end - origin)
     out = np.flatnonzero(_probability(line, grid, lower, upper) < reliability)
     value, _, u = predict(line, at)
     return Forecast(
-        now=now,
+        origin=origin,
         crossing=sides[0] if sides else Crossing(np.inf, None, (np.inf, np.inf)),
         checks=at,
         predicted=value,
         u_predicted=u,
         probability=_probability(line, at, lower, upper),
-        recommended_interval=np.inf if not out.size else float(grid[max(int(out[0]) - 1, 0)] - now),
+        recommended_interval=np.inf if not out.size else float(grid[max(int(out[0]) - 1, 0)] - origin),
         reliability=reliability,
         horizon=end,
         method=METHOD,

@@ -84,15 +84,15 @@ def select_runs(columns: Mapping[str, npt.ArrayLike], condition: str, *, name: s
     clauses = re.split(r"\s+and\s+(?=(?:[^'\"]*['\"][^'\"]*['\"])*[^'\"]*$)", condition.strip())
     mask: npt.NDArray[np.bool_] | None = None
     for clause in clauses:
-        found = _CLAUSE.fullmatch(clause)
-        if found is None:
+        match = _CLAUSE.fullmatch(clause)
+        if match is None:
             raise DataError(
                 f"{clause!r} is no condition; write column, operator ({' '.join(OPERATORS)}), value, "
                 "for example: warm_up == true and ambient_degC < 24"
             )
-        column = _column(columns, found["column"])
-        value = _value(found["value"], found["column"], column.dtype.kind)
-        part = np.asarray(OPERATORS[found["operator"]](column, value), dtype=np.bool_)
+        column = _column(columns, match["column"])
+        value = _value(match["value"], match["column"], column.dtype.kind)
+        part = np.asarray(OPERATORS[match["operator"]](column, value), dtype=np.bool_)
         mask = part if mask is None else mask & part
     if mask is None or not mask.any():
         raise DataError(f"no run meets {condition!r}.")

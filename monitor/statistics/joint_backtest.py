@@ -1,4 +1,4 @@
-"""How good were forecasts of the longest error vector? Days of the past foretold by what was known before them.
+"""Backtest of forecasts of the longest error vector: days of the past foretold by the days before them.
 
 The parameters are extrapolated together as ``forecast_longest`` does; what is compared is the longest vector of a run
 that was measured with the median and the interval of the longest vectors of such a run.
@@ -14,10 +14,9 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.checks import as_probability
 from monitor.statistics.forecast import predict
-from monitor.statistics.joint_forecast import draw_lines, residual_correlation
-from monitor.statistics.longest_vector import longest
+from monitor.statistics.joint_forecast import JointLines, draw_lines, residual_correlation
+from monitor.statistics.longest_vector import ErrorVectors
 from monitor.statistics.trend import Trend
 
 #: Days foretold at most, evenly spread over those that can be: each costs a fit of every parameter.
@@ -26,6 +25,8 @@ FORETOLD = 8
 FEWEST_DAYS = 5
 #: Simulated futures of each forecast: the ends of the interval are good to some 4 % of its half width.
 DRAWS = 2000
+#: Probability of the intervals.
+LEVEL = 0.95
 
 #: Fits the line of a column to runs ``keep`` (n,); raises DataError where they do not suffice.
 Fit = Callable[[int, npt.NDArray[np.bool_]], Trend]
@@ -33,12 +34,12 @@ Fit = Callable[[int, npt.NDArray[np.bool_]], Trend]
 
 @dataclass(frozen=True)
 class LengthBacktest:
-    """Forecasts of held-out days: ``covered`` of ``made`` longest vectors lay in their interval (``level``).
+    """Forecasts of held-out days: ``covered`` of ``forecasts`` longest vectors lay in their interval (``level``).
 
-    ``bias`` and ``rms`` of measured less median, in the unit of the vectors; ``at`` (made,) the foretold runs' times.
+    ``bias`` and ``rms`` of measured less median, in the unit of the vectors; ``at`` (forecasts,) the runs' times.
     """
 
-    made: int
+    forecasts: int
     covered: int
     level: float
     bias: float
@@ -48,73 +49,91 @@ class LengthBacktest:
     @property
     def coverage(self) -> float:
         """Share of held-out days inside."""
-        return self.covered / self.made
+        return self.covered / self.forecasts
+
+
+@dataclass(frozen=True)
+class JointSeries:
+    """``values`` (n, p) of p parameters in the order of ``times`` (n,), with labels of their ``days`` (n,).
+
+    A value is NaN where a parameter has none, or where its last change lies ahead.
+    """
+
+    values: Array
+    times: Array
+    days: npt.NDArray[np.int64]
 
 
 def backtest_longest(
-    values: Array,
-    times: Array,
-    days: npt.NDArray[np.int64],
+    series: JointSeries,
     fit: Fit,
-    sensitivity: Array,
-    offset: Array,
+    vectors: ErrorVectors,
     *,
     rng: np.random.Generator,
-    level: float = 0.95,
     foretold: int = FORETOLD,
     draws: int = DRAWS,
 ) -> LengthBacktest:
-    """Foretell the first run of up to ``foretold`` days by the days before each.
+    """Foretell the first run of up to ``foretold`` days by the days before each, with intervals of ``LEVEL``.
 
-    ``values`` (n, p) in the order of ``times`` (n,), NaN where a parameter has none or its last change lies ahead;
-    ``days`` (n,) labels; ``sensitivity`` (k, 3, p) and ``offset`` (k, 3) as in ``forecast_longest``. Raises DataError
-    where no day has five days of every parameter before it. The linearisation at today's values serves the past too.
+    Raises DataError where no day has five days of every parameter before it. The linearisation at today's values serves
+    the past too.
     """
-    tail = (1.0 - as_probability(level, "level")) / 2.0
-    whole = np.isfinite(values).all(axis=1)
-    labels, first = np.unique(days[whole], return_index=True)
+    rows = _foretold_rows(series, foretold)
+    forecasts = [_forecast(series, row, fit, vectors, rng, draws) for row in rows]
+    errors = np.array([measured - median for measured, (_, median, _) in forecasts])
+    return LengthBacktest(
+        len(errors),
+        sum(low <= measured <= high for measured, (low, _, high) in forecasts),
+        LEVEL,
+        float(errors.mean()),
+        float(np.sqrt((errors**2).mean())),
+        series.times[rows],
+    )
+
+
+def _foretold_rows(series: JointSeries, foretold: int) -> list[int]:
+    """Return the first runs of the days to be foretold, evenly spread over those that can be."""
+    whole = np.isfinite(series.values).all(axis=1)
+    labels, first = np.unique(series.days[whole], return_index=True)
     rows = np.sort(np.flatnonzero(whole)[first])
-    possible = rows[_known_days(values, days, times, times[rows]) >= FEWEST_DAYS].tolist()
+    possible = rows[_fewest_days(series, series.times[rows]) >= FEWEST_DAYS].tolist()
     if not possible:
         raise DataError(
             f"{len(labels)} days of all parameters since the last change are too few to foretell one of them by the "
             f"days before it; at least {FEWEST_DAYS + 1} are needed."
         )
     spread = np.unique(np.linspace(0, len(possible) - 1, min(foretold, len(possible))).round().astype(int))
-    inside, misses = 0, []
-    for row in (possible[i] for i in spread):
-        before = (times < times[row]) & (days != days[row])
-        lines = [fit(column, before & np.isfinite(values[:, column])) for column in range(values.shape[1])]
-        left = np.column_stack(
-            [values[before, column] - predict(line, times[before])[0] for column, line in enumerate(lines)]
-        )
-        correlation, _, _ = residual_correlation(left, days[before])
-        level_dev, slope_dev, run_dev = draw_lines(lines, correlation, rng, draws)
-        centre = np.array([line.at for line in lines])
-        best = np.array([float(predict(line, times[row])[0]) for line in lines])
-        future = best + level_dev + slope_dev * (times[row] - centre) + run_dev
-        lengths = longest(future, sensitivity, offset)
-        measured = float(longest(values[[row]], sensitivity, offset)[0])
-        low, middle, high = np.quantile(lengths, [tail, 0.5, 1.0 - tail])
-        inside += int(low <= measured <= high)
-        misses.append(measured - middle)
-    found = np.array(misses)
-    return LengthBacktest(
-        len(found),
-        inside,
-        level,
-        float(found.mean()),
-        float(np.sqrt((found**2).mean())),
-        times[[possible[i] for i in spread]],
+    return [possible[index] for index in spread]
+
+
+def _forecast(
+    series: JointSeries, row: int, fit: Fit, vectors: ErrorVectors, rng: np.random.Generator, draws: int
+) -> tuple[float, tuple[float, float, float]]:
+    """Return the measured length of a run, and the low end, median and high end of its forecast."""
+    values, times, days = series.values, series.times, series.days
+    before = (times < times[row]) & (days != days[row])
+    lines = [fit(column, before & np.isfinite(values[:, column])) for column in range(values.shape[1])]
+    residuals = np.column_stack(
+        [values[before, column] - predict(line, times[before])[0] for column, line in enumerate(lines)]
     )
+    correlation, _, _ = residual_correlation(residuals, days[before])
+    joint = JointLines(lines, correlation)
+    futures = draw_lines(joint, rng, draws)
+    future = (
+        joint.predict(times[row]) + futures.level + futures.slope * (times[row] - joint.centre) + futures.run
+    )
+    lengths = vectors.longest(future)
+    tail = (1.0 - LEVEL) / 2.0
+    low, median, high = np.quantile(lengths, [tail, 0.5, 1.0 - tail])
+    return float(vectors.longest(values[[row]])[0]), (float(low), float(median), float(high))
 
 
-def _known_days(values: Array, days: npt.NDArray[np.int64], times: Array, at: Array) -> npt.NDArray[np.intp]:
-    """Fewest days (k,) of any parameter that had begun before each of the times ``at`` (k,)."""
-    fewest = np.full(len(at), len(days))
-    for column in values.T:
-        own = np.isfinite(column)
-        # Times do not fall: the first run of a day is where it is met first.
-        begins = times[own][np.unique(days[own], return_index=True)[1]]
+def _fewest_days(series: JointSeries, at: Array) -> npt.NDArray[np.intp]:
+    """Return the fewest days (k,) of any parameter that had begun before each of the times ``at`` (k,)."""
+    fewest = np.full(len(at), len(series.days))
+    for column in series.values.T:
+        is_measured = np.isfinite(column)
+        # Times do not fall: the first run of a day is its first row.
+        begins = series.times[is_measured][np.unique(series.days[is_measured], return_index=True)[1]]
         fewest = np.minimum(fewest, np.searchsorted(np.sort(begins), at, side="left"))
     return fewest

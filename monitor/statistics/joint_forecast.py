@@ -1,4 +1,4 @@
-"""When will the volumetric error leave its limit: the longest of many vectors that follow all parameters together.
+"""Forecast of when the volumetric error leaves its limit: the longest of many vectors that follow all parameters.
 
 Each parameter is extrapolated by its own line (``trend``), and the lines and the scatter about them are correlated as
 the residuals of the days are. The longest vector is no linear function of the parameters: it is simulated.
@@ -18,17 +18,66 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_probability, as_vector
 from monitor.statistics.forecast import Crossing, predict
-from monitor.statistics.longest_vector import longest
+from monitor.statistics.longest_vector import ErrorVectors
 from monitor.statistics.trend import Trend
 
 #: Simulated futures: the probability at a check is good to 0.011 (one standard deviation at 0.5).
 DRAWS = 2000
-#: Times looked at between now and the horizon, denser near now; crossings are interpolated between them.
+#: Times searched between now and the horizon, denser near now; crossings are interpolated between them.
 TIMES = 60
-#: Fewest days without which the correlation of the parameters is taken as none.
+#: Fewest days without which the parameters count as uncorrelated.
 FEWEST_DAYS = 4
 #: Points at which chi-square is solved for; in between a polynomial has it to 1e-11 (measured, 1 to 1e6 degrees).
 NODES = 48
+
+
+@dataclass(frozen=True)
+class JointLines:
+    """The ``lines`` of p parameters, and the ``correlation`` (p, p) of lines and scatter.
+
+    The lines are in the unit of their values over days or any unit of time.
+    """
+
+    lines: Sequence[Trend]
+    correlation: Array
+
+    def predict(self, t: float) -> Array:
+        """Return the best estimate (p,) of the parameters at a time."""
+        return np.array([float(predict(line, t)[0]) for line in self.lines])
+
+    @property
+    def centre(self) -> Array:
+        """Mean times (p,) of the lines."""
+        return np.array([line.at for line in self.lines])
+
+
+@dataclass(frozen=True)
+class LengthQuestion:
+    """A ``limit`` of the longest vector, the forecast ``origin`` (now), and the times ``checks`` (c,) of planned ones.
+
+    ``horizon`` is the end of the search, ``reliability`` the wanted probability of a run in tolerance, ``level`` that
+    of intervals. Raises DataError for a limit that is not above zero, a check before now, or a horizon not after it.
+    """
+
+    limit: float
+    origin: float
+    checks: npt.ArrayLike
+    horizon: float
+    reliability: float = 0.95
+    level: float = 0.95
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.limit) and self.limit > 0.0):
+            raise DataError(f"limit is {self.limit}; the longest vector needs a limit above zero.")
+        checks = as_vector(self.checks, "checks", least=0)
+        if checks.size and checks.min() < self.origin:
+            raise DataError(
+                f"checks holds {checks.min()}; a planned check cannot lie before now, {self.origin}."
+            )
+        if not self.horizon > self.origin:
+            raise DataError(f"horizon is {self.horizon}; it must lie after now, {self.origin}.")
+        as_probability(self.reliability, "reliability")
+        as_probability(self.level, "level")
 
 
 @dataclass(frozen=True)
@@ -36,11 +85,11 @@ class LengthForecast:
     """``crossing`` of the limit by the lines; ``probability`` (c,) that a run is in tolerance at ``checks`` (c,).
 
     ``predicted`` (c,) is the median of the longest vector of a run, ``interval`` (c, 2) holds it with ``level``;
-    ``recommended_interval`` is the longest time from now on with which a run stays in tolerance with ``reliability``
-    (infinite beyond ``horizon``). ``latest`` is the length at ``now`` by the lines.
+    ``recommended_interval`` is the longest time from ``origin`` on with which a run stays in tolerance with
+    ``reliability`` (infinite beyond ``horizon``). ``latest`` is the length at ``origin`` by the lines.
     """
 
-    now: float
+    origin: float
     latest: float
     crossing: Crossing
     checks: Array
@@ -94,16 +143,32 @@ def _chi_square(u: Array, dof: Array) -> Array:
     z = scipy.special.ndtri(u)
     middle, half = 0.5 * (z.max() + z.min()), max(0.5 * float(np.ptp(z)), 1e-9)
     nodes = chebyshev.chebpts1(NODES)
-    known = np.log(scipy.special.chdtri(dof, scipy.special.ndtr(middle + half * nodes)[:, np.newaxis]))
-    factors = np.linalg.solve(chebyshev.chebvander(nodes, NODES - 1), known)
+    node_logarithms = np.log(
+        scipy.special.chdtri(dof, scipy.special.ndtr(middle + half * nodes)[:, np.newaxis])
+    )
+    factors = np.linalg.solve(chebyshev.chebvander(nodes, NODES - 1), node_logarithms)
     return np.asarray(np.exp(chebyshev.chebvander((z - middle) / half, NODES - 1) @ factors))
 
 
-def draw_lines(
-    lines: Sequence[Trend], correlation: Array, rng: np.random.Generator, count: int
-) -> tuple[Array, Array, Array]:
-    """Deviations (count, p) of level and slope of each line and of a run about it; each a t of the line's freedom."""
-    values, vectors = np.linalg.eigh(correlation)
+@dataclass(frozen=True)
+class Futures:
+    """Simulated deviations (m, p) of p parameters from their best lines: of ``level``, ``slope`` and of a ``run``."""
+
+    lines: JointLines
+    level: Array
+    slope: Array
+    run: Array
+
+    def parameters(self, t: float, *, of_runs: bool) -> Array:
+        """Return the parameters (m, p) at a time, of the lines alone or of runs about them."""
+        deviation = self.level + self.slope * (t - self.lines.centre)
+        return self.lines.predict(t) + deviation + (self.run if of_runs else 0.0)
+
+
+def draw_lines(joint: JointLines, rng: np.random.Generator, count: int) -> Futures:
+    """Draw ``count`` futures of the lines and of a run about each; each a t of the line's degrees of freedom."""
+    lines = joint.lines
+    values, vectors = np.linalg.eigh(joint.correlation)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     z = rng.standard_normal((3, count, len(lines))) @ root.T
     u = rng.uniform(size=count)
@@ -112,94 +177,77 @@ def draw_lines(
     roots = np.array([np.linalg.cholesky(line.covariance + 1e-30 * np.eye(2)) for line in lines])
     level = z[0] * roots[:, 0, 0]
     slope = z[0] * roots[:, 1, 0] + z[1] * roots[:, 1, 1]
-    return level * heavy, slope * heavy, z[2] * np.array([line.run_sd for line in lines]) * heavy
+    return Futures(
+        joint, level * heavy, slope * heavy, z[2] * np.array([line.run_sd for line in lines]) * heavy
+    )
 
 
 def _first_crossing(times: Array, lengths: Array, limit: float) -> Array:
     """First time at which each row (m, t) of lengths reaches the limit; infinite where none does."""
     beyond = lengths >= limit
-    place = beyond.argmax(axis=1)
+    first = beyond.argmax(axis=1)
     rows = np.arange(len(lengths))
-    before = np.maximum(place - 1, 0)
-    low, high = lengths[rows, before], lengths[rows, place]
+    before = np.maximum(first - 1, 0)
+    low, high = lengths[rows, before], lengths[rows, first]
     share = (limit - low) / np.where(high > low, high - low, 1.0)
-    at = times[before] + share * (times[place] - times[before])
-    at = np.where(place == 0, times[0], at)
+    at = times[before] + share * (times[first] - times[before])
+    at = np.where(first == 0, times[0], at)
     return np.asarray(np.where(beyond.any(axis=1), at, np.inf))
 
 
+def _followed(vectors: ErrorVectors, futures: Futures, times: Sequence[float]) -> ErrorVectors:
+    """Return the vectors that are the longest of some future: only these need be followed."""
+    worst: set[int] = set()
+    for t in times:
+        best = futures.lines.predict(t)
+        deviation = futures.level + futures.slope * (t - futures.lines.centre) + futures.run
+        rows = np.vstack([best + deviation[:100], best])
+        at = np.tensordot(rows, vectors.sensitivity, axes=([1], [2])) + vectors.offset
+        worst |= set((at**2).sum(axis=2).argmax(axis=1).tolist())
+    return vectors.places(sorted(worst))
+
+
 def forecast_longest(
-    lines: Sequence[Trend],
-    correlation: Array,
-    sensitivity: Array,
-    offset: Array,
-    limit: float,
-    now: float,
-    checks: npt.ArrayLike,
+    lines: JointLines,
+    vectors: ErrorVectors,
+    question: LengthQuestion,
     *,
     rng: np.random.Generator,
-    reliability: float = 0.95,
-    level: float = 0.95,
-    horizon: float,
     draws: int = DRAWS,
 ) -> LengthForecast:
-    """Forecast of the longest of k vectors ``offset + sensitivity @ parameters`` against ``limit``.
+    """Forecast the longest of the error vectors against a limit.
 
-    ``lines`` (p) of the parameters, in the unit of their values over days or any unit of time; ``correlation``
-    (p, p); ``sensitivity`` (k, 3, p) in the unit of the limit per unit of the parameters, ``offset`` (k, 3) the
-    vectors with all parameters at zero. Raises DataError for a limit that is not above zero, a check before now,
-    or a horizon that is not after it. Neglected: changes yet to come, correlation of the days in time, and products
-    of errors (1e-4 of a vector). A longest vector found with uncertainty is on average longer than the true one; so
-    is that of every run that will be measured, which is what the probability is about.
+    Neglected: changes yet to come, correlation of the days in time, and products of errors (1e-4 of a vector). A
+    longest vector estimated with uncertainty is on average longer than the true one; so is that of every run that
+    will be measured, which is what the probability is about.
     """
-    if not (np.isfinite(limit) and limit > 0.0):
-        raise DataError(f"limit is {limit}; the longest vector needs a limit above zero.")
-    at = as_vector(checks, "checks", least=0)
-    if at.size and at.min() < now:
-        raise DataError(f"checks holds {at.min()}; a planned check cannot lie before now, {now}.")
-    if not horizon > now:
-        raise DataError(f"horizon is {horizon}; it must lie after now, {now}.")
-    as_probability(reliability, "reliability")
-    tail = (1.0 - as_probability(level, "level")) / 2.0
-    level_dev, slope_dev, run_dev = draw_lines(lines, correlation, rng, draws)
-    centre = np.array([line.at for line in lines])
-
-    def best(t: float) -> Array:
-        return np.array([float(predict(line, t)[0]) for line in lines])
-
-    # Only points that are the worst of some future need be followed.
-    times = now + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, TIMES)]) * (horizon - now)
-    kept: set[int] = set()
-    for t in [*times[:: TIMES // 6], *at]:
-        future = best(t) + (level_dev + slope_dev * (t - centre) + run_dev)[:100]
-        vectors = np.tensordot(np.vstack([future, best(t)]), sensitivity, axes=([1], [2])) + offset
-        kept |= set((vectors**2).sum(axis=2).argmax(axis=1).tolist())
-    chosen = sorted(kept)
-    s, v = sensitivity[chosen], offset[chosen]
-
-    def lengths(t: float, of_runs: bool) -> Array:
-        deviation = level_dev + slope_dev * (t - centre)
-        return longest(best(t) + deviation + (run_dev if of_runs else 0.0), s, v)
-
-    of_lines = np.column_stack([lengths(t, False) for t in times])
-    certain = np.array([[longest(best(t)[np.newaxis], s, v)[0] for t in times]])
+    limit, origin, horizon = question.limit, question.origin, question.horizon
+    checks = as_vector(question.checks, "checks", least=0)
+    tail = (1.0 - question.level) / 2.0
+    futures = draw_lines(lines, rng, draws)
+    times = origin + np.concatenate([[0.0], np.geomspace(1e-4, 1.0, TIMES)]) * (horizon - origin)
+    followed = _followed(vectors, futures, [*times[:: TIMES // 6], *checks])
+    of_lines = np.column_stack([followed.longest(futures.parameters(t, of_runs=False)) for t in times])
+    certain = np.array([[followed.longest(lines.predict(t)[np.newaxis])[0] for t in times]])
     first = np.sort(_first_crossing(times, of_lines, limit))
     crossing = float(_first_crossing(times, certain, limit)[0])
     # Order statistics: an interpolated quantile of infinities is not a number.
     ends = (float(first[int(tail * draws)]), float(first[min(int(np.ceil((1.0 - tail) * draws)), draws) - 1]))
-    inside = np.array([float((lengths(t, True) <= limit).mean()) for t in times])
-    out = np.flatnonzero(inside < reliability)
-    runs = [lengths(t, True) for t in at]
+    inside = np.array(
+        [float((followed.longest(futures.parameters(t, of_runs=True)) <= limit).mean()) for t in times]
+    )
+    out = np.flatnonzero(inside < question.reliability)
+    lengths = [followed.longest(futures.parameters(t, of_runs=True)) for t in checks]
     return LengthForecast(
-        now=now,
+        origin=origin,
         latest=float(certain[0, 0]),
         crossing=Crossing(limit, None if np.isinf(crossing) else crossing, ends),
-        checks=at,
-        predicted=np.array([float(np.median(one)) for one in runs]),
-        interval=np.array([np.quantile(one, [tail, 1.0 - tail]) for one in runs]).reshape(-1, 2),
-        probability=np.array([float((one <= limit).mean()) for one in runs]),
-        recommended_interval=np.inf if not out.size else float(times[max(int(out[0]) - 1, 0)] - now),
-        reliability=reliability,
-        level=level,
+        checks=checks,
+        predicted=np.array([float(np.median(length)) for length in lengths]),
+        interval=np.array([np.quantile(length, [tail, 1.0 - tail]) for length in lengths]).reshape(-1, 2),
+        probability=np.array([float((length <= limit).mean()) for length in lengths]),
+        recommended_interval=np.inf if not out.size else float(times[max(int(out[0]) - 1, 0)] - origin),
+        reliability=question.reliability,
+        level=question.level,
         horizon=horizon,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +18,29 @@ STRAIGHT = 1e-10
 _BLOCK = 100
 
 
+@dataclass(frozen=True)
+class ErrorVectors:
+    """Error vectors ``offset`` (k, 3) + ``sensitivity`` (k, 3, p) parameters at k points, in the unit of the limit.
+
+    ``offset`` are the vectors with all p parameters at zero.
+    """
+
+    sensitivity: Array
+    offset: Array
+
+    def longest(self, parameters: Array) -> Array:
+        """Return the length (m,) of the longest vector for each row (m, p) of parameters."""
+        return longest(parameters, self.sensitivity, self.offset)
+
+    def places(self, indices: Sequence[int]) -> ErrorVectors:
+        """Return the vectors at some of the k places."""
+        return ErrorVectors(self.sensitivity[indices], self.offset[indices])
+
+
 def longest(parameters: Array, sensitivity: Array, offset: Array) -> Array:
-    """Longest of the vectors of each row (m, p) of parameters, (m,): ``offset`` (k, 3) + ``sensitivity`` (k, 3, p)."""
+    """Return the longest (m,) of the vectors ``offset`` (k, 3) + ``sensitivity`` (k, 3, p) for each row (m, p)."""
     turned = [np.ascontiguousarray(sensitivity[:, axis].T) for axis in range(3)]
-    found = np.empty(len(parameters))
+    largest_squares = np.empty(len(parameters))
     for start in range(0, len(parameters), _BLOCK):
         rows = parameters[start : start + _BLOCK]
         squares = np.zeros((len(rows), len(offset)))
@@ -29,14 +49,14 @@ def longest(parameters: Array, sensitivity: Array, offset: Array) -> Array:
             along += offset[:, axis]
             along *= along
             squares += along
-        found[start : start + _BLOCK] = squares.max(axis=1)
-    return np.sqrt(found)
+        largest_squares[start : start + _BLOCK] = squares.max(axis=1)
+    return np.sqrt(largest_squares)
 
 
 def may_be_longest(
     sensitivity: Array, offset: Array, shape: Sequence[int], length: float
 ) -> npt.NDArray[np.intp]:
-    """Places (c,) of the vectors of a grid that can be the longest, whatever the parameters.
+    """Return the places (c,) of the vectors of a grid that can be the longest, whatever the parameters.
 
     The k vectors ``offset`` (k, 3) + ``sensitivity`` (k, 3, p) parameters stand on a grid of ``shape``, whose first
     axis counts the poses and whose others have equal steps; ``length`` is one that counts as long. Where they run

@@ -115,11 +115,11 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
         """Triangle (q, q), coefficients, chi-square and its slope for t² = ``variance`` in units of s²."""
         rows = outer / np.sqrt(1.0 + variance * total)[:, np.newaxis]
         triangle = _triangle(np.vstack([inner, rows]))
-        found = scipy.linalg.solve_triangular(triangle[:q, :q], triangle[:q, q], check_finite=False)
-        left = (rows[:, q] - rows[:, :q] @ found) ** 2
-        within_days = ((inner[:, q] - inner[:, :q] @ found) ** 2).sum()
-        slope = (left * total / (1.0 + variance * total)).sum()
-        return triangle[:q, :q], found, float(within_days + left.sum()), -float(slope)
+        coefficients = scipy.linalg.solve_triangular(triangle[:q, :q], triangle[:q, q], check_finite=False)
+        between_days = (rows[:, q] - rows[:, :q] @ coefficients) ** 2
+        within_days = ((inner[:, q] - inner[:, :q] @ coefficients) ** 2).sum()
+        slope = (between_days * total / (1.0 + variance * total)).sum()
+        return triangle[:q, :q], coefficients, float(within_days + between_days.sum()), -float(slope)
 
     goal = (n - q) * unit
     variance, truncated = 0.0, True

@@ -72,16 +72,16 @@ def _places(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
 
 
 def theil_sen(
-    values: Array, times: Array, level: float, found: tuple[Array, Array] | None = None
+    values: Array, times: Array, level: float, pair_slopes: tuple[Array, Array] | None = None
 ) -> tuple[float, tuple[float, float]]:
     """Median slope of all pairs of ``values`` (n,) over ``times`` (n,), which must not fall, and its interval.
 
     Source: P. K. Sen, J. Am. Stat. Assoc. 63 (1968) 1379, Eq. (2.6) with its variance for ties; the numbers are those
-    of ``scipy.stats.theilslopes``, of which only the ranks that are asked for are sorted out. ``found``: the
-    ``pairs``, where they are known.
+    of ``scipy.stats.theilslopes``, of which only the ranks that are asked for are sorted out. ``pair_slopes``: the
+    ``pairs``, where they were computed before.
     """
     n = len(values)
-    slopes = (found or pairs(values, times))[1]
+    slopes = (pair_slopes or pairs(values, times))[1]
     many = len(slopes)
     variance = n * (n - 1.0) * (2 * n + 5) / 18.0
     for column in (values, times):
@@ -99,18 +99,18 @@ def mann_kendall(
     values: npt.ArrayLike,
     times: npt.ArrayLike,
     *,
-    found: tuple[Array, Array] | None = None,
+    pair_slopes: tuple[Array, Array] | None = None,
     slope: float | None = None,
 ) -> MonotoneTrend:
     """Mann-Kendall of ``values`` (n,) in the order of ``times`` (n,), which must rise; at least 6 values.
 
-    ``found`` and ``slope``: the ``pairs`` and their median, where they are known.
+    ``pair_slopes`` and ``slope``: the ``pairs`` and their median, where they were computed before.
     Ties are corrected for. Raises ``DataError`` for fewer values, times that do not rise or non-finite
     numbers. Sources: M. G. Kendall, Rank Correlation Methods, 1975; K. H. Hamed and A. R. Rao, J. Hydrology
     204 (1998) 182, for ranks of the detrended series; S. Yue and C. Wang, Water Resour. Manage. 18 (2004)
     201, for the first-order variance. Measured false alarms at 5 %: at most 5 % for correlations up to 0.6 from
-    10 values on (independent values: 2 to 3 %); 7 to 8 % with 0.8 and up to 20 values, of which no more can be
-    told from a trend (docs/trials-statistics.md).
+    10 values on (independent values: 2 to 3 %); 7 to 8 % with 0.8 and up to 20 values, which cannot be
+    distinguished from a trend (docs/trials-statistics.md).
     """
     y = as_vector(values, "values", least=6)
     n = len(y)
@@ -119,7 +119,7 @@ def mann_kendall(
         raise DataError(
             f"times falls or repeats at index {int(np.argmax(np.diff(t) <= 0)) + 1}; it must rise."
         )
-    rise, slopes = found or pairs(y, t)
+    rise, slopes = pair_slopes or pairs(y, t)
     s = int(np.count_nonzero(rise > 0.0) - np.count_nonzero(rise < 0.0))
     ties = np.unique(y, return_counts=True)[1].astype(np.float64)
     variance = (n * (n - 1.0) * (2 * n + 5) - (ties * (ties - 1) * (2 * ties + 5)).sum()) / 18.0
@@ -127,13 +127,13 @@ def mann_kendall(
         return MonotoneTrend(0, 0.0, 0.0, 1.0, 1.0, 1.0)
     slope = float(np.median(slopes)) if slope is None else slope
     ranks = _ranks(y - slope * t)
-    seen = lag_one(np.asarray(ranks), fitted=2)
-    r = float(np.clip(seen + SCATTER / np.sqrt(n), 0.0, 0.95))
+    lag_correlation = lag_one(np.asarray(ranks), fitted=2)
+    r = float(np.clip(lag_correlation + SCATTER / np.sqrt(n), 0.0, 0.95))
     lags = np.arange(1, n)
     inflation = 1.0 + 2.0 * float(((1.0 - lags / n) * r**lags).sum())
     tau = s / (n * (n - 1) / 2.0)
     plain, allowed = (_p_value(s, v) for v in (variance, variance * inflation))
-    return MonotoneTrend(s, tau, max(seen, 0.0), inflation, allowed, plain)
+    return MonotoneTrend(s, tau, max(lag_correlation, 0.0), inflation, allowed, plain)
 
 
 def _ranks(values: Array) -> Array:

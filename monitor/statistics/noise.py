@@ -1,4 +1,4 @@
-"""Noise whose neighbours resemble each other: what it is, and how much less it lets one say.
+"""Correlated noise of neighbouring rows: its process, and p-values that allow for it.
 
 A first-order process plus independent noise (what a slow disturbance and a reading make together), seen at
 equal steps of the order of the rows. Nobody knows its two numbers beforehand, and a plug-in estimate of them
@@ -25,7 +25,7 @@ INDEPENDENT_SHARES = (0.0, 0.3, 0.6, 0.8, 0.9)
 ALTERNATING = (-0.7, -0.5, -0.3, -0.15)
 # Beforehand, noise of rows is as likely independent as not.
 INDEPENDENT = 0.5
-# Correlation is told from here on: one false alarm in a hundred campaigns.
+# Correlation is reported from here on: one false alarm in a hundred campaigns.
 NOTICED = 0.01
 # From here on the filter counts as stationary; the rest of its way moves no p-value by a part in a million.
 _SETTLED = 1e-8
@@ -63,9 +63,9 @@ class Noise:
 
     def correlations(self, count: int) -> Array:
         """Correlation (count,) of rows 0, 1, 2 ... apart."""
-        found = np.asarray((1.0 - self.independent) * self.slow ** np.arange(count), dtype=np.float64)
-        found[0] = 1.0
-        return found
+        r = np.asarray((1.0 - self.independent) * self.slow ** np.arange(count), dtype=np.float64)
+        r[0] = 1.0
+        return r
 
     def whiten(self, columns: Array) -> tuple[Array, float]:
         """Columns (n, k) as what no earlier row predicts, at unit variance each, and the sum of the logarithms of
@@ -102,7 +102,7 @@ def processes() -> tuple[tuple[Noise, float], ...]:
     """The grid of processes, each with its probability beforehand."""
     others = [Noise(slow, share) for slow in SLOW for share in INDEPENDENT_SHARES]
     others += [Noise(slow) for slow in ALTERNATING]
-    return ((WHITE, INDEPENDENT), *((one, (1.0 - INDEPENDENT) / len(others)) for one in others))
+    return ((WHITE, INDEPENDENT), *((noise, (1.0 - INDEPENDENT) / len(others)) for noise in others))
 
 
 @dataclass(frozen=True)
@@ -123,44 +123,45 @@ def _likelihoods(y: Array, x: Array) -> list[tuple[Noise, float, float, Array, A
     """For every process: log restricted likelihood with its prior, without, and whitened response and columns."""
     scale = np.linalg.norm(x, axis=0)
     both = np.column_stack([y, x / np.where(scale == 0, 1.0, scale)])
-    found = []
+    fits = []
     for noise, prior in processes():
         white, logarithm = noise.whiten(both)
         q, r, _ = scipy.linalg.qr(white[:, 1:], mode="economic", pivoting=True)
         diagonal = np.abs(np.diag(r)) if r.size else np.zeros(0)
         rank = int(np.sum(diagonal > 1e-9 * max(diagonal.max(initial=0.0), 1e-300)))
-        left = white[:, 0] - q[:, :rank] @ (q[:, :rank].T @ white[:, 0])
+        residual = white[:, 0] - q[:, :rank] @ (q[:, :rank].T @ white[:, 0])
         dof = max(len(y) - rank, 1)
-        sum_of_squares = max(float(left @ left), 1e-300)
+        sum_of_squares = max(float(residual @ residual), 1e-300)
         likelihood = -0.5 * (
             dof * np.log(sum_of_squares / dof) + logarithm + 2.0 * float(np.sum(np.log(diagonal[:rank])))
         )
-        found.append((noise, float(likelihood + np.log(prior)), float(likelihood), white, q[:, :rank]))
-    return found
+        fits.append((noise, float(likelihood + np.log(prior)), float(likelihood), white, q[:, :rank]))
+    return fits
 
 
 def assess(y: Array, x: Array) -> Assessed:
     """The noise in ``y`` (n,) around a model with columns ``x`` (n, k), rows in the order in which they were made."""
     if len(y) < x.shape[1] + 8:
         return Assessed(WHITE, 1.0)
-    found = _likelihoods(y, x)
-    best = max(found, key=lambda one: one[1])
-    ratio = 2.0 * (max(one[2] for one in found) - found[0][2])
+    fits = _likelihoods(y, x)
+    best = max(fits, key=lambda fit: fit[1])
+    ratio = 2.0 * (max(fit[2] for fit in fits) - fits[0][2])
     return Assessed(best[0], float(scipy.special.chdtrc(2.0, max(ratio, 0.0))))
 
 
 def p_value_in_noise(y: Array, x: Array, added: Array, *, white: bool = False) -> float:
-    """p-value of the columns ``added`` (n, k) beside ``x`` (n, c): F in every process, averaged over what the data
-    say of the process once the columns are in. With ``white``, or with fewer than eight rows to spare, the noise is
-    taken as independent.
+    """Return the p-value of the columns ``added`` (n, k) beside ``x`` (n, c).
+
+    It is that of F in every process, averaged over what the data say of the process once the columns are in. With
+    ``white``, or with fewer than eight rows to spare, the noise counts as independent.
     """
-    found = _likelihoods(y, np.column_stack([x, added]))
+    fits = _likelihoods(y, np.column_stack([x, added]))
     if white or len(y) < x.shape[1] + added.shape[1] + 8:
-        found = found[:1]
-    most = max(one[1] for one in found)
-    weights = np.exp([one[1] - most for one in found])
+        fits = fits[:1]
+    most = max(fit[1] for fit in fits)
+    weights = np.exp([fit[1] - most for fit in fits])
     total = 0.0
-    for weight, (_, _, _, rows, basis) in zip(weights, found, strict=True):
+    for weight, (_, _, _, rows, basis) in zip(weights, fits, strict=True):
         if weight < 1e-12:
             continue
         small, rank = _basis(rows[:, 1 : 1 + x.shape[1]])
@@ -179,29 +180,29 @@ def _basis(columns: Array) -> tuple[Array, int]:
     return q[:, :rank], rank
 
 
-def _f_test(before: Array, after: Array, more: int, left: int) -> float:
-    if more < 1 or left < 1:
+def _f_test(before: Array, after: Array, added_rank: int, dof: int) -> float:
+    if added_rank < 1 or dof < 1:
         return 1.0
-    explained, stays = float(before @ before - after @ after), float(after @ after)
-    if stays <= 0.0:
+    explained, unexplained = float(before @ before - after @ after), float(after @ after)
+    if unexplained <= 0.0:
         return 0.0
-    return float(scipy.special.fdtrc(more, left, max(explained, 0.0) / more / (stays / left)))
+    return float(scipy.special.fdtrc(added_rank, dof, max(explained, 0.0) / added_rank / (unexplained / dof)))
 
 
 def p_value_against_noise(y: Array, x: Array, added: Array) -> float:
-    """p-value of the columns ``added`` (n, k) against the rival that there is nothing but correlated noise.
+    """Return the p-value of the columns ``added`` (n, k) against the rival that there is nothing but correlated noise.
 
-    Likelihood ratio of two explanations, the columns in their likeliest noise and no columns in theirs, told by F so
+    Likelihood ratio of two explanations, the columns in their likeliest noise and no columns in theirs, judged by F so
     that few rows do not exaggerate (they do not nest, so it is no exact level; see docs/trials-curve.md).
     """
     few = len(y) < x.shape[1] + added.shape[1] + 8
-    one, rank = _largest_likelihood(y, x, few)
-    two, more = _largest_likelihood(y, np.column_stack([x, added]), few)
-    left = len(y) - more
-    if more <= rank or left < 1:
+    without, rank = _largest_likelihood(y, x, few)
+    with_added, whole_rank = _largest_likelihood(y, np.column_stack([x, added]), few)
+    dof = len(y) - whole_rank
+    if whole_rank <= rank or dof < 1:
         return 1.0
-    f = np.expm1(np.minimum(max(two - one, 0.0) * 2.0 / len(y), 700.0)) * left / (more - rank)
-    return float(scipy.special.fdtrc(more - rank, left, f))
+    f = np.expm1(np.minimum(max(with_added - without, 0.0) * 2.0 / len(y), 700.0)) * dof / (whole_rank - rank)
+    return float(scipy.special.fdtrc(whole_rank - rank, dof, f))
 
 
 def _largest_likelihood(y: Array, x: Array, white_only: bool) -> tuple[float, int]:
@@ -212,8 +213,10 @@ def _largest_likelihood(y: Array, x: Array, white_only: bool) -> tuple[float, in
     for noise, _ in processes()[: 1 if white_only else None]:
         white, logarithm = noise.whiten(both)
         basis, rank = _basis(white[:, 1:])
-        left = white[:, 0] - basis @ (basis.T @ white[:, 0])
-        best = max(best, -0.5 * (len(y) * np.log(max(float(left @ left), 1e-300) / len(y)) + logarithm))
+        residual = white[:, 0] - basis @ (basis.T @ white[:, 0])
+        best = max(
+            best, -0.5 * (len(y) * np.log(max(float(residual @ residual), 1e-300) / len(y)) + logarithm)
+        )
     return float(best), rank
 
 

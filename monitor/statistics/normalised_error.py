@@ -41,13 +41,15 @@ def normalised_error(
     Raises ``DataError`` for shapes that differ, numbers that are not finite, or uncertainties that are negative or
     both zero. Of independent normal results with right uncertainties 4.6 % have |E_n| > 1.
     """
-    columns = [np.atleast_1d(np.asarray(one, dtype=np.float64)) for one in (first, u_first, second, u_second)]
+    columns = [
+        np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in (first, u_first, second, u_second)
+    ]
     x1, u1, x2, u2 = columns
-    if len({one.shape for one in columns}) != 1:
+    if len({column.shape for column in columns}) != 1:
         raise DataError(
-            f"values and uncertainties must be alike in number, not {[one.shape for one in columns]}"
+            f"values and uncertainties must be alike in number, not {[column.shape for column in columns]}"
         )
-    if not all(np.isfinite(one).all() for one in columns):
+    if not all(np.isfinite(column).all() for column in columns):
         raise DataError("values and uncertainties must be finite")
     if np.any(u1 < 0.0) or np.any(u2 < 0.0) or np.any(np.hypot(u1, u2) == 0.0):
         raise DataError("a standard uncertainty must not be negative, and of two results one must have one")

@@ -69,17 +69,17 @@ class Pooling:
 
     @property
     def dof_all(self) -> int:
-        """n - 1."""
+        """Degrees of freedom of all runs, n - 1."""
         return self.covariance_all.dof
 
     @property
     def dof_pooled(self) -> int:
-        """n - k."""
+        """Degrees of freedom within the groups, n - k."""
         return self.covariance_pooled.dof
 
     @property
     def dof_by_group(self) -> npt.NDArray[np.int64]:
-        """n_j - 1 for each group (k,)."""
+        """Degrees of freedom n_j - 1 of each group (k,)."""
         return self.counts - 1
 
 

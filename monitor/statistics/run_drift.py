@@ -1,7 +1,7 @@
 """Drift within a day: does a parameter run off over the few runs of one session?
 
 Four runs of an hour are too few for a trend of each parameter by itself: two degrees of freedom are left. But all
-parameters of a run come from the same touches, so their scatter is taken as one and the same multiple of their stated
+parameters of a run come from the same touches, so their scatter counts as one and the same multiple of their stated
 covariance, and the scatter about the lines of all of them together says how large it is. Where the parameters
 contradict that (Bartlett), each has its own scatter and the test has little power. For months and years see ``trend``.
 """
@@ -23,7 +23,7 @@ from monitor.statistics.sums import label_groups
 #: Below this p-value of Bartlett's test the scatters are no common multiple of what is stated. Low, because a wrong
 #: "not common" costs nearly all power with few runs, a wrong "common" little: the drifting one scatters more, too.
 NOT_COMMON = 0.01
-#: A drift is told at this false discovery rate over the parameters.
+#: A drift is reported at this false discovery rate over the parameters.
 RATE = 0.05
 
 
@@ -79,14 +79,14 @@ def run_drift(
     if square == 0.0:
         raise DataError("all runs of a day began at the same time; a drift needs times that differ")
     slope = t @ y / square
-    left = y - t[:, None] * slope
+    residual = y - t[:, None] * slope
     u = np.sqrt(np.diag(covariance))
-    own = np.sqrt(np.sum(left**2, axis=0) / dof) / u
-    common = k > 1 and _alike(own**2, dof)
-    scale = own
+    ratio = np.sqrt(np.sum(residual**2, axis=0) / dof) / u
+    common = k > 1 and _alike(ratio**2, dof)
+    scale = ratio
     if common:
         # In whitened columns the parameters are independent, whatever the plan correlates.
-        white = np.linalg.solve(np.linalg.cholesky(covariance), left.T)
+        white = np.linalg.solve(np.linalg.cholesky(covariance), residual.T)
         scale = np.full(k, np.sqrt(np.sum(white**2) / (dof * k)))
         dof *= k
     error = scale * u / np.sqrt(square)

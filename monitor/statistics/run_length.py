@@ -31,9 +31,9 @@ def _solve(inside: Array, start: int) -> Array:
     """Mean time to absorption from state ``start`` for transition matrices (..., s, s)."""
     size = inside.shape[-1]
     system = np.eye(size) - inside
-    found = np.linalg.solve(system, np.ones((*inside.shape[:-2], size, 1)))[..., start, 0]
+    absorption_time = np.linalg.solve(system, np.ones((*inside.shape[:-2], size, 1)))[..., start, 0]
     # Where hardly anything is absorbed the system is singular to rounding and the sign of its solution is chance.
-    return np.where((found > 0.0) & (found < LONGEST), found, LONGEST)
+    return np.where((absorption_time > 0.0) & (absorption_time < LONGEST), absorption_time, LONGEST)
 
 
 def ewma_run_length(width: float, shift: Array, scatter: Array, lam: float) -> Array:
@@ -85,7 +85,7 @@ def reference_nodes(n: float, dof: float) -> tuple[Array, Array, Array]:
 
 
 def run_length(chart: RunLength, limit: float, n: float, dof: float) -> float:
-    """1 / (expected rate of false alarms) of a chart whose reference had ``n`` runs and ``dof``."""
+    """Return 1 / (expected rate of false alarms) of a chart whose reference had ``n`` runs and ``dof``."""
     shift, scatter, weight = reference_nodes(n, dof)
     return float(1.0 / (weight / chart(limit, shift, scatter)).sum())
 
@@ -95,8 +95,8 @@ def limit_for(chart: partial[Array], arl: float, n: float, dof: float, top: floa
     reach it."""
     name = "ewma" if chart.func is ewma_run_length else "cusum"
     (constant,) = chart.keywords.values()
-    known = tabulated_limit(name, constant, arl, n, dof)
-    return solved_limit(chart, arl, n, dof, top) if known is None else known
+    tabulated = tabulated_limit(name, constant, arl, n, dof)
+    return solved_limit(chart, arl, n, dof, top) if tabulated is None else tabulated
 
 
 def solved_limit(chart: partial[Array], arl: float, n: float, dof: float, top: float) -> float:

@@ -166,20 +166,20 @@ class Scanner:
         if isinstance(prepared.shape, FirstOrder):
             r = prepared.shape.strength
             total = sums.squares[0] + r * r * sums.squares[1] - r * sums.squares[2]
-            found = r * r * sums.products[1]
-            found += sums.products[0]
-            found -= r * sums.products[2]
+            explained = r * r * sums.products[1]
+            explained += sums.products[0]
+            explained -= r * sums.products[2]
             by_base = prepared.turned.T @ sums.rows
             total = np.maximum(total - (by_base**2).sum(axis=0), 0.0)
-            found -= prepared.along @ by_base
+            explained -= prepared.along @ by_base
         else:
             rows = prepared.shape.whiten(sums.rows)
             rows -= prepared.base @ (prepared.base.T @ rows)
             total = np.einsum("ij,ij->j", rows, rows)
-            found = self._products(prepared.shape.back(rows))
-        found *= found
-        found *= prepared.inverse[:, np.newaxis]
-        return total, found
+            explained = self._products(prepared.shape.back(rows))
+        explained *= explained
+        explained *= prepared.inverse[:, np.newaxis]
+        return total, explained
 
     def _deviances(self, weighted: Array, places: Sequence[int]) -> tuple[Array, Array]:
         """Minus twice the residual log-likelihood by shape (s, m): of no change, and of the best candidate."""
@@ -188,13 +188,13 @@ class Scanner:
         for start in range(0, weighted.shape[1], FIRST_BLOCK):
             part = slice(start, start + FIRST_BLOCK)
             sums = self._sums(weighted[:, part])
-            for i, one in enumerate(self.prepared[place] for place in places):
-                total, left = self._residual(one, sums)
-                np.subtract(total, left, out=left)
-                np.maximum(left, 1e-15 * total + 1e-300, out=left)
-                left *= one.weight[:, np.newaxis]
-                plain[i, part] = one.constant + self.free * np.log(total + 1e-300)
-                best[i, part] = one.constant + self.free * np.log(left.min(axis=0))
+            for i, prepared in enumerate(self.prepared[index] for index in places):
+                total, unexplained = self._residual(prepared, sums)
+                np.subtract(total, unexplained, out=unexplained)
+                np.maximum(unexplained, 1e-15 * total + 1e-300, out=unexplained)
+                unexplained *= prepared.weight[:, np.newaxis]
+                plain[i, part] = prepared.constant + self.free * np.log(total + 1e-300)
+                best[i, part] = prepared.constant + self.free * np.log(unexplained.min(axis=0))
         return plain, best
 
     def _gain(self, weighted: Array, family: int) -> Array:
@@ -202,29 +202,29 @@ class Scanner:
         plain, best = self._deviances(weighted, self.families[family])
         return np.asarray(plain.min(axis=0) - best.min(axis=0))
 
-    def _simulated(self, family: int, place: int, count: int, rng: np.random.Generator) -> Array:
-        """The statistic of at least ``count`` series without a change, of one shape; kept and added to."""
+    def _simulated(self, family: int, index: int, count: int, rng: np.random.Generator) -> Array:
+        """The statistic of at least ``count`` series without a change, of one shape; cached."""
         if self._seed is None:
             self._seed = int(rng.integers(2**63))
-        kept = self._null.get((family, place), np.empty(0))
-        while len(kept) < count:
+        gains = self._null.get((family, index), np.empty(0))
+        while len(gains) < count:
             # Every shape sees the same noise: their p-values differ by the shape alone.
-            size = BLOCK if len(kept) else FIRST_BLOCK
-            noise = np.random.default_rng([self._seed, len(kept)]).standard_normal((len(self.root), size))
-            kept = np.append(kept, self._gain(self.prepared[place].shape.colour(noise), family))
-        self._null[family, place] = kept
-        return kept[:count]
+            size = BLOCK if len(gains) else FIRST_BLOCK
+            noise = np.random.default_rng([self._seed, len(gains)]).standard_normal((len(self.root), size))
+            gains = np.append(gains, self._gain(self.prepared[index].shape.colour(noise), family))
+        self._null[family, index] = gains
+        return gains[:count]
 
     def _p_value(
-        self, gain: float, family: int, place: int, level: float, rng: np.random.Generator, trials: int
+        self, gain: float, family: int, index: int, level: float, rng: np.random.Generator, trials: int
     ) -> float:
-        exceeding = done = 0
-        while done < trials:
-            upto = min(done + BLOCK if done else FIRST_BLOCK, trials)
-            exceeding += int((self._simulated(family, place, upto, rng)[done:] >= gain).sum())
+        exceeding = simulated = 0
+        while simulated < trials:
+            upto = min(simulated + BLOCK if simulated else FIRST_BLOCK, trials)
+            exceeding += int((self._simulated(family, index, upto, rng)[simulated:] >= gain).sum())
             if exceeding and special.bdtrc(exceeding - 1, upto, level) < HOPELESS:
                 return exceeding / upto
-            done = upto
+            simulated = upto
         return (1 + exceeding) / (trials + 1)
 
     def _not_refuted(self, best: Array, numbers: Sequence[int]) -> list[tuple[int, int]]:
@@ -233,13 +233,13 @@ class Scanner:
         The stronger the correlation, the larger the gains without a change: a weaker one has the smaller p-value.
         """
         least = min(best[i] for number in numbers for i in self.families[number])
-        found = []
+        allowed = []
         for number in numbers:
             family = self.families[number]
             likely = [i for i in family if best[i] - least <= 2.0 * REFUTED]
             if likely:
-                found.append((number, min(max(likely), max(self._claimed & set(family)))))
-        return found
+                allowed.append((number, min(max(likely), max(self._claimed & set(family)))))
+        return allowed
 
     def day_support(self, y: Array) -> Array | None:
         """Log-likelihood of each day component, none first, with the best change of ``y`` (n,) taken off; None
@@ -271,25 +271,25 @@ class Scanner:
         plain, best = self._deviances_of(y)
         numbers = [0] if len(self.families) == 1 else [0, 2 if wide_days else 1]
         p = 0.0
-        for family, place in self._not_refuted(best[:, 0], numbers):
-            own = list(self.families[family])
-            gain = float(plain[own].min() - best[own].min())
-            p = max(p, self._p_value(gain, family, place, level, rng, trials))
+        for family, index in self._not_refuted(best[:, 0], numbers):
+            members = list(self.families[family])
+            gain = float(plain[members].min() - best[members].min())
+            p = max(p, self._p_value(gain, family, index, level, rng, trials))
             if p > level:
                 break
         places = sorted({i for number in numbers for i in self.families[number]})
         likeliest = self.prepared[min(places, key=lambda i: best[i, 0])]
-        total, taken = self._residual(likeliest, self._sums(weighted))
-        left = np.maximum(total - taken, 1e-15 * total + 1e-300)[:, 0]
-        chosen = int((left * likeliest.weight).argmin())
+        total, explained = self._residual(likeliest, self._sums(weighted))
+        unexplained = np.maximum(total - explained, 1e-15 * total + 1e-300)[:, 0]
+        best_candidate = int((unexplained * likeliest.weight).argmin())
         return Scan(
-            self.kinds[chosen],
-            int(self.positions[chosen]),
+            self.kinds[best_candidate],
+            int(self.positions[best_candidate]),
             p,
             likeliest.shape,
             self.root,
-            self.columns[:, chosen],
+            self.columns[:, best_candidate],
             self.kinds,
             self.positions,
-            likeliest.shape.log_determinant + len(y) * np.log(left),
+            likeliest.shape.log_determinant + len(y) * np.log(unexplained),
         )

@@ -56,12 +56,12 @@ class GroupedSums:
 
     @property
     def dof_within(self) -> int:
-        """n - k."""
+        """Degrees of freedom within the groups, n - k."""
         return self.n - self.k
 
     @property
     def dof_between(self) -> int:
-        """k - 1."""
+        """Degrees of freedom between the groups, k - 1."""
         return self.k - 1
 
     @property
@@ -94,10 +94,10 @@ def label_groups(groups: npt.ArrayLike, n: int) -> tuple[tuple[str, ...], npt.ND
     if array.dtype.kind not in "UO":
         return tuple(str(label) for label in distinct), index.astype(np.intp)
     texts = [str(label) for label in distinct]
-    order = sorted(range(len(texts)), key=lambda place: _natural(texts[place]))
+    order = sorted(range(len(texts)), key=lambda index_of_text: _natural(texts[index_of_text]))
     rank = np.empty(len(order), dtype=np.intp)
     rank[order] = np.arange(len(order))
-    return tuple(texts[place] for place in order), rank[index]
+    return tuple(texts[index_of_text] for index_of_text in order), rank[index]
 
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
@@ -111,7 +111,7 @@ def _natural(label: str) -> tuple[object, ...]:
         return (0, float(bin_of[2]), side, label)
     # Texts and whole numbers take turns, so that like is compared with like.
     parts = re.split(r"(\d+)", label)
-    return (1, *(int(part) if place % 2 else part for place, part in enumerate(parts)))
+    return (1, *(int(part) if position % 2 else part for position, part in enumerate(parts)))
 
 
 def grouped_sums(
@@ -165,5 +165,5 @@ def _mean(rows: Array) -> Array:
 
 def _sum_of_squares(deviation: Array) -> Array:
     """Sum of squares of deviations, less what the rounding of the mean left in them (Chan et al. 1983)."""
-    left = deviation.sum(axis=0)
-    return np.asarray((deviation * deviation).sum(axis=0) - left * left / len(deviation))
+    remainder = deviation.sum(axis=0)
+    return np.asarray((deviation * deviation).sum(axis=0) - remainder * remainder / len(deviation))

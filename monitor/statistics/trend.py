@@ -69,9 +69,9 @@ def _result(
         both = pairs(means, moments)
         slope, interval = theil_sen(means, moments, p, both)
         if ranked and (np.diff(moments) > 0.0).all():
-            monotone = mann_kendall(means, moments, found=both, slope=slope)
+            monotone = mann_kendall(means, moments, pair_slopes=both, slope=slope)
     low, high = fit.interval(p)[1]
-    own = 1.0 if u is None else float(np.sqrt(np.mean(u**2)))
+    run_u = 1.0 if u is None else float(np.sqrt(np.mean(u**2)))
     return Trend(
         at=at,
         level_at=float(fit.coefficients[0]),
@@ -83,7 +83,7 @@ def _result(
         covariance=fit.covariance,
         within=fit.within,
         between=fit.between,
-        run_sd=float(np.hypot(fit.within * own, fit.between)),
+        run_sd=float(np.hypot(fit.within * run_u, fit.between)),
         n=len(y),
         days=len(means),
         confidence=p,
@@ -115,7 +115,7 @@ def trend(
     """
     y = as_vector(values, "values", least=3)
     t = as_vector(times, "times", length=len(y))
-    own = None if u is None else as_positive(u, "u", length=len(y))
+    run_u = None if u is None else as_positive(u, "u", length=len(y))
     as_probability(level, "level")
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     count = int(index.max()) + 1
@@ -127,12 +127,12 @@ def trend(
         raise DataError(f"all times are {t[0]}; a trend needs times that differ.")
     # All runs of a day count at its mean time: what happens within a day (a machine that warms up every morning) is
     # scatter of the runs and no drift of years, which a slope within the day would pass itself off as.
-    weight = np.ones_like(t) if own is None else 1.0 / own**2
+    weight = np.ones_like(t) if run_u is None else 1.0 / run_u**2
     on_day = (np.bincount(index, weight * t) / np.bincount(index, weight))[index]
     if np.ptp(on_day) == 0.0:
         raise DataError("all days have the same mean time; a trend needs days that differ.")
     at = float(on_day.mean())
     design = np.column_stack([np.ones_like(t), on_day - at])
-    fit = fit_with_days(y, design, own, index)
-    means, moments = day_averages(y, t, own, index)
-    return _result(fit, at, y, own, (means, moments), level, robust)
+    fit = fit_with_days(y, design, run_u, index)
+    means, moments = day_averages(y, t, run_u, index)
+    return _result(fit, at, y, run_u, (means, moments), level, robust)

@@ -41,19 +41,19 @@ class VectorChart:
 
 def _reference(values: npt.ArrayLike, reference: npt.ArrayLike) -> tuple[Array, Array, int]:
     """Values standardised by the reference (n, p), and the inverse covariance of what is standardised."""
-    x, known = as_matrix(values, "values", least=1), as_matrix(reference, "reference")
-    m, p = known.shape
+    x, reference_runs = as_matrix(values, "values", least=1), as_matrix(reference, "reference")
+    m, p = reference_runs.shape
     if x.shape[1] != p:
         raise DataError(f"values has {x.shape[1]} parameters, reference {p}; the same are needed.")
     if m < p + 2:
         raise DataError(f"the reference period has {m} runs for {p} parameters; at least {p + 2} are needed.")
-    scale = known.std(axis=0, ddof=1)
+    scale = reference_runs.std(axis=0, ddof=1)
     if (scale == 0.0).any():
         raise DataError(f"column {int(np.argmin(scale))} never varies in the reference period; leave it out.")
-    correlation = np.cov(known / scale, rowvar=False).reshape(p, p)
+    correlation = np.cov(reference_runs / scale, rowvar=False).reshape(p, p)
     if np.linalg.eigvalsh(correlation)[0] < 1e-10:
         raise DataError("the reference period has columns that are exactly dependent; leave one out.")
-    return (x - known.mean(axis=0)) / scale, np.linalg.inv(correlation), m
+    return (x - reference_runs.mean(axis=0)) / scale, np.linalg.inv(correlation), m
 
 
 def _quadratic(z: Array, inverse: Array) -> tuple[Array, Array]:
@@ -102,8 +102,8 @@ def mewma_chart(
         raise DataError(f"lam is {lam}; the weight lies above 0 and up to 1.")
     if trials < 100:
         raise DataError(f"trials is {trials}; at least 100 are needed.")
-    known = tabulated_vector_limit(z.shape[1], m, lam, arl)
-    limit = mewma_limit(z.shape[1], m, lam, arl, rng, trials) if known is None else known
+    tabulated = tabulated_vector_limit(z.shape[1], m, lam, arl)
+    limit = mewma_limit(z.shape[1], m, lam, arl, rng, trials) if tabulated is None else tabulated
     path = np.empty_like(z)
     last = np.zeros(z.shape[1])
     for i, row in enumerate(z):
@@ -130,8 +130,8 @@ def mewma_limit(
     largest = np.zeros(trials)
     last = np.zeros((trials, p))
     # Steps are taken by the block: one product of matrices a trial costs a tenth of as many products with a vector.
-    for left in range(round(arl), 0, -_STEPS):
-        path = rng.standard_normal((min(left, _STEPS), trials, p)) - mean
+    for steps_to_go in range(round(arl), 0, -_STEPS):
+        path = rng.standard_normal((min(steps_to_go, _STEPS), trials, p)) - mean
         for row in path:
             last += lam * (row - last)
             row[:] = last

@@ -82,14 +82,14 @@ def _p_value(profile: _Profile, rng: np.random.Generator, trials: int) -> float:
     base = _constant(weighted)
     draws -= np.outer(base, base @ draws)
     best = ((weighted.T @ draws) ** 2).max(axis=0) / (draws**2).sum(axis=0)
-    seen = 1.0 - profile.rss.min() / profile.unexplained
-    return float((1 + (best >= seen).sum()) / (trials + 1))
+    explained = 1.0 - profile.rss.min() / profile.unexplained
+    return float((1 + (best >= explained).sum()) / (trials + 1))
 
 
 def _constant(unit: Array) -> Array:
     """Any unit vector outside the span of the profile's columns (the weighted constant)."""
-    left, _, _ = np.linalg.svd(unit, full_matrices=True)
-    return np.asarray(left[:, -1])
+    left_vectors, _, _ = np.linalg.svd(unit, full_matrices=True)
+    return np.asarray(left_vectors[:, -1])
 
 
 def warm_up(

@@ -7,6 +7,7 @@ its unit. Only this room imports duckdb.
 
 from monitor.store.analyses import (
     StoredAnalysis,
+    analysis_text,
     check_analysis,
     latest_documents,
     list_analyses,
@@ -14,9 +15,13 @@ from monitor.store.analyses import (
     save_analysis,
     stored_analyses,
 )
+from monitor.store.audit import AuditEntry, last_entries
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
+    CampaignRow,
+    RunRow,
+    WithdrawnCampaign,
     described_machines,
     list_campaigns,
     list_machines,
@@ -34,7 +39,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.events import NOTE, list_events, machine_events, record_event
+from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
@@ -47,11 +52,13 @@ from monitor.store.identifications import (
 )
 from monitor.store.import_notes import campaign_notes, run_fingerprints
 from monitor.store.machine_runs import (
+    MachineDescription,
     RecordedRun,
     campaign_machines,
     campaign_tolerances,
     check_campaigns,
     identified_runs,
+    machine_descriptions,
     machine_runs,
     probing_counts,
 )
@@ -71,14 +78,20 @@ from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
 __all__ = [
     "NOTE",
+    "AuditEntry",
     "Backup",
+    "CampaignRow",
     "Database",
     "FleetSums",
     "Imported",
+    "MachineDescription",
+    "MachineEvent",
     "MachineHistory",
     "RecordedRun",
+    "RunRow",
     "StoredAnalysis",
     "StoredCertificate",
+    "StoredEvent",
     "StoredIdentification",
     "StoredModel",
     "StoredRefusal",
@@ -86,6 +99,8 @@ __all__ = [
     "StoredSelection",
     "Verification",
     "Withdrawal",
+    "WithdrawnCampaign",
+    "analysis_text",
     "campaign_machines",
     "campaign_notes",
     "campaign_tolerances",
@@ -104,6 +119,7 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "last_entries",
     "last_used_campaign",
     "latest_documents",
     "latest_tolerances",
@@ -125,6 +141,7 @@ __all__ = [
     "load_curve",
     "load_identification",
     "load_model",
+    "machine_descriptions",
     "machine_events",
     "machine_history",
     "machine_runs",

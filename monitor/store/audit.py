@@ -1,17 +1,19 @@
 """The audit chain: every change adds an entry that holds the hash of what was stored and of the entry before.
 
 An entry that is altered, or left out between two others, no longer fits its neighbours. Entries cut off at
-the end are seen where the things that they tell of are still there (``verification``).
+the end are detected where what they record is still there (``verification``).
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
 from monitor import __version__
+from monitor.documents import IN_UTC
 from monitor.store.connection import Database, utc_now
 
 #: What stands in the first entry for the hash of the entry before.
@@ -23,14 +25,27 @@ _COLUMNS = (
 )
 
 
+@dataclass(frozen=True)
+class AuditEntry:
+    """Who changed what and when: an entry of the audit without its hashes."""
+
+    entry: int
+    made_at: datetime = field(metadata=IN_UTC)
+    actor: str
+    action: str
+    subject: str
+    key: str
+    software_version: str
+
+
 def digest(*values: Any) -> str:
-    """SHA-256 of plain values (None, numbers, text, bytes, datetimes, lists, mappings), hexadecimal."""
+    """Return the SHA-256 of plain values (None, numbers, text, bytes, datetimes, lists, mappings), hexadecimal."""
     text = json.dumps(values, ensure_ascii=False, sort_keys=True, separators=(",", ":"), default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def record(db: Database, action: str, subject: str, key: str, content_sha256: str) -> None:
-    """Add an entry, inside the transaction of the change that it tells of."""
+    """Add an entry, inside the transaction of the change that it records."""
     last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
     number, previous = last[0] if last else (0, NO_ENTRY_BEFORE)
     values = [number + 1, utc_now(), db.actor, action, subject, key, content_sha256, __version__, previous]
@@ -39,8 +54,17 @@ def record(db: Database, action: str, subject: str, key: str, content_sha256: st
     )
 
 
+def last_entries(db: Database, count: int) -> tuple[AuditEntry, ...]:
+    """Return the last ``count`` entries, the newest first."""
+    return db.records(
+        AuditEntry,
+        "SELECT entry, made_at, actor, action, subject, key, software_version FROM audit ORDER BY entry DESC LIMIT ?",
+        [count],
+    )
+
+
 def chain_faults(db: Database) -> tuple[str, ...]:
-    """What is wrong with the chain, entry by entry; empty where nothing is."""
+    """Return what is wrong with the chain, entry by entry; empty where nothing is."""
     faults = []
     previous = NO_ENTRY_BEFORE
     for expected, row in enumerate(db.rows(f"SELECT {_COLUMNS} FROM audit ORDER BY entry"), start=1):

@@ -49,18 +49,18 @@ def take_backup(db: Database, target: str | Path) -> Backup:
     _remove(partial)
     try:
         tables = _copy(db, partial)
-        made = Backup(
+        backup = Backup(
             target.name, _file_sha256(partial), utc_now().isoformat(), __version__, duckdb.__version__, tables
         )
         _manifest(target).write_text(
-            json.dumps(asdict(made), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+            json.dumps(asdict(backup), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
         )
         os.replace(partial, target)
     except (OSError, duckdb.Error) as fault:
         raise StoreError(f"the backup {target} could not be written: {fault}") from fault
     finally:
         _remove(partial)
-    return made
+    return backup
 
 
 def snapshot(db: Database, folder: str | Path) -> Backup:
@@ -72,8 +72,8 @@ def snapshot(db: Database, folder: str | Path) -> Backup:
 
 def list_backups(folder: str | Path) -> tuple[Backup, ...]:
     """The backups and snapshots in a folder that have a manifest, the oldest first."""
-    found = [_read_manifest(path) for path in Path(folder).glob(f"*{_MANIFEST_END}")]
-    return tuple(sorted(found, key=lambda made: (made.made_at, made.path)))
+    backups = [_read_manifest(path) for path in Path(folder).glob(f"*{_MANIFEST_END}")]
+    return tuple(sorted(backups, key=lambda backup: (backup.made_at, backup.path)))
 
 
 def restore(source: str | Path, target: str | Path) -> Backup:
@@ -89,16 +89,16 @@ def restore(source: str | Path, target: str | Path) -> Backup:
             f"{source} has no manifest {_manifest(source).name} beside it, so it cannot be checked"
         )
     _refuse_existing(target)
-    made = _read_manifest(_manifest(source))
+    manifest = _read_manifest(_manifest(source))
     partial = target.with_name(target.name + ".partial")
     try:
         shutil.copyfile(source, partial)
-        if _file_sha256(partial) != made.sha256:
+        if _file_sha256(partial) != manifest.sha256:
             raise StoreError(
                 f"{source} is not what its manifest says: its SHA-256 differs; use another backup"
             )
         with Database(partial, read_only=True) as db:
-            if made.duckdb_version == duckdb.__version__ and _tables(db) != made.tables:
+            if manifest.duckdb_version == duckdb.__version__ and _tables(db) != manifest.tables:
                 raise StoreError(
                     f"{source} is not what its manifest says: its tables differ; use another backup"
                 )
@@ -107,13 +107,13 @@ def restore(source: str | Path, target: str | Path) -> Backup:
         raise StoreError(f"{target} could not be written: {fault}") from fault
     finally:
         _remove(partial)
-    return made
+    return manifest
 
 
 def _copy(db: Database, partial: Path) -> dict[str, tuple[int, str]]:
     with db.attached(partial, "backup_copy"):
-        ((own,),) = db.rows("SELECT current_database()")
-        db.execute(f"COPY FROM DATABASE {_quoted(own)} TO backup_copy")
+        ((database,),) = db.rows("SELECT current_database()")
+        db.execute(f"COPY FROM DATABASE {_quoted(database)} TO backup_copy")
         tables = _tables(db)
         copied = _tables(db, "backup_copy")
     if copied != tables:
@@ -129,14 +129,14 @@ def _tables(db: Database, catalog: str | None = None) -> dict[str, tuple[int, st
         "WHERE database_name = coalesce($catalog, current_database()) ORDER BY table_name",
         {"catalog": catalog},
     )
-    found = {}
+    checksums = {}
     for database, table in names:
         ((rows, checksum),) = db.rows(
             "SELECT count(*), CAST(coalesce(sum(CAST(hash(t) AS HUGEINT)), 0) AS VARCHAR) "
             f"FROM {_quoted(database)}.main.{_quoted(table)} AS t"
         )
-        found[str(table)] = (int(rows), str(checksum))
-    return found
+        checksums[str(table)] = (int(rows), str(checksum))
+    return checksums
 
 
 def _manifest(path: Path) -> Path:

@@ -43,28 +43,28 @@ class Imported:
 
 
 def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ()) -> Imported:
-    """Keep a campaign and the bytes of its files, or say that the same is there already.
+    """Store a campaign and the bytes of its files, or say that the same is there already.
 
-    ``notes`` are sentences on what looked like a mistake; they are kept with it.
+    ``notes`` are sentences on what looked like a mistake; they are stored with it.
 
-    Raises CampaignError, with nothing kept, where a campaign of that name has other content, or its machine
+    Raises CampaignError, with nothing stored, where a campaign of that name has other content, or its machine
     has another topology in the database; DataError where a number is not finite.
     """
     rows = probings.printed(campaign.probings, campaign.machine)
     for run in campaign.runs:
         _check_run(run)
     content = _content(campaign, rows)
-    done = Imported(campaign.name, "imported", len(campaign.runs), len(campaign.probings))
+    imported = Imported(campaign.name, "imported", len(campaign.runs), len(campaign.probings))
     with db.transaction():
-        known = db.rows(
+        same_name = db.rows(
             "SELECT campaign_id, content_sha256, imported_at FROM campaign WHERE campaign = ?",
             [campaign.name],
         )
-        if known:
-            faults = _differences(db, campaign, content, *known[0])
+        if same_name:
+            faults = _differences(db, campaign, content, *same_name[0])
             if faults:
                 raise CampaignError(campaign.name, faults)
-            return Imported(done.campaign, "unchanged", done.runs, done.probings)
+            return Imported(imported.campaign, "unchanged", imported.runs, imported.probings)
         _keep_machine(db, campaign)
         campaign_id = db.next_number("imported_campaign", "campaign_id")
         db.execute(
@@ -92,18 +92,18 @@ def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ())
         keep_fingerprints(db, campaign_id, run_fingerprints(campaign.probings))
         audit.record(db, "import", "campaign", campaign.name, content)
         keep_notes(db, campaign_id, notes)
-    return done
+    return imported
 
 
 def import_curve(db: Database, curve: CurveCampaign) -> Imported:
-    """Keep a curve and the bytes of its files, or say that the same is there already. Raises as ``import_campaign``."""
+    """Store a curve and the bytes of its files, or report that it is stored already. Raises as ``import_campaign``."""
     content = curve_content(curve)
     with db.transaction():
-        known = db.rows(
+        same_name = db.rows(
             "SELECT campaign_id, content_sha256, imported_at FROM campaign WHERE campaign = ?", [curve.name]
         )
-        if known:
-            faults = _differences(db, curve, content, *known[0])
+        if same_name:
+            faults = _differences(db, curve, content, *same_name[0])
             if faults:
                 raise CampaignError(curve.name, faults)
             return Imported(curve.name, "unchanged", 0, 0, len(curve))
@@ -174,20 +174,20 @@ def _differences(
     """
     when = f"{imported_at:%Y-%m-%d %H:%M} UTC"
     before = dict(db.rows("SELECT file, sha256 FROM source_file WHERE campaign_id = ?", [campaign_id]))
-    now = {file.name: file.sha256 for file in campaign.files}
-    if not before and not now and content != stored:
+    after = {file.name: file.sha256 for file in campaign.files}
+    if not before and not after and content != stored:
         return [Fault("campaign", None, None, f"its content differs from that imported on {when}")]
     advice = (
         "give the new content another campaign name, or withdraw what was imported: "
         f'`monitor withdraw {shlex.quote(campaign.name)} --reason "..."`'
     )
     faults = []
-    for name in sorted(before.keys() | now.keys()):
-        if name not in now:
+    for name in sorted(before.keys() | after.keys()):
+        if name not in after:
             faults.append(Fault(name, None, None, f"is missing; it was imported on {when}; {advice}"))
         elif name not in before:
             faults.append(Fault(name, None, None, f"was not there when imported on {when}; {advice}"))
-        elif before[name] != now[name]:
+        elif before[name] != after[name]:
             faults.append(Fault(name, None, None, f"differs from the file imported on {when}; {advice}"))
     return faults
 
@@ -195,20 +195,20 @@ def _differences(
 def _keep_machine(db: Database, campaign: Campaign) -> None:
     machine = campaign.machine
     # Only campaigns that count hold a machine to its axes: with the last of them a wrong topology is withdrawn, too.
-    known = db.rows(
+    topologies = db.rows(
         "SELECT DISTINCT machine_description ->> 'topology' FROM campaign WHERE machine = ? AND method <> ?",
         [machine.id, CURVE],
     )
     registered = db.rows(
         "SELECT arg_max(topology, registration) FROM registered_machine WHERE machine = ?", [machine.id]
     )
-    if not known and registered != [(machine.topology,)]:
+    if not topologies and registered != [(machine.topology,)]:
         number = db.next_number("registered_machine", "registration")
         db.execute(
             "INSERT INTO registered_machine VALUES (?, ?, ?, ?)",
             [number, machine.id, machine.topology, utc_now()],
         )
-    elif known and known[0][0] != machine.topology:
+    elif topologies and topologies[0][0] != machine.topology:
         raise CampaignError(
             campaign.name,
             [
@@ -216,7 +216,7 @@ def _keep_machine(db: Database, campaign: Campaign) -> None:
                     "campaign.toml",
                     None,
                     "topology",
-                    f"machine {machine.id} is known as {known[0][0]!r}, here it is {machine.topology!r}; the axes "
+                    f"machine {machine.id} is known as {topologies[0][0]!r}, here it is {machine.topology!r}; the axes "
                     "of a machine do not change: correct the topology, or give the machine another id",
                 )
             ],

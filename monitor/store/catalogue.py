@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
 from typing import TYPE_CHECKING
 
+from monitor.documents import IN_UTC, OMITTED
 from monitor.exceptions import NotFoundError
 from monitor.records import Machine
 from monitor.store.connection import Database
@@ -13,20 +17,78 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def list_campaigns(db: Database) -> pd.DataFrame:
-    """All campaigns, in the order of import: the view ``v_campaigns``."""
-    return db.frame("SELECT * FROM v_campaigns ORDER BY campaign_id")
+@dataclass(frozen=True)
+class CampaignRow:
+    """A campaign as the view ``v_campaigns`` has it. A curve has ``rows`` and no runs; others have no ``rows``."""
+
+    campaign_id: int
+    campaign: str
+    machine: str
+    method: str
+    runs: int
+    probings: int
+    first_run_at: datetime | None = field(metadata=IN_UTC)
+    last_run_at: datetime | None = field(metadata=IN_UTC)
+    days: int | None
+    probe: str | None
+    probe_u_um: float | None
+    artefact: str | None
+    scale_bar_mm: float | None
+    scale_bar_certificate: str | None
+    imported_at: datetime = field(metadata=IN_UTC)
+    rows: int | None = field(default=None, metadata=OMITTED)
 
 
-def list_withdrawn(db: Database) -> pd.DataFrame:
-    """The campaigns that no longer count, by the time of withdrawal: the view ``v_withdrawn_campaigns``."""
-    return db.frame("SELECT * FROM v_withdrawn_campaigns ORDER BY withdrawn_at, campaign_id")
+@dataclass(frozen=True)
+class WithdrawnCampaign:
+    """A campaign that no longer counts."""
+
+    campaign: str
+    machine: str
+    method: str
+    imported_at: datetime = field(metadata=IN_UTC)
+    withdrawn_at: datetime = field(metadata=IN_UTC)
+    reason: str
 
 
-def list_runs(db: Database, campaign: str) -> pd.DataFrame:
-    """The runs of a campaign in file order: the view ``v_runs``. Raises NotFoundError."""
+@dataclass(frozen=True)
+class RunRow:
+    """A run as the view ``v_runs`` has it; ``started_at_local`` is by the shop's clock."""
+
+    campaign: str
+    machine: str
+    run: int
+    started_at: datetime = field(metadata=IN_UTC)
+    started_at_local: datetime
+    day: int
+    warm_up: bool
+    ambient_degc: float | None
+    conditions: Mapping[str, float]
+
+
+def list_campaigns(db: Database) -> tuple[CampaignRow, ...]:
+    """Return all campaigns that count, in the order of import."""
+    return db.records(
+        CampaignRow,
+        'SELECT v.*, c."rows" FROM v_campaigns AS v LEFT JOIN ('
+        'SELECT campaign_id, count(*) AS "rows" FROM curve_row GROUP BY campaign_id) AS c USING (campaign_id) '
+        "ORDER BY campaign_id",
+    )
+
+
+def list_withdrawn(db: Database) -> tuple[WithdrawnCampaign, ...]:
+    """Return the campaigns that no longer count, by the time of withdrawal."""
+    return db.records(
+        WithdrawnCampaign,
+        "SELECT campaign, machine, method, imported_at, withdrawn_at, reason FROM v_withdrawn_campaigns "
+        "ORDER BY withdrawn_at, campaign_id",
+    )
+
+
+def list_runs(db: Database, campaign: str) -> tuple[RunRow, ...]:
+    """Return the runs of a campaign in file order. Raises NotFoundError."""
     campaign_number(db, campaign)
-    return db.frame("SELECT * FROM v_runs WHERE campaign = ?", [campaign])
+    return db.records(RunRow, "SELECT * FROM v_runs WHERE campaign = ?", [campaign])
 
 
 def list_machines(db: Database) -> pd.DataFrame:
@@ -47,21 +109,21 @@ def described_machines(db: Database) -> tuple[Machine, ...]:
 
 def campaign_number(db: Database, name: str) -> int:
     """The number of a campaign in the tables. Raises NotFoundError listing what is there."""
-    found = db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [name])
-    if not found:
+    numbers = db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [name])
+    if not numbers:
         raise NotFoundError(
             f"there is no campaign {name!r}; {_withdrawn(db, name)}{_what_is_there(db, 'campaign')}"
         )
-    return int(found[0][0])
+    return int(numbers[0][0])
 
 
 def _withdrawn(db: Database, name: str) -> str:
     """Whether a campaign of that name was withdrawn, in words before others; empty where none was."""
-    found = db.rows(
+    withdrawals = db.rows(
         "SELECT withdrawn_at, reason FROM v_withdrawn_campaigns WHERE campaign = ? ORDER BY withdrawn_at DESC LIMIT 1",
         [name],
     )
-    return f"it was withdrawn on {found[0][0]:%Y-%m-%d} ({found[0][1]}); " if found else ""
+    return f"it was withdrawn on {withdrawals[0][0]:%Y-%m-%d} ({withdrawals[0][1]}); " if withdrawals else ""
 
 
 def campaigns_of_machine(db: Database, machine: str) -> dict[int, tuple[str, str]]:
@@ -69,14 +131,14 @@ def campaigns_of_machine(db: Database, machine: str) -> dict[int, tuple[str, str
 
     Raises NotFoundError, listing what is there, for a machine that has neither a campaign that counts nor an event.
     """
-    found = db.rows(
+    imported = db.rows(
         "SELECT campaign_id, campaign, method FROM imported_campaign WHERE machine = ? ORDER BY campaign_id",
         [machine],
     )
-    counting = _counting(db, [number for number, _, _ in found])
+    counting = _counting(db, [number for number, _, _ in imported])
     if not counting and not _has_event(db, machine):
         raise _no_machine(db, machine)
-    return {number: (name, method) for number, name, method in found if number in counting}
+    return {number: (name, method) for number, name, method in imported if number in counting}
 
 
 def check_machine(db: Database, machine: str) -> None:

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 import duckdb
 import pandas as pd
@@ -26,6 +26,7 @@ from monitor.exceptions import StoreError
 from monitor.store import migrations
 
 Parameters = Sequence[Any] | Mapping[str, Any]
+Record = TypeVar("Record")
 
 _LOCKED = re.compile(r"Conflicting lock is held in (.*?) ?\(PID (\d+)\)")
 
@@ -36,7 +37,7 @@ _YOUNG_S, _LOOKS, _BETWEEN_LOOKS_S = 2.0, 10, 0.05
 
 
 def utc_now() -> datetime:
-    """The present moment in UTC without its zone, as every time is stored."""
+    """Return the present moment in UTC without its zone, as every time is stored."""
     return datetime.now(UTC).replace(tzinfo=None)
 
 
@@ -82,17 +83,24 @@ class Database:
             self._connection.execute(sql, parameters)
 
     def rows(self, sql: str, parameters: Parameters = ()) -> list[tuple[Any, ...]]:
-        """The rows of a query as tuples."""
+        """Return the rows of a query as tuples."""
         with self._lock, _stopped_by_ctrl_c():
             return self._connection.execute(sql, parameters).fetchall()
 
+    def records(self, kind: type[Record], sql: str, parameters: Parameters = ()) -> tuple[Record, ...]:
+        """Return the rows of a query as records of a kind, whose fields are named as the columns."""
+        with self._lock, _stopped_by_ctrl_c():
+            cursor = self._connection.execute(sql, parameters)
+            names = [column[0] for column in cursor.description or ()]
+            return tuple(kind(**dict(zip(names, row, strict=True))) for row in cursor.fetchall())
+
     def frame(self, sql: str, parameters: Parameters = ()) -> pd.DataFrame:
-        """The rows of a query as a table, for views that people read."""
+        """Return the rows of a query as a table, for views that people read."""
         with self._lock, _stopped_by_ctrl_c():
             return self._connection.execute(sql, parameters).df()
 
     def arrays(self, sql: str, parameters: Parameters = ()) -> dict[str, Any]:
-        """The columns of a query as numpy arrays, masked where NULL."""
+        """Return the columns of a query as numpy arrays, masked where NULL."""
         with self._lock, _stopped_by_ctrl_c():
             columns: dict[str, Any] = self._connection.execute(sql, parameters).fetchnumpy()
             return columns
@@ -110,18 +118,18 @@ class Database:
 
     @contextmanager
     def connected(self) -> Iterator[duckdb.DuckDBPyConnection]:
-        """DuckDB's own connection, for this block; no other thread uses the database meanwhile."""
+        """Yield DuckDB's connection for this block; no other thread uses the database meanwhile."""
         with self._lock, _stopped_by_ctrl_c():
             yield self._connection
 
     def next_number(self, table: str, column: str) -> int:
-        """One more than the largest number in use; call it inside the transaction that uses it."""
+        """Return one more than the largest number in use; call it inside the transaction that uses it."""
         ((number,),) = self.rows(f"SELECT coalesce(max({column}), 0) + 1 FROM {table}")
         return int(number)
 
     @contextmanager
     def attached(self, path: Path, name: str) -> Iterator[None]:
-        """A second database file under a name, for this block; no other thread uses the database meanwhile."""
+        """Attach a second database file under a name for this block; no other thread uses the database meanwhile."""
         with self._lock:
             literal = str(path).replace("'", "''")
             self._connection.execute(f"ATTACH '{literal}' AS {name} (READ_WRITE)")
@@ -135,7 +143,7 @@ class Database:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """All or nothing: what is done inside is kept as a whole, or not at all where it fails.
+        """Store all changes of the block, or none where it fails.
 
         A transaction inside another joins it.
         """
@@ -152,7 +160,7 @@ class Database:
                 self._connection.commit()
             except BaseException as fault:
                 self._roll_back()
-                # A disk that is full when the transaction ends is told as a fault of the transaction.
+                # A disk that is full when the transaction ends is reported as a fault of the transaction.
                 full = isinstance(fault, duckdb.TransactionException) and "Could not write file" in str(fault)
                 if full or isinstance(fault, duckdb.IOException | duckdb.OutOfMemoryException):
                     raise StoreError(
@@ -170,12 +178,12 @@ class Database:
             return
 
     def _fit(self) -> None:
-        known = migrations.available()
+        available = migrations.available()
         try:
             if not self.read_only:
-                migrations.migrate(self._connection, known)
+                migrations.migrate(self._connection, available)
                 return
-            waiting = migrations.pending(self._connection, known)
+            waiting = migrations.pending(self._connection, available)
         except StoreError as fault:
             raise StoreError(f"{self.path}: {fault}") from fault
         if waiting:
@@ -187,7 +195,7 @@ class Database:
 
 @contextmanager
 def _stopped_by_ctrl_c() -> Iterator[None]:
-    """DuckDB tells Ctrl-C during a query as a fault of the query; here it is what it is everywhere else."""
+    """Raise KeyboardInterrupt for Ctrl-C during a query, which DuckDB reports as a fault of the query."""
     try:
         yield
     except RuntimeError as fault:
@@ -224,10 +232,10 @@ def _connect(path: str, read_only: bool, threads: int | None) -> duckdb.DuckDBPy
 def _is_being_made(path: str) -> bool:
     """Whether a file that is no database yet may be one in a moment: another process makes it just now."""
     try:
-        found = Path(path).stat()
+        status = Path(path).stat()
     except OSError:
         return False
-    return found.st_size < _HEADERS_BYTES and abs(time.time() - found.st_mtime) < _YOUNG_S
+    return status.st_size < _HEADERS_BYTES and abs(time.time() - status.st_mtime) < _YOUNG_S
 
 
 def _in_words(path: str, read_only: bool, message: str) -> str:

@@ -29,8 +29,8 @@ def is_curve_number(db: Database, campaign_id: int) -> bool:
 
 def curve_names(db: Database) -> tuple[str, ...]:
     """The campaigns that are curves, the latest first."""
-    found = db.rows("SELECT campaign FROM campaign WHERE method = ? ORDER BY campaign_id DESC", [METHOD])
-    return tuple(str(name) for (name,) in found)
+    names = db.rows("SELECT campaign FROM campaign WHERE method = ? ORDER BY campaign_id DESC", [METHOD])
+    return tuple(str(name) for (name,) in names)
 
 
 def insert_curve(db: Database, campaign_id: int, curve: CurveCampaign, content: str) -> None:

@@ -50,6 +50,6 @@ def gather(connection: duckdb.DuckDBPyConnection, sql: str, portion: int = PORTI
 
 
 def _after_last(connection: duckdb.DuckDBPyConnection, table: str) -> int:
-    found = connection.execute(f"SELECT coalesce(max(identification_id), 0) + 1 FROM {table}").fetchone()
-    assert found is not None
-    return int(found[0])
+    row = connection.execute(f"SELECT coalesce(max(identification_id), 0) + 1 FROM {table}").fetchone()
+    assert row is not None
+    return int(row[0])

@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 
 def save_identification(db: Database, identification: StoredIdentification) -> int:
-    """Keep an identification; its number. Raises DataError for arrays that do not fit, NotFoundError."""
+    """Store an identification; its number. Raises DataError for arrays that do not fit, NotFoundError."""
     check_identification(identification)
     with db.transaction():
         campaign_id = campaign_number(db, identification.campaign)
-        known = {run for (run,) in db.rows("SELECT run FROM run WHERE campaign_id = ?", [campaign_id])}
-        strange = sorted({run.run for run in identification.runs} - known)
+        recorded = {run for (run,) in db.rows("SELECT run FROM run WHERE campaign_id = ?", [campaign_id])}
+        strange = sorted({run.run for run in identification.runs} - recorded)
         if strange:
             raise NotFoundError(f"campaign {identification.campaign!r} has no run {strange[0]}")
         number = db.next_number("identification", "identification_id")
@@ -77,7 +77,7 @@ def load_identification(
     ``model`` and ``version`` narrow the choice. Raises NotFoundError saying what to type.
     """
     campaign_id = campaign_number(db, campaign)
-    found = db.rows(
+    numbers = db.rows(
         """
         SELECT identification_id FROM identification AS i
         WHERE campaign_id = $campaign_id
@@ -88,7 +88,7 @@ def load_identification(
         """,
         {"campaign_id": campaign_id, "model": model, "version": version, "run": run},
     )
-    if not found:
+    if not numbers:
         wanted = "".join(
             f" {word} {value}"
             for word, value in (("model", model), ("version", version), ("run", run))
@@ -98,7 +98,7 @@ def load_identification(
             f"campaign {campaign!r} has not been identified yet{' for' + wanted if wanted else ''}; "
             f"type `monitor identify {campaign}`"
         )
-    return identification_by_number(db, found[0][0])
+    return identification_by_number(db, numbers[0][0])
 
 
 def identification_by_number(db: Database, number: int) -> StoredIdentification:
@@ -212,20 +212,20 @@ def _runs(db: Database, number: int, count: int) -> tuple[StoredRun, ...]:
     values = db.arrays(
         "SELECT run, value FROM parameter_value WHERE identification_id = ? ORDER BY rowid", [number]
     )
-    left = db.arrays(
+    residuals = db.arrays(
         "SELECT run, sequence, dx_mm, dy_mm, dz_mm FROM residual WHERE identification_id = ? ORDER BY rowid",
         [number],
     )
-    vectors = np.column_stack([left["dx_mm"], left["dy_mm"], left["dz_mm"]])
+    vectors = np.column_stack([residuals["dx_mm"], residuals["dy_mm"], residuals["dz_mm"]])
     estimates = np.ma.filled(np.ma.asarray(values["value"]), np.nan)
-    found = []
+    stored_runs = []
     for run, rms, iterations, freedom, chi_square, covariance, refused in db.rows(
         "SELECT run, rms_mm, iterations, degrees_of_freedom, chi_square, covariance, refused "
         "FROM identified_run WHERE identification_id = ? ORDER BY rowid",
         [number],
     ):
-        own = np.asarray(left["run"] == run)
-        found.append(
+        of_run = np.asarray(residuals["run"] == run)
+        stored_runs.append(
             StoredRun(
                 run,
                 estimates[np.asarray(values["run"] == run)],
@@ -235,8 +235,8 @@ def _runs(db: Database, number: int, count: int) -> tuple[StoredRun, ...]:
                 iterations,
                 freedom,
                 chi_square,
-                np.asarray(left["sequence"][own], dtype=np.int64),
-                vectors[own],
+                np.asarray(residuals["sequence"][of_run], dtype=np.int64),
+                vectors[of_run],
             )
         )
-    return tuple(found)
+    return tuple(stored_runs)

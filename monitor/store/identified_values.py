@@ -48,31 +48,31 @@ def values_of(db: Database, numbers: Sequence[int]) -> Mapping[int, IdentifiedVa
         f"WHERE identification_id IN ({marks})",
         list(numbers),
     )
-    found = {}
+    values = {}
     for number, runs, value, u in zip(*columns.values(), strict=True):
         shape = (-1, len(runs))
-        found[int(number)] = IdentifiedValues(
+        values[int(number)] = IdentifiedValues(
             int(number),
             np.asarray(runs, dtype=np.int64),
             # NULL, of what was refused, is masked.
             np.ma.filled(value, np.nan).reshape(shape).T,
             np.ma.filled(u, np.nan).reshape(shape).T,
         )
-    return found
+    return values
 
 
 def agrees(db: Database, number: int, identification: StoredIdentification) -> bool:
     """Whether the row of an identification is what its runs say."""
-    found = values_of(db, [number]).get(number)
-    if found is None:
+    stored = values_of(db, [number]).get(number)
+    if stored is None:
         return False
     value, u = _matrices(identification)
     runs = np.array([run.run for run in identification.runs], dtype=np.int64)
-    a, b = np.argsort(found.runs), np.argsort(runs)
+    a, b = np.argsort(stored.runs), np.argsort(runs)
     return (
-        np.array_equal(found.runs[a], runs[b])
-        and np.array_equal(found.value[a], value[b], equal_nan=True)
-        and np.array_equal(found.u[a], u[b], equal_nan=True)
+        np.array_equal(stored.runs[a], runs[b])
+        and np.array_equal(stored.value[a], value[b], equal_nan=True)
+        and np.array_equal(stored.u[a], u[b], equal_nan=True)
     )
 
 

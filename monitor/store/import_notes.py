@@ -1,4 +1,4 @@
-"""What was noticed at an import: sentences kept with the campaign, and runs that came in before.
+"""What was noticed at an import: sentences stored with the campaign, and runs that were imported before.
 
 Readings of a run that equal those of another in every digit are a copy, never chance; counted as independent they
 would make every uncertainty too small. The hash of a run's readings tells them without reading the readings again.
@@ -24,26 +24,28 @@ from monitor.units import CONDITION_SUFFIXES
 FEWEST_PROBINGS = 12
 
 
-def run_fingerprints(found: Probings) -> dict[int, str]:
+def run_fingerprints(touches: Probings) -> dict[int, str]:
     """The hash of targets and readings by run, of every run with ``FEWEST_PROBINGS`` or more.
 
     Times and recorded conditions (temperatures) are left out: who copies a run may give it others.
     """
-    measured = {**found.readings} | {
+    measured = {**touches.readings} | {
         name: values
-        for name, values in found.channels.items()
+        for name, values in touches.channels.items()
         if name.rpartition("_")[2] not in CONDITION_SUFFIXES
     }
-    order = np.argsort(found.run, kind="stable")
-    runs, starts = np.unique(found.run[order], return_index=True)
+    order = np.argsort(touches.run, kind="stable")
+    runs, starts = np.unique(touches.run[order], return_index=True)
     prints = {}
     for run, rows in zip(runs.tolist(), np.split(order, starts[1:]), strict=True):
         if len(rows) < FEWEST_PROBINGS:
             continue
-        own = hashlib.sha256("\0".join(found.target[rows].tolist()).encode())
+        fingerprint = hashlib.sha256("\0".join(touches.target[rows].tolist()).encode())
         for name in sorted(measured):
-            own.update(name.encode() + b"\0" + np.asarray(measured[name][rows], dtype="<f8").tobytes())
-        prints[int(run)] = own.hexdigest()
+            fingerprint.update(
+                name.encode() + b"\0" + np.asarray(measured[name][rows], dtype="<f8").tobytes()
+            )
+        prints[int(run)] = fingerprint.hexdigest()
     return prints
 
 
@@ -86,7 +88,7 @@ def notes_content(db: Database, campaign_id: int) -> str:
 
 
 def campaign_notes(db: Database, campaign: str) -> tuple[str, ...]:
-    """What is to be known of a campaign's data: the notes of its import, and runs that equal others' in every digit."""
+    """Return the notes of a campaign's import, and sentences on runs that equal others' in every digit."""
     notes = [
         str(note)
         for (note,) in db.rows(

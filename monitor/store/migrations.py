@@ -58,12 +58,12 @@ class Migration:
 
 def available() -> tuple[Migration, ...]:
     """The migrations of this software, in order."""
-    found = []
+    migrations = []
     for entry in migration_folder().iterdir():
         match = _FILE_NAME.fullmatch(entry.name)
         if match:
-            found.append(Migration(int(match[1]), entry.name, entry.read_text(encoding="utf-8")))
-    return tuple(sorted(found, key=lambda migration: migration.number))
+            migrations.append(Migration(int(match[1]), entry.name, entry.read_text(encoding="utf-8")))
+    return tuple(sorted(migrations, key=lambda migration: migration.number))
 
 
 def applied(connection: duckdb.DuckDBPyConnection) -> list[tuple[int, str, str, str]]:
@@ -89,25 +89,25 @@ def pending(connection: duckdb.DuckDBPyConnection, migrations: Sequence[Migratio
     numbers = [migration.number for migration in migrations]
     if numbers != list(range(1, len(numbers) + 1)):
         raise StoreError(f"the migrations must be numbered 1, 2, 3, ... without a gap; there are {numbers}")
-    known = {migration.number: migration for migration in migrations}
-    done = applied(connection)
-    for number, name, sha256, version in done:
+    by_number = {migration.number: migration for migration in migrations}
+    ledger = applied(connection)
+    for number, name, sha256, version in ledger:
         if number > len(numbers):
             raise StoreError(
                 f"the database is newer than this software: {version} brought it to {name}, and this is "
                 f"{__version__}, which knows {len(numbers)} migrations; use {version} or later"
             )
-        if known[number].name != name:
+        if by_number[number].name != name:
             raise StoreError(
                 f"the migration {name}, which made this database, is missing from this installation "
-                f"(in its place is {known[number].name}); install the software again"
+                f"(in its place is {by_number[number].name}); install the software again"
             )
-        if known[number].sha256 != sha256:
+        if by_number[number].sha256 != sha256:
             raise StoreError(
                 f"the migration {name} was edited after it was applied to this database by {version}; "
                 "bring the file back as it was released and put the change into a new one"
             )
-    return tuple(migrations[len(done) :])
+    return tuple(migrations[len(ledger) :])
 
 
 def migrate(connection: duckdb.DuckDBPyConnection, migrations: Sequence[Migration]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Models and their versions: a list of effects, where it came from, and what was added or taken away."""
+"""Models and their versions: a list of effects, where it came from, and what was added or removed."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def save_model(
     parent: tuple[str, int] | None = None,
     note: str = "",
 ) -> StoredModel:
-    """Keep a model under the next version of its name; the same effects again are the version that is there.
+    """Store a model under the next version of its name; the same effects again are the version that is there.
 
     Raises InputError for an empty name or an effect listed twice, NotFoundError for an unknown parent.
     """
@@ -54,7 +54,7 @@ def save_model(
     if twice:
         raise InputError(f"the model {name} lists an effect twice: {', '.join(twice)}")
     with db.transaction():
-        versions = _found(db, "model = ? ORDER BY version DESC", [name])
+        versions = _select(db, "model = ? ORDER BY version DESC", [name])
         if versions and versions[0].effects == tuple(effects):
             return versions[0]
         before = load_model(db, *parent).effects if parent else ()
@@ -90,17 +90,17 @@ def save_model(
 
 def load_model(db: Database, name: str, version: int | None = None) -> StoredModel:
     """A version of a model, the latest where none is named. Raises NotFoundError listing what is there."""
-    found = _found(db, "model = ? ORDER BY version DESC", [name])
-    chosen = [model for model in found if version is None or model.version == version]
-    if chosen:
-        return chosen[0]
-    if found:
-        raise NotFoundError(f"model {name!r} has no version {version}; it has 1 to {found[0].version}")
+    versions = _select(db, "model = ? ORDER BY version DESC", [name])
+    wanted = [model for model in versions if version is None or model.version == version]
+    if wanted:
+        return wanted[0]
+    if versions:
+        raise NotFoundError(f"model {name!r} has no version {version}; it has 1 to {versions[0].version}")
     names = [row[0] for row in db.rows("SELECT DISTINCT model FROM model ORDER BY model")]
-    there = (
+    existing = (
         f"there are {', '.join(names)}" if names else "there is none yet; `monitor identify` makes the first"
     )
-    raise NotFoundError(f"there is no model {name!r}; {there}")
+    raise NotFoundError(f"there is no model {name!r}; {existing}")
 
 
 def model_history(db: Database, name: str, version: int | None = None) -> tuple[StoredModel, ...]:
@@ -130,7 +130,7 @@ def list_models(db: Database) -> pd.DataFrame:
 
 def all_models(db: Database) -> list[StoredModel]:
     """All versions of all models."""
-    return _found(db, "true ORDER BY model, version", [])
+    return _select(db, "true ORDER BY model, version", [])
 
 
 def model_key(name: str, version: int) -> str:
@@ -152,7 +152,7 @@ def model_content(model: StoredModel) -> str:
     )
 
 
-def _found(db: Database, condition: str, parameters: list[object]) -> list[StoredModel]:
+def _select(db: Database, condition: str, parameters: list[object]) -> list[StoredModel]:
     return [
         StoredModel(
             name,

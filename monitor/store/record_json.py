@@ -113,8 +113,12 @@ def _self_calibration(data: dict[str, Any] | None) -> SelfCalibration | None:
 def _l_shape(data: dict[str, Any] | None) -> LShape | None:
     if data is None:
         return None
-    modules = tuple(Module(one["id"], _tuple(one["centre"]), _tuple(one["tilt"])) for one in data["modules"])
-    placements = tuple(Placement(one["plane"], _tuple(one["corner"])) for one in data["placements"])
+    modules = tuple(
+        Module(module["id"], _tuple(module["centre"]), _tuple(module["tilt"])) for module in data["modules"]
+    )
+    placements = tuple(
+        Placement(placement["plane"], _tuple(placement["corner"])) for placement in data["placements"]
+    )
     return LShape(**{**data, "modules": modules, "placements": placements})
 
 

@@ -1,6 +1,6 @@
 """Imports that were refused: who reads a report later learns which data never arrived, and whether they came since.
 
-Nothing of a refused folder is kept; its path, its faults, and the names that it told are.
+Of a refused folder its path, its faults and the names in it are stored, nothing else.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from monitor import __version__
 from monitor.store import audit
 from monitor.store.connection import Database
 
-#: Faults kept in words, as many as a refusal shows; the others are counted.
+#: Faults stored as sentences, as many as a refusal shows; the others are counted.
 FAULTS_KEPT = 20
 
 
@@ -41,32 +41,32 @@ def record_refusal(
     machine: str | None = None,
     at: datetime | None = None,
 ) -> int:
-    """Keep that a folder was refused; its number. ``at`` (with its offset) is now where it is not given.
+    """Record that a folder was refused; its number. ``at`` (with its offset) is now where it is not given.
 
     A folder that is refused again on the same day for the same faults (a job that tries every five minutes) is
-    told once: the number is that of the refusal that is there.
+    recorded once: the number is that of the first refusal.
     """
-    now = at or datetime.now().astimezone()
-    offset = now.utcoffset() or timedelta()
-    folder, kept = _utf8(folder), [_utf8(fault) for fault in faults[:FAULTS_KEPT]]
+    moment = at or datetime.now().astimezone()
+    offset = moment.utcoffset() or timedelta()
+    folder, texts = _utf8(folder), [_utf8(fault) for fault in faults[:FAULTS_KEPT]]
     with db.transaction():
-        day = now.date()
-        for one in refusals(db):
-            same = (one.folder, one.fault_count, list(one.faults)) == (folder, len(faults), kept)
-            if same and one.cleared_at is None and one.at.date() == day:
-                return one.number
+        day = moment.date()
+        for refusal in refusals(db):
+            same = (refusal.folder, refusal.fault_count, list(refusal.faults)) == (folder, len(faults), texts)
+            if same and refusal.cleared_at is None and refusal.at.date() == day:
+                return refusal.number
         number = db.next_number("refused_import", "refusal_id")
         db.execute(
             "INSERT INTO refused_import VALUES (?, ?, ?, ?, ?, ?, ?, ?::VARCHAR[], ?)",
             [
                 number,
-                now.astimezone(UTC).replace(tzinfo=None),
+                moment.astimezone(UTC).replace(tzinfo=None),
                 offset.total_seconds(),
                 folder,
                 campaign,
                 machine,
                 len(faults),
-                kept,
+                texts,
                 __version__,
             ],
         )
@@ -76,7 +76,7 @@ def record_refusal(
 
 def clear_refusals(db: Database, folder: str, campaign: str, at: datetime | None = None) -> tuple[int, ...]:
     """Mark the open refusals of a folder, or of a campaign of that name, as settled: it was imported well."""
-    now = (at or datetime.now(UTC)).astimezone(UTC).replace(tzinfo=None)
+    moment = (at or datetime.now(UTC)).astimezone(UTC).replace(tzinfo=None)
     with db.transaction():
         open_ones = db.rows(
             "SELECT refusal_id FROM v_refused_imports WHERE cleared_at IS NULL AND (folder = ? OR campaign = ?) "
@@ -84,7 +84,7 @@ def clear_refusals(db: Database, folder: str, campaign: str, at: datetime | None
             [_utf8(folder), campaign],
         )
         for (number,) in open_ones:
-            db.execute("INSERT INTO refusal_cleared VALUES (?, ?, ?)", [number, campaign, now])
+            db.execute("INSERT INTO refusal_cleared VALUES (?, ?, ?)", [number, campaign, moment])
             audit.record(db, "clear", "cleared refusal", str(number), cleared_content(db, number))
     return tuple(int(number) for (number,) in open_ones)
 

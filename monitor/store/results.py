@@ -77,6 +77,7 @@ def _bits(values: Array) -> bytes:
 
 
 def check_identification(identification: StoredIdentification) -> None:
+    """Raise DataError where the arrays of an identification do not fit each other or are not finite."""
     count = len(identification.parameters)
     if len(identification.units) != count:
         raise DataError(f"{count} parameters need {count} units, not {len(identification.units)}")

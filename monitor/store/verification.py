@@ -1,7 +1,7 @@
-"""Is the database as it was written? Everything that is stored is hashed anew and held against the audit.
+"""Verification that the database is as it was written: everything is hashed anew and compared with the audit.
 
 Seen are: an altered, added or removed row of any result, campaign or file; an altered or missing audit entry,
-those at the end included as long as what they tell of is there. Not seen is a database put back as a whole to
+those at the end included as long as what they record is there. Not seen is a database put back as a whole to
 an earlier state: keep the last hash (``Verification.last_sha256``) elsewhere, for example on paper.
 """
 
@@ -30,7 +30,7 @@ from monitor.store.withdrawals import withdrawal_content
 
 @dataclass(frozen=True)
 class Verification:
-    """What was found: the number of audit entries, the hash of the last, and every fault in words."""
+    """Result of a verification: the number of audit entries, the hash of the last, and a sentence for every fault."""
 
     entries: int
     last_sha256: str
@@ -38,12 +38,12 @@ class Verification:
 
     @property
     def ok(self) -> bool:
-        """True where nothing is wrong."""
+        """Whether there is no fault."""
         return not self.faults
 
 
 def verify_audit(db: Database) -> Verification:
-    """Hash everything anew and hold it against the audit; takes as long as reading the whole database."""
+    """Hash everything anew and compare it with the audit; takes as long as reading the whole database."""
     faults = [
         *audit.chain_faults(db),
         *certificate_faults(db),
@@ -51,21 +51,21 @@ def verify_audit(db: Database) -> Verification:
         *_machine_faults(db),
         *index_faults(db),
     ]
-    told = {}
+    audited = {}
     imports: Counter[str] = Counter()
     for subject, key, content in db.rows("SELECT subject, key, content_sha256 FROM audit ORDER BY entry"):
         if subject == "campaign":
             imports[key] += 1
             key = _of_several(key, imports[key])
-        told[subject, key] = content
-    found = dict(_contents(db))
-    for subject, key in sorted(told.keys() | found.keys()):
+        audited[subject, key] = content
+    stored = dict(_contents(db))
+    for subject, key in sorted(audited.keys() | stored.keys()):
         name = f"{subject} {key}"
-        if (subject, key) not in found:
+        if (subject, key) not in stored:
             faults.append(f"{name} is in the audit, but no longer in the database")
-        elif (subject, key) not in told:
+        elif (subject, key) not in audited:
             faults.append(f"{name} is in the database, but not in the audit")
-        elif told[subject, key] != found[subject, key]:
+        elif audited[subject, key] != stored[subject, key]:
             faults.append(f"{name} was altered after it was stored")
     last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
     entries, last_sha256 = last[0] if last else (0, audit.NO_ENTRY_BEFORE)
@@ -104,8 +104,10 @@ def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
         yield ("import notes", str(number)), notes_content(db, number)
     for (number,) in db.rows("SELECT campaign_id FROM withdrawn_campaign ORDER BY ALL"):
         yield ("withdrawn campaign", str(number)), withdrawal_content(db, number)
-    for number, entry, own in db.rows("SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"):
-        yield ("certificate", f"{number} entry {entry}"), own
+    for number, entry, content in db.rows(
+        "SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"
+    ):
+        yield ("certificate", f"{number} entry {entry}"), content
 
 
 def _of_several(name: str, nth: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import monitor
@@ -14,11 +15,29 @@ FOUND_EFFECT = "EZC1:const@warmup"
 EXAMPLES = (MAIN, "cold-cold", "hot-cold", HIDDEN)
 
 
+@dataclass(frozen=True)
+class DemoStep:
+    """A step of the demo: what it shows, and the verb with its arguments."""
+
+    step: str
+    verb: str
+    arguments: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class DemoAnswer:
+    """The folder of the demo, its steps, and the files that they wrote."""
+
+    out: Path
+    steps: tuple[DemoStep, ...]
+    files: tuple[str, ...]
+
+
 def examples_folder() -> Path:
     """The folder ``examples``: of the checkout, or of the working directory. Raises InputError where there is none."""
-    for place in (Path(monitor.__file__).parent.parent / "examples", Path("examples")):
-        if all((place / name / "campaign.toml").is_file() for name in EXAMPLES):
-            return place
+    for folder in (Path(monitor.__file__).parent.parent / "examples", Path("examples")):
+        if all((folder / name / "campaign.toml").is_file() for name in EXAMPLES):
+            return folder
     raise InputError(
         "the example campaigns are not here; they come with the source: run `monitor demo` in a folder that holds "
         f"examples/ with {', '.join(EXAMPLES)}"

@@ -1,90 +1,130 @@
-"""Keeping a database for years: events, audit, verification, backup, restore, export."""
+"""Keeping a database for years: audit, verification, backup, restore, export."""
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError
 from monitor.store import (
+    AuditEntry,
     Database,
     export_tables,
-    list_events,
-    list_machines,
-    record_event,
+    last_entries,
     restore,
     take_backup,
     verify_audit,
 )
-from monitor.workflow.intake.campaigns import records
-
-Document = dict[str, Any]
 
 
-def record(db: Database, machine: str, at: datetime, kind: str, text: str) -> int:
-    """Record what happened to a machine. Raises InputError without words, NotFoundError."""
-    if not text.strip():
-        raise InputError("say in words what happened, for example 'B axis encoder changed'")
-    if at > datetime.now(UTC) + timedelta(hours=1):
-        raise InputError(
-            f"{at.isoformat()} lies in the future, and an event cannot be undone; give the time it had"
-        )
-    return record_event(db, machine, at, kind, text)
+@dataclass(frozen=True)
+class VerifyAnswer:
+    """Whether the database is as it was written, with the hash of the last audit entry to be noted elsewhere."""
+
+    ok: bool
+    entries: int
+    last_sha256: str
+    faults: tuple[str, ...]
 
 
-def events(db: Database, machine: str | None = None) -> Document:
-    """What was recorded of a machine, or of all. Raises NotFoundError for an unknown machine."""
-    known = [str(name) for name in list_machines(db)["machine"]]
-    if machine is not None and machine not in known:
-        raise NotFoundError(f"there is no machine {machine!r}; there are {', '.join(known) or 'none yet'}")
-    return {"events": records(list_events(db, machine))}
+def verify(db: Database) -> VerifyAnswer:
+    """Hash everything that is stored anew and compare it with the audit."""
+    verification = verify_audit(db)
+    return VerifyAnswer(verification.ok, verification.entries, verification.last_sha256, verification.faults)
 
 
-def verify(db: Database) -> Document:
-    """Whether the database is as it was written."""
-    found = verify_audit(db)
-    return {
-        "ok": found.ok,
-        "entries": found.entries,
-        "last_sha256": found.last_sha256,
-        "faults": list(found.faults),
-    }
+@dataclass(frozen=True)
+class AuditRequest:
+    """How many of the last entries to list. Raises InputError where it is not a whole number from 1 on."""
+
+    last: int
+
+    def __post_init__(self) -> None:
+        if not 0 < self.last < 2**63:
+            raise InputError(f"--last {self.last}: how many entries, a whole number from 1 on")
 
 
-def audit(db: Database, last: int) -> Document:
-    """The last entries of the audit, the newest first. Raises InputError."""
-    if not 0 < last < 2**63:
-        raise InputError(f"--last {last}: how many entries, a whole number from 1 on")
-    frame = db.frame(
-        "SELECT entry, made_at, actor, action, subject, key, software_version FROM audit ORDER BY entry DESC LIMIT ?",
-        [last],
+@dataclass(frozen=True)
+class AuditAnswer:
+    """Entries of the audit, the newest first."""
+
+    entries: tuple[AuditEntry, ...]
+
+
+def audit(db: Database, request: AuditRequest) -> AuditAnswer:
+    """List the last entries of the audit, the newest first."""
+    return AuditAnswer(last_entries(db, request.last))
+
+
+@dataclass(frozen=True)
+class BackupRequest:
+    """The new file that the database is copied to."""
+
+    target: Path
+
+
+@dataclass(frozen=True)
+class BackupAnswer:
+    """The copy with its hash, and how many rows it has in all tables."""
+
+    file: Path
+    sha256: str
+    rows: int
+    message: str
+
+
+def backup(db: Database, request: BackupRequest) -> BackupAnswer:
+    """Copy everything into a second file. Raises StoreError where it exists or cannot be written."""
+    copy = take_backup(db, request.target)
+    rows = sum(count for count, _ in copy.tables.values())
+    return BackupAnswer(
+        file=request.target,
+        sha256=copy.sha256,
+        rows=rows,
+        message=f"{request.target}: {len(copy.tables)} tables, {rows} rows, checked; its manifest lies beside it",
     )
-    return {"entries": records(frame)}
 
 
-def backup(db: Database, target: Path) -> Document:
-    """A second file with everything."""
-    made = take_backup(db, target)
-    rows = sum(count for count, _ in made.tables.values())
-    return {
-        "file": str(target),
-        "sha256": made.sha256,
-        "rows": rows,
-        "message": f"{target}: {len(made.tables)} tables, {rows} rows, checked; its manifest lies beside it",
-    }
+@dataclass(frozen=True)
+class RestoreRequest:
+    """A backup, and the new database that is made from it."""
+
+    source: Path
+    target: Path
 
 
-def restore_to(source: Path, target: Path) -> Document:
-    """A database from a backup."""
-    made = restore(source, target)
-    return {
-        "file": str(target),
-        "sha256": made.sha256,
-        "message": f"{target} is the backup of {made.made_at[:19].replace('T', ' ')} UTC",
-    }
+@dataclass(frozen=True)
+class RestoreAnswer:
+    """The restored database with its hash."""
+
+    file: Path
+    sha256: str
+    message: str
 
 
-def export(db: Database, folder: Path, form: Literal["csv", "parquet"]) -> Document:
-    """All tables as files."""
-    return {"files": [str(path) for path in export_tables(db, folder, form)]}
+def restore_backup(request: RestoreRequest) -> RestoreAnswer:
+    """Make a database from a backup. Raises StoreError where the backup is not what its manifest says."""
+    source = restore(request.source, request.target)
+    moment = source.made_at[:19].replace("T", " ")
+    return RestoreAnswer(request.target, source.sha256, f"{request.target} is the backup of {moment} UTC")
+
+
+@dataclass(frozen=True)
+class ExportRequest:
+    """A new or empty folder for the tables, and their format."""
+
+    folder: Path
+    format: Literal["csv", "parquet"] = "csv"
+
+
+@dataclass(frozen=True)
+class ExportAnswer:
+    """The files that were written."""
+
+    files: tuple[Path, ...]
+
+
+def export(db: Database, request: ExportRequest) -> ExportAnswer:
+    """Write all tables as files. Raises InputError for a folder that is not empty, StoreError."""
+    return ExportAnswer(export_tables(db, request.folder, request.format))

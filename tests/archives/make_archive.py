@@ -132,7 +132,7 @@ def expected(db: store.Database) -> dict[str, object]:
             for number in ("C-1", "C-2")
             for certificate in [store.load_certificate(db, number)]
         },
-        "events": store.list_events(db)["description"].tolist(),
+        "events": [event.description for event in store.list_events(db)],
         "selections": {"warm": list(store.find_selection(db, "warm").runs)},
     }
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from monitor.store import Database
 from monitor.workflow.health.report import report
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 QUIET = "nothing-hidden"
@@ -40,7 +40,7 @@ def fill(db: Database, machines: int, folder: Path, *, all_lack: bool = False) -
         text = (own / "campaign.toml").read_text(encoding="utf-8")
         text = re.sub('campaign = ".*?"', f'campaign = "{name}"', text, count=1).replace("HU40-T", name, 1)
         (own / "campaign.toml").write_text(text, encoding="utf-8")
-        import_folders(db, [own])
+        import_folders(db, ImportRequest([own]))
         shutil.rmtree(own)
 
 

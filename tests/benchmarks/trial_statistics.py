@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.statistics import (
+    ErrorVectors,
+    JointSeries,
     anova,
     backtest_longest,
     bartlett,
@@ -201,10 +203,11 @@ def volumetric(rng: np.random.Generator) -> None:
             line = rng.normal(5.0, 3.0, size=6) + rng.normal(0.0, 0.02, size=6) * t[:, np.newaxis]
             y = line + component * (rng.normal(size=(days, 6)) @ mix.T)[day] + rng.normal(size=(len(t), 6))
             found = backtest_longest(
-                y, t, day, lambda column, keep, y=y, t=t, day=day: trend(y[keep, column], t[keep], days=day[keep]),
-                rng.normal(size=(8, 3, 6)), np.zeros((8, 3)), rng=rng, foretold=3, draws=1000,
+                JointSeries(y, t, day),
+                lambda column, keep, y=y, t=t, day=day: trend(y[keep, column], t[keep], days=day[keep]),
+                ErrorVectors(rng.normal(size=(8, 3, 6)), np.zeros((8, 3))), rng=rng, foretold=3, draws=1000,
             )  # fmt: skip
-            made, inside = made + found.made, inside + found.covered
+            made, inside = made + found.forecasts, inside + found.covered
         rows.append([days, runs, component, made, inside / made])
     head = ["days", "runs", "day component", "forecasts", "inside"]
     table("Forecasts of the volumetric error in their 95 % interval", head, rows)

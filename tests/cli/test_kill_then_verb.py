@@ -28,11 +28,11 @@ _DIE_AFTER_COMMIT = """
 import os, signal, sys
 from pathlib import Path
 from monitor.store import Database
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 db = Database(sys.argv[1])
-import_folders(db, [Path(sys.argv[2])])
+import_folders(db, ImportRequest([Path(sys.argv[2])]))
 identify(db, IdentifyRequest(Path(sys.argv[2]).name))
 os.kill(os.getpid(), signal.SIGKILL)
 """

@@ -25,12 +25,12 @@ from monitor.documents import to_document
 from monitor.reporting.figures.style import png
 from monitor.statistics.means import anova
 from monitor.store import Database, load_curve
-from monitor.workflow.explain.curve_answer import curve_explain_answer
+from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.curve_figures import residual_figure
 from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.versions import history
 from monitor.workflow.identify.fitting import curve_problem
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import version_with
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.models import label, resolve
@@ -59,10 +59,10 @@ def tell(names: tuple[str, ...] | None = None) -> dict[str, Told]:
         for name, one in series().items():
             if names is not None and name not in names:
                 continue
-            import_folders(db, [write(one, Path(made) / name)])
+            import_folders(db, ImportRequest([write(one, Path(made) / name)]))
             model = "curve"
             explanation = explain_curve(curve_problem(load_curve(db, name), resolve(db, model)))
-            answer = curve_explain_answer(explanation, model)
+            answer = curve_explanation(explanation, model)
             for step, missing in enumerate(answer.missing, start=1):
                 request = AddEffectRequest(missing.effect, model, f"{name}-{step}", campaign=name)
                 model = label(version_with(db, request))

@@ -16,7 +16,7 @@ from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import problem_of
 from monitor.readers import read_campaign
 from monitor.records import CurveCampaign, Instrument
-from monitor.workflow.explain.curve_answer import curve_explain_answer
+from monitor.workflow.explain.curve_answer import curve_explanation
 
 HOURS = np.arange(240.0)
 
@@ -82,12 +82,12 @@ def test_without_an_input_nothing_was_repeated() -> None:
 def test_rounding_is_no_noise() -> None:
     x = np.linspace(0.1, 7.3, 60)
     problem = problem_of(curve({"y": 2.0 + 3.0 * x, "x": x}, "y ~ 1 + x"))
-    answer = curve_explain_answer(explain_curve(problem), "curve")
+    answer = curve_explanation(explain_curve(problem), "curve")
     assert answer.missing == ()
     assert answer.comparison.verdict is Verdict.EXPLAINED
     assert "fits exactly" in answer.answer
     problem = problem_of(curve({"y": 2.0 + 3.0 * x + 0.5 * x**2, "x": x}, "y ~ 1 + x"))
-    answer = curve_explain_answer(explain_curve(problem), "curve")
+    answer = curve_explanation(explain_curve(problem), "curve")
     assert [effect.effect for effect in answer.missing] == ["x:poly2"]
     assert answer.suspect_data == ()
     assert "With all of it the model fits exactly" in answer.answer
@@ -97,9 +97,9 @@ def test_a_response_that_was_set_is_told() -> None:
     load = np.repeat(np.arange(6.0), 8)
     read = 3.0 * load + np.random.default_rng(4).normal(0.0, 0.1, 48)
     swapped = problem_of(curve({"y": load, "x": read}, "y ~ 1 + x"))
-    assert "exchange them" in curve_explain_answer(explain_curve(swapped), "curve").answer
+    assert "exchange them" in curve_explanation(explain_curve(swapped), "curve").answer
     right = problem_of(curve({"y": read, "x": load}, "y ~ 1 + x"))
-    assert "exchange them" not in curve_explain_answer(explain_curve(right), "curve").answer
+    assert "exchange them" not in curve_explanation(explain_curve(right), "curve").answer
 
 
 def written(folder: Path, rows: list[str], header: str = "when,y", keys: str = "") -> Path:

@@ -10,9 +10,13 @@ import pytest
 from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError, InputError
-from monitor.reporting.figures.drivers import predicted_against_measured, residual_against_driver
-from monitor.reporting.figures.models import error_falling, ranked_effects
-from monitor.reporting.figures.parameters import parameters_by_run
+from monitor.reporting.figures.drivers import (
+    DrivenResiduals,
+    predicted_against_measured,
+    residual_against_driver,
+)
+from monitor.reporting.figures.models import ErrorSteps, RankedEffects, error_falling, ranked_effects
+from monitor.reporting.figures.parameters import ParametersOfRuns, parameters_by_run
 from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import png, save, svg
 from monitor.reporting.palette import BLUE, INK, ORANGE
@@ -21,12 +25,9 @@ from monitor.reporting.palette import BLUE, INK, ORANGE
 def by_run() -> Figure:
     values = np.array([[1.0, 5.0], [1.1, 5.1], [9.0, np.nan], [9.1, 5.2]])
     return parameters_by_run(
-        [1, 2, 3, 4],
-        [1, 1, 2, 2],
-        ["EB0C", "EX0C"],
-        ["µrad", "µm"],
-        values,
-        np.full((4, 2), 0.3),
+        ParametersOfRuns(
+            [1, 2, 3, 4], [1, 1, 2, 2], ["EB0C", "EX0C"], ["µrad", "µm"], values, np.full((4, 2), 0.3)
+        ),
         title="EB0C jumped by 8 µrad",
         interval="U = 2.24 u",
         highlight=["EB0C"],
@@ -45,7 +46,9 @@ def vectors() -> Figure:
 
 
 def driver() -> Figure:
-    return residual_against_driver(np.arange(40.0), np.arange(40.0) % 5, title="T", driver_name="time / s")
+    return residual_against_driver(
+        DrivenResiduals(np.arange(40.0), np.arange(40.0) % 5), title="T", driver_name="time / s"
+    )
 
 
 def predicted() -> Figure:
@@ -53,14 +56,12 @@ def predicted() -> Figure:
 
 
 def falling() -> Figure:
-    return error_falling(["SAMBA", "EYX:poly2"], [3.0, 1.1], [3.2, np.nan], noise_um=1.0, title="T")
+    return error_falling(ErrorSteps(["SAMBA", "EYX:poly2"], [3.0, 1.1], [3.2, np.nan], 1.0), title="T")
 
 
 def ranked() -> Figure:
     return ranked_effects(
-        ["EAY:poly2", "EZC1:const@warmup", "EZY:poly2"],
-        [7.9, 28.3, 7.6],
-        [1, 2, 1],
+        RankedEffects(["EAY:poly2", "EZC1:const@warmup", "EZY:poly2"], [7.9, 28.3, 7.6], [1, 2, 1]),
         title="T",
         value_name="v",
         threshold=8.0,
@@ -126,7 +127,7 @@ def test_effects_are_ranked_with_their_group_and_bracketed() -> None:
 
 def test_steps_get_one_plus_and_break_before_their_driver() -> None:
     figure = error_falling(
-        ["SAMBA", "+ EXX:poly1@x_degC", "EYX:poly2"], [3, 2, 1], [3, 2, 1], noise_um=1, title="T"
+        ErrorSteps(["SAMBA", "+ EXX:poly1@x_degC", "EYX:poly2"], [3, 2, 1], [3, 2, 1], 1), title="T"
     )
     labels = [label.get_text() for label in figure.axes[0].get_xticklabels()]
     assert labels == ["SAMBA", "+\N{NO-BREAK SPACE}EXX:poly1\n@x_degC", "+\N{NO-BREAK SPACE}EYX:poly2"]
@@ -134,7 +135,9 @@ def test_steps_get_one_plus_and_break_before_their_driver() -> None:
 
 def test_driver_group_means_are_those_of_the_groups() -> None:
     figure = residual_against_driver(
-        [0.0, 0.0, 1.0, 1.0], [1.0, 3.0, 5.0, 7.0], title="T", driver_name="d", group=["a", "a", "b", "b"]
+        DrivenResiduals([0.0, 0.0, 1.0, 1.0], [1.0, 3.0, 5.0, 7.0], ["a", "a", "b", "b"]),
+        title="T",
+        driver_name="d",
     )
     line = next(line for line in figure.axes[0].lines if line.get_marker() == "o")
     np.testing.assert_allclose(line.get_ydata(), [2.0, 6.0])
@@ -154,7 +157,9 @@ def test_save_writes_what_the_ending_says(tmp_path: Path) -> None:
 
 def test_wrong_shapes_are_refused_in_words() -> None:
     with pytest.raises(DataError, match=r"estimate must have shape \(1, 1\), but has \(2, 1\)"):
-        parameters_by_run([1], [1], ["A"], ["µm"], [[1.0], [2.0]], [[1.0]], title="T", interval="U")
+        parameters_by_run(
+            ParametersOfRuns([1], [1], ["A"], ["µm"], [[1.0], [2.0]], [[1.0]]), title="T", interval="U"
+        )
     with pytest.raises(DataError, match=r"the RMS by run must have shape \(2,\), but has \(1,\)"):
         residual_bars({"run": (["1", "2"], [1.0])})
     with pytest.raises(DataError, match="groups is empty"):
@@ -162,10 +167,10 @@ def test_wrong_shapes_are_refused_in_words() -> None:
     with pytest.raises(DataError, match=r"must have one shape \(n, 3\), but have \(2, 2\) and \(2, 3\)"):
         residual_vectors(np.zeros((2, 2)), np.zeros((2, 3)), title="T")
     with pytest.raises(DataError, match=r"driver and residual_um must have one shape \(n,\)"):
-        residual_against_driver([1.0], [1.0, 2.0], title="T", driver_name="d")
+        residual_against_driver(DrivenResiduals([1.0], [1.0, 2.0]), title="T", driver_name="d")
     with pytest.raises(DataError, match=r"predicted_um and measured_um must have one shape \(n,\)"):
         predicted_against_measured([], [], title="T")
     with pytest.raises(DataError, match=r"2 steps need rms_um and heldout_rms_um of shape \(2,\)"):
-        error_falling(["a", "b"], [1.0], [1.0], noise_um=1.0, title="T")
+        error_falling(ErrorSteps(["a", "b"], [1.0], [1.0], 1.0), title="T")
     with pytest.raises(DataError, match="1 effects need as many values and groups"):
-        ranked_effects(["a"], [1.0, 2.0], [1], title="T", value_name="v")
+        ranked_effects(RankedEffects(["a"], [1.0, 2.0], [1]), title="T", value_name="v")

@@ -79,7 +79,7 @@ def test_backtest_covers_and_sees_a_change_that_no_drift_foretold():
     for _ in range(60):
         y, t, day = history(rng, days=14)
         result = backtest(y, t, days=day, first=6)
-        made, covered = made + result.made, covered + result.covered
+        made, covered = made + result.forecasts, covered + result.covered
     assert made == 60 * 8
     assert 0.93 < covered / made <= 1.0  # conservative with few days, see predict
     y, t, day = history(rng, days=14)
@@ -107,7 +107,7 @@ def test_backtest_of_all_days_at_once_is_that_of_each_day_by_itself(repeats, wei
         z.append(errors[-1] / spread)
         inside += abs(z[-1]) <= stats.t.isf(0.025, line.dof)
     found = backtest(y, t, u=u, days=day, first=5, ahead=2)
-    assert (found.made, found.covered) == (14, inside)
+    assert (found.forecasts, found.covered) == (14, inside)
     np.testing.assert_allclose(found.z, z, rtol=1e-8, atol=1e-9)
     assert found.bias == pytest.approx(np.mean(errors), rel=1e-8)
     assert found.rms == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=1e-8)

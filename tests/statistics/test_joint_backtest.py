@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.statistics import backtest_longest, trend
+from monitor.statistics import ErrorVectors, JointSeries, backtest_longest, trend
 
 DAYS, RUNS = 24, 2
 DAY = np.repeat(np.arange(DAYS), RUNS)
@@ -26,7 +26,12 @@ def backtested(values, sensitivity, rng, **options):
         return trend(values[keep, column], TIMES[keep], days=DAY[keep])
 
     return backtest_longest(
-        values, TIMES, DAY, fit, sensitivity, np.zeros((len(sensitivity), 3)), rng=rng, draws=500, **options
+        JointSeries(values, TIMES, DAY),
+        fit,
+        ErrorVectors(sensitivity, np.zeros((len(sensitivity), 3))),
+        rng=rng,
+        draws=500,
+        **options,
     )
 
 
@@ -36,7 +41,7 @@ def test_share_of_held_out_days_in_their_interval_over_many_histories(rate_agree
     misses = []
     for _ in range(40):
         found = backtested(history(rng), rng.normal(size=(5, 3, 3)), rng, foretold=4)
-        made, inside = made + found.made, inside + found.covered
+        made, inside = made + found.forecasts, inside + found.covered
         misses.append(found.bias)
     assert made == 160
     assert rate_agrees(inside, made, 0.95), inside / made
@@ -56,7 +61,7 @@ def test_one_parameter_is_foretold_as_by_its_own_line():
     values = history(rng)[:, :1]
     found = backtested(values, np.array([[[1.0], [0.0], [0.0]]]), rng, foretold=100)
     # The days before the sixth are too few; every later one is foretold.
-    assert found.made == DAYS - 5
+    assert found.forecasts == DAYS - 5
     assert found.at.tolist() == TIMES[::RUNS][5:].tolist()
     misses = []
     for at in found.at:

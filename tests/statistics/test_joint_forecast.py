@@ -7,7 +7,15 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import DataError
-from monitor.statistics import forecast, forecast_longest, residual_correlation, trend
+from monitor.statistics import (
+    ErrorVectors,
+    JointLines,
+    LengthQuestion,
+    forecast,
+    forecast_longest,
+    residual_correlation,
+    trend,
+)
 from monitor.statistics.joint_forecast import _chi_square
 
 WEEKS = np.arange(30) * 7.0
@@ -31,8 +39,8 @@ def test_one_parameter_along_one_axis_agrees_with_its_own_forecast():
     checks = [now + 100.0, now + 250.0, now + 400.0]
     own = forecast(lines[0], (-20.0, 20.0), now, checks, horizon=horizon)
     found = forecast_longest(
-        lines, np.eye(1), np.array([[[1.0], [0.0], [0.0]]]), np.zeros((1, 3)), 20.0, now, checks,
-        rng=rng, horizon=horizon, draws=20_000,
+        JointLines(lines, np.eye(1)), ErrorVectors(np.array([[[1.0], [0.0], [0.0]]]), np.zeros((1, 3))),
+        LengthQuestion(20.0, now, checks, horizon), rng=rng, draws=20_000,
     )  # fmt: skip
     assert found.probability == pytest.approx(own.probability, abs=0.012)
     assert found.crossing.at == pytest.approx(own.crossing.at, abs=1.0)
@@ -57,8 +65,8 @@ def test_prediction_interval_of_the_longest_vector_covers_the_next_run(rate_agre
         truth = level + slope * at + root @ rng.normal(size=3)
         length = np.linalg.norm(sensitivity @ truth, axis=1).max()
         found = forecast_longest(
-            lines, correlation, sensitivity, np.zeros((4, 3)), 50.0, float(WEEKS[-1]), [at], rng=rng,
-            horizon=at + 1.0, draws=200,
+            JointLines(lines, correlation), ErrorVectors(sensitivity, np.zeros((4, 3))),
+            LengthQuestion(50.0, float(WEEKS[-1]), [at], at + 1.0), rng=rng, draws=200,
         )  # fmt: skip
         inside += found.interval[0, 0] <= length <= found.interval[0, 1]
     assert rate_agrees(inside, trials, 0.95), inside / trials
@@ -74,8 +82,8 @@ def test_correlation_decides_whether_parameters_make_up_for_each_other():
 
     def spread(correlation):
         found = forecast_longest(
-            lines, correlation, mean, np.zeros((1, 3)), 30.0, now, [now + 7.0],
-            rng=np.random.default_rng(4), horizon=now + 700.0,
+            JointLines(lines, correlation), ErrorVectors(mean, np.zeros((1, 3))),
+            LengthQuestion(30.0, now, [now + 7.0], now + 700.0), rng=np.random.default_rng(4),
         )  # fmt: skip
         return float(np.ptp(found.interval[0]))
 
@@ -97,15 +105,12 @@ def test_few_days_say_nothing_of_correlations_and_noise_is_shrunk():
 
 
 def test_refusals_say_what_is_needed():
-    lines = lines_of(np.random.default_rng(6).normal(size=(30, 1)))
-    one = (lines, np.eye(1), np.ones((1, 3, 1)), np.zeros((1, 3)))
-    rng = np.random.default_rng(1)
     with pytest.raises(DataError, match=r"limit is 0\.0; the longest vector needs a limit above zero"):
-        forecast_longest(*one, 0.0, 210.0, [], rng=rng, horizon=300.0)
+        LengthQuestion(0.0, 210.0, [], 300.0)
     with pytest.raises(DataError, match=r"checks holds 10\.0; a planned check cannot lie before now, 210"):
-        forecast_longest(*one, 1.0, 210.0, [10.0], rng=rng, horizon=300.0)
+        LengthQuestion(1.0, 210.0, [10.0], 300.0)
     with pytest.raises(DataError, match=r"horizon is 100\.0; it must lie after now, 210"):
-        forecast_longest(*one, 1.0, 210.0, [], rng=rng, horizon=100.0)
+        LengthQuestion(1.0, 210.0, [], 100.0)
 
 
 def test_chi_square_between_its_points_is_that_of_scipy():

@@ -222,13 +222,13 @@ def test_unknown_campaign_lists_what_is_there(db: Database, make_campaign: Make)
 
 def test_views_show_units_and_the_shops_clock(db: Database, campaign: Campaign) -> None:
     import_campaign(db, campaign)
-    (row,) = list_campaigns(db).to_dict("records")
-    assert (row["runs"], row["probings"], row["days"]) == (2, 6, 2)
-    assert (row["probe_u_um"], row["scale_bar_mm"]) == (1.0, 304.98923)
+    (row,) = list_campaigns(db)
+    assert (row.runs, row.probings, row.days) == (2, 6, 2)
+    assert (row.probe_u_um, row.scale_bar_mm) == (1.0, 304.98923)
     assert db.rows("SELECT CAST(started_at_local AS VARCHAR), ambient_degc FROM v_runs WHERE run = 2") == [
         ("2026-03-02 08:37:06.421766", 22.08)
     ]
-    assert list(list_runs(db, campaign.name)["run"]) == [2, 1]
+    assert [row.run for row in list_runs(db, campaign.name)] == [2, 1]
     assert db.rows("SELECT parameter, tolerance FROM v_tolerances ORDER BY ALL") == [
         ("EC0Y", 20.0),
         ("EXX", 0.1),

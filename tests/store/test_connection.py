@@ -150,7 +150,7 @@ def test_threads_share_a_database_as_if_one_after_the_other(
     with ThreadPoolExecutor(4) as pool:
         states = list(pool.map(lambda name: import_campaign(db, make_campaign(name)).state, names * 2))
     assert (states.count("imported"), states.count("unchanged")) == (12, 12)
-    assert sorted(list_campaigns(db)["campaign"]) == sorted(names)
+    assert sorted(row.campaign for row in list_campaigns(db)) == sorted(names)
     assert verify_audit(db).faults == ()
 
 

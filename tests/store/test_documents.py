@@ -67,7 +67,7 @@ def test_event_is_kept_with_the_shops_clock(db: Database, campaign: Campaign) ->
     at = datetime(2026, 3, 5, 23, 30, tzinfo=timezone(timedelta(hours=-5)))
     later = record_event(db, campaign.machine.id, at, "repair", "B zero reset; it's fine")
     first = record_event(db, campaign.machine.id, at - timedelta(days=1), "crash", "")
-    assert list(list_events(db, campaign.machine.id)["event_id"]) == [first, later]
+    assert [event.event_id for event in list_events(db, campaign.machine.id)] == [first, later]
     assert db.rows(
         "SELECT CAST(happened_at AS VARCHAR), CAST(happened_at_local AS VARCHAR), kind, description "
         "FROM v_events WHERE event_id = ?",

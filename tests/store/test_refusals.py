@@ -10,7 +10,7 @@ import pytest
 
 from monitor.exceptions import CampaignError, InputError
 from monitor.store import Database, record_refusal, refusals, verify_audit
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MONDAY = datetime.fromisoformat("2026-03-02T23:30:00-05:00")
@@ -30,7 +30,7 @@ def test_a_refused_folder_is_recorded_and_settled_when_it_is_imported_well(
     db: Database, spoilt: Path
 ) -> None:
     with pytest.raises(CampaignError, match="ninety"):
-        import_folders(db, [spoilt])
+        import_folders(db, ImportRequest([spoilt]))
     (one,) = refusals(db)
     assert (one.folder, one.campaign, one.machine) == (str(spoilt), "cold-cold", "HU40-T")
     assert one.fault_count == 1
@@ -39,7 +39,7 @@ def test_a_refused_folder_is_recorded_and_settled_when_it_is_imported_well(
     assert db.rows("SELECT count(*) FROM campaign") == [(0,)]
     assert verify_audit(db).ok
     shutil.copyfile(EXAMPLES / "cold-cold" / "probings.csv", spoilt / "probings.csv")
-    import_folders(db, [spoilt])
+    import_folders(db, ImportRequest([spoilt]))
     (one,) = refusals(db)
     assert one.imported_as == "cold-cold"
     assert one.cleared_at is not None
@@ -50,10 +50,10 @@ def test_a_refused_folder_is_recorded_and_settled_when_it_is_imported_well(
 
 def test_a_campaign_that_comes_from_another_folder_settles_it_too(db: Database, spoilt: Path) -> None:
     with pytest.raises(InputError, match="was refused, nothing of it was kept"):
-        import_folders(db, [spoilt])
-    import_folders(db, [EXAMPLES / "five-days"])
+        import_folders(db, ImportRequest([spoilt]))
+    import_folders(db, ImportRequest([EXAMPLES / "five-days"]))
     assert refusals(db)[0].cleared_at is None
-    import_folders(db, [EXAMPLES / "cold-cold"])
+    import_folders(db, ImportRequest([EXAMPLES / "cold-cold"]))
     assert refusals(db)[0].imported_as == "cold-cold"
 
 
@@ -64,7 +64,7 @@ def test_folders_that_tell_no_names_are_recorded_by_their_path(db: Database, tmp
     bytes_in_the_name = Path(str(tmp_path) + "/caf\udce9")
     for folder in (missing, empty, file, bytes_in_the_name):
         with pytest.raises(CampaignError, match="was refused"):
-            import_folders(db, [folder])
+            import_folders(db, ImportRequest([folder]))
     found = refusals(db)
     assert [one.folder for one in found[:3]] == [str(missing), str(empty), str(file)]
     assert found[3].folder.endswith("caf\\udce9")
@@ -73,7 +73,7 @@ def test_folders_that_tell_no_names_are_recorded_by_their_path(db: Database, tmp
 
 def test_what_is_imported_before_the_refused_folder_stays(db: Database, spoilt: Path) -> None:
     with pytest.raises(InputError, match="In the database before it was met: five-days"):
-        import_folders(db, [EXAMPLES / "five-days", spoilt])
+        import_folders(db, ImportRequest([EXAMPLES / "five-days", spoilt]))
     assert db.rows("SELECT campaign FROM campaign") == [("five-days",)]
     assert len(refusals(db)) == 1
 

@@ -62,7 +62,7 @@ def test_a_withdrawn_campaign_counts_nowhere(
     assert (done.campaign, done.machine, done.reason, done.certificates) == (
         "one", machine, "wrong file", ("C-1",),
     )  # fmt: skip
-    assert list(list_campaigns(filled)["campaign"]) == ["two"]
+    assert [row.campaign for row in list_campaigns(filled)] == ["two"]
     assert set(machine_history(filled, machine).campaign) == {"two"}
     campaigns = machine_history(filled, machine).campaigns
     assert latest_documents(filled, "uncertainty", campaigns) == {"two": {"of": "two"}}
@@ -74,7 +74,7 @@ def test_a_withdrawn_campaign_counts_nowhere(
         NotFoundError, match=r"there is no campaign 'one'; it was withdrawn on .* \(wrong file\)"
     ):
         load_campaign(filled, "one")
-    assert list(list_withdrawn(filled)["reason"]) == ["wrong file"]
+    assert [row.reason for row in list_withdrawn(filled)] == ["wrong file"]
 
 
 def test_nothing_of_it_is_deleted_and_the_audit_knows(filled: Database) -> None:
@@ -202,7 +202,7 @@ def test_a_reason_is_needed_and_a_campaign_that_is_there(filled: Database) -> No
         withdraw_campaign(filled, "one", "  ")
     with pytest.raises(NotFoundError, match="there is no campaign 'three'; there are one, two"):
         withdraw_campaign(filled, "three", "wrong")
-    assert list(list_withdrawn(filled)["campaign"]) == []
+    assert [row.campaign for row in list_withdrawn(filled)] == []
 
 
 def test_backup_and_export_hold_the_withdrawn_too(
@@ -214,8 +214,8 @@ def test_backup_and_export_hold_the_withdrawn_too(
     restore(tmp_path / "copy.duckdb", tmp_path / "back.duckdb")
     with Database(tmp_path / "back.duckdb") as back:
         assert verify_audit(back).faults == ()
-        assert list(list_campaigns(back)["campaign"]) == ["two", "one"]
-        assert list(list_withdrawn(back)["campaign"]) == ["one"]
+        assert [row.campaign for row in list_campaigns(back)] == ["two", "one"]
+        assert [row.campaign for row in list_withdrawn(back)] == ["one"]
     written = {path.name for path in export_tables(filled, tmp_path / "tables")}
     assert {
         "imported_campaign.csv",

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from monitor.store import Database
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CAMPAIGNS = ("five-days", "cold-cold", "hidden-reversal-x")
@@ -28,7 +28,7 @@ def clock() -> Iterator[None]:
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("workflow") / "filled.duckdb"
     with Database(path) as db:
-        import_folders(db, [EXAMPLES / name for name in CAMPAIGNS])
+        import_folders(db, ImportRequest([EXAMPLES / name for name in CAMPAIGNS]))
     return path
 
 

@@ -14,7 +14,7 @@ from monitor.store import Database
 from monitor.workflow.certificate.files import prepared, why_not
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -23,7 +23,7 @@ DAY = date(2026, 3, 12)
 
 def test_the_run_may_be_left_out_where_there_is_one_only(tmp_path: Path) -> None:
     with Database(tmp_path / "c.duckdb") as db:
-        import_folders(db, [EXAMPLES / "tilting-table-compensated", EXAMPLES / "five-days"])
+        import_folders(db, ImportRequest([EXAMPLES / "tilting-table-compensated", EXAMPLES / "five-days"]))
         made = issue(
             db,
             CertificateRequest(

@@ -13,7 +13,8 @@ from monitor.exceptions import CampaignError
 from monitor.methods.samba.virtual import virtual_campaign
 from monitor.readers import write_campaign
 from monitor.store import Database, list_campaigns
-from monitor.workflow.intake.campaigns import campaigns, import_folders, runs
+from monitor.workflow.intake.campaigns import RunsRequest, campaigns, runs
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -35,9 +36,9 @@ def test_a_copied_run_is_refused_in_words(tmp_path: Path) -> None:
         Database(":memory:") as db,
         pytest.raises(CampaignError, match=r"runs 2 and 5 are equal in every reading of their \d+ probings"),
     ):
-        import_folders(db, [folder])
+        import_folders(db, ImportRequest([folder]))
     with Database(":memory:") as db:
-        import_folders(db, [EXAMPLES / "cold-cold"])
+        import_folders(db, ImportRequest([EXAMPLES / "cold-cold"]))
         assert len(list_campaigns(db)) == 1
 
 
@@ -45,7 +46,7 @@ def test_the_refusal_is_recorded(tmp_path: Path) -> None:
     folder = with_a_copy(tmp_path / "cold-cold", 2, 5)
     with Database(":memory:") as db:
         with pytest.raises(CampaignError, match=r"remove the copies here and from runs\.csv"):
-            import_folders(db, [folder])
+            import_folders(db, ImportRequest([folder]))
         assert db.rows("SELECT campaign, fault_count FROM v_refused_imports") == [("cold-cold", 1)]
 
 
@@ -53,12 +54,10 @@ def test_runs_without_noise_are_equal_by_right(tmp_path: Path) -> None:
     exact = virtual_campaign("exact", np.random.default_rng(1), noise=0.0)
     write_campaign(exact, tmp_path / "exact")
     with Database(":memory:") as db:
-        (found,) = import_folders(db, [tmp_path / "exact"])["imported"]
-        assert found["state"] == "imported"
-        assert len(found["notes"]) == 1
-        assert (
-            "simulated without noise they count as runs, but their scatter means nothing" in found["notes"][0]
-        )
+        (found,) = import_folders(db, ImportRequest([tmp_path / "exact"])).imported
+        assert found.state == "imported"
+        assert len(found.notes) == 1
+        assert "simulated without noise they count as runs, but their scatter means nothing" in found.notes[0]
 
 
 def test_a_campaign_that_came_in_under_another_name_is_told(tmp_path: Path) -> None:
@@ -69,8 +68,10 @@ def test_a_campaign_that_came_in_under_another_name_is_told(tmp_path: Path) -> N
         encoding="utf-8",
     )
     with Database(":memory:") as db:
-        first, second = import_folders(db, [EXAMPLES / "cold-cold", tmp_path / "again"])["imported"]
-        assert first["notes"] == []
-        assert "runs of again equal those of campaign cold-cold in every reading" in second["notes"][0]
-        assert runs(db, "again")["notes"] == second["notes"]
-        assert campaigns(db)["withdrawn"] == []
+        first, second = import_folders(
+            db, ImportRequest([EXAMPLES / "cold-cold", tmp_path / "again"])
+        ).imported
+        assert first.notes == ()
+        assert "runs of again equal those of campaign cold-cold in every reading" in second.notes[0]
+        assert runs(db, RunsRequest("again")).notes == second.notes
+        assert campaigns(db).withdrawn == ()

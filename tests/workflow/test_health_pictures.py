@@ -21,7 +21,7 @@ from monitor.reporting.health.records import MachineHealth
 from monitor.store import Database, import_campaign, record_refusal, refusals
 from monitor.workflow.health.machine import Settings
 from monitor.workflow.health.report import report, stored_health
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import add_effect
 from monitor.workflow.model.request import AddEffectRequest
 
@@ -215,10 +215,10 @@ def test_a_refusal_that_was_settled_is_marked_and_no_longer_news(tmp_path: Path)
     with Database(tmp_path / "one.duckdb", threads=1) as db:
         (folder / "runs.csv").write_bytes(good.replace(b"true", b"perhaps").replace(b"false", b"perhaps"))
         with pytest.raises(CampaignError, match="perhaps"):
-            import_folders(db, [folder])
+            import_folders(db, ImportRequest([folder]))
         (refused,) = refusals(db)
         (folder / "runs.csv").write_bytes(good)
-        import_folders(db, [folder])
+        import_folders(db, ImportRequest([folder]))
         week = f"{refused.at.isocalendar().year}-W{refused.at.isocalendar().week:02d}"
         found = report(db, week, out=tmp_path, made_at=refused.at.replace(tzinfo=UTC))
         assert "refused" not in found["machines"][0]["changed"]

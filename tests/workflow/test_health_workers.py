@@ -17,7 +17,7 @@ import pytest
 from monitor.exceptions import InputError
 from monitor.store import Database, verify_audit
 from monitor.workflow.health.report import report
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MADE = datetime.fromisoformat("2026-03-09T06:00:00+00:00")
@@ -35,7 +35,7 @@ def fleet(tmp_path: Path) -> Path:
             file = folder / "campaign.toml"
             text = re.sub('campaign = ".*?"', f'campaign = "{example}"', file.read_text("utf-8"), count=1)
             file.write_text(text.replace('id = "HU40-T"', f'id = "on {example}"', 1), "utf-8")
-            import_folders(db, [folder])
+            import_folders(db, ImportRequest([folder]))
     return path
 
 

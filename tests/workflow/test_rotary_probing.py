@@ -16,12 +16,12 @@ from by_path import load
 
 from monitor.discovery import Verdict
 from monitor.store import Database
-from monitor.workflow import keeping
+from monitor.workflow.events import EventRequest, event
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
-from monitor.workflow.intake import campaigns
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.trend.trends import trends
@@ -40,7 +40,7 @@ COMPENSATED = {"EX0A", "EY0A", "EZ0A", "EA0C"}
 def db(tmp_path_factory):
     with Database(tmp_path_factory.mktemp("rotary") / "x.duckdb") as own:
         for name in ("tilting-table", "tilting-table-compensated"):
-            campaigns.import_folders(own, [ROOT / "examples" / name])
+            import_folders(own, ImportRequest([ROOT / "examples" / name]))
         yield own
 
 
@@ -59,7 +59,7 @@ def test_table_4_only_the_z_offset_drifts(db):
 
 def test_table_4_compensation_moves_what_was_compensated(db):
     noon = datetime(2012, 3, 5, 12, 0, tzinfo=timezone(timedelta(hours=9)))
-    keeping.record(db, "TILT-500", noon, "compensation", "dx, dy, dz and the zero of A")
+    event(db, EventRequest("TILT-500", "dx, dy, dz and the zero of A", noon, "compensation"))
     (pair,) = trends(db, "TILT-500").document["agreement"]
     assert pair["kind"] == "event"
     assert pair["campaigns"] == ["tilting-table", "tilting-table-compensated"]
@@ -109,7 +109,7 @@ def both_methods(simulator: ModuleType, folder: Path, rotary: dict[str, float]) 
         first=datetime(2026, 3, 9, 9, 0, tzinfo=UTC),
     )  # fmt: skip
     own = Database(folder / "two.duckdb")
-    campaigns.import_folders(own, [folder / "s", folder / "r"])
+    import_folders(own, ImportRequest([folder / "s", folder / "r"]))
     return own
 
 

@@ -18,7 +18,7 @@ from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.trend.trends import Choice, trends
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import UncertaintyRequest
@@ -39,7 +39,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("volumetric") / "m.duckdb"
     rng = np.random.default_rng(3)
     with Database(place) as db:
-        import_folders(db, [EXAMPLES / "cold-cold"])
+        import_folders(db, ImportRequest([EXAMPLES / "cold-cold"]))
         identify(db, IdentifyRequest("cold-cold"))
         ((machine, topology_of, start),) = db.rows(
             "SELECT machine, machine_description, min(started_at) FROM campaign JOIN run USING (campaign_id) "

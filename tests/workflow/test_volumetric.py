@@ -8,7 +8,7 @@ from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
 from monitor.methods.samba.virtual import virtual_campaign
 from monitor.store import Database
-from monitor.workflow.intake.campaigns import import_folders
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import add_effect
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.simulation import SimulateRequest, simulate
@@ -61,7 +61,7 @@ def database(tmp_path_factory):
     folder = tmp_path_factory.mktemp("volumetric")
     simulate(SimulateRequest(folder / "hidden", "EBB:harmonic2", 8.0, 1.0, 3))
     with Database(folder / "map.duckdb") as db:
-        import_folders(db, [folder / "hidden"])
+        import_folders(db, ImportRequest([folder / "hidden"]))
         add_effect(db, AddEffectRequest("EBB:harmonic2", "samba", "with-b"))
         yield db
 

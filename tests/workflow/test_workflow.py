@@ -12,7 +12,8 @@ from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import ChainMethod, methods
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.store import Database, load_campaign, load_identification
-from monitor.workflow import keeping
+from monitor.workflow import events
+from monitor.workflow.events import EventRequest, EventsRequest
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
@@ -20,6 +21,7 @@ from monitor.workflow.explain.versions import latest_campaign
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake import campaigns
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import add_effect, version_with
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.model.show import list_all_models
@@ -84,8 +86,8 @@ def test_coordinates_only_where_all_runs_follow_one_plan(db: Database) -> None:
 def test_import_of_several_folders_names_what_came_before_a_refusal(tmp_path: Path) -> None:
     with Database(tmp_path / "x.duckdb") as own:
         with pytest.raises(InputError, match="In the database before it was met: cold-cold"):
-            campaigns.import_folders(own, [EXAMPLES / "cold-cold", tmp_path / "nope"])
-        assert campaigns.chosen(own, None) == ["cold-cold"]
+            import_folders(own, ImportRequest([EXAMPLES / "cold-cold", tmp_path / "nope"]))
+        assert campaigns.selected_campaigns(own, None) == ["cold-cold"]
 
 
 def test_no_campaign_yet(tmp_path: Path) -> None:
@@ -93,7 +95,7 @@ def test_no_campaign_yet(tmp_path: Path) -> None:
         Database(tmp_path / "x.duckdb") as own,
         pytest.raises(NotFoundError, match="no campaign yet; type `monitor import FOLDER`"),
     ):
-        campaigns.chosen(own, None)
+        campaigns.selected_campaigns(own, None)
 
 
 def test_a_base_effect_is_not_added(db: Database) -> None:
@@ -133,10 +135,10 @@ def test_inputs_come_from_the_repeated_runs_where_there_are_enough(db: Database)
 def test_events_need_words_and_a_machine(db: Database) -> None:
     at = datetime.fromisoformat("2026-03-05T07:00:00-05:00")
     with pytest.raises(InputError, match="say in words what happened"):
-        keeping.record(db, "HU40-T", at, "note", " ")
+        events.record(db, EventRequest("HU40-T", at, "note", " "))
     with pytest.raises(NotFoundError, match="there is no machine 'NOPE'; there are HU40-T"):
-        keeping.events(db, "NOPE")
-    assert keeping.events(db)["events"] == []
+        events.events(db, EventsRequest("NOPE"))
+    assert events.events(db, EventsRequest()).events == ()
 
 
 def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: Path) -> None:

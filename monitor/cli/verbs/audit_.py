@@ -19,9 +19,9 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        found = keeping.audit(db, options.last)
+        answer = keeping.audit(db, keeping.AuditRequest(options.last))
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        output.listing(found["entries"], "nothing was written yet")
+        output.listing(answer.entries, "nothing was written yet")
     return 0

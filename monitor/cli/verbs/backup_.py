@@ -20,9 +20,9 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("copying"):
-        found = keeping.backup(db, options.target)
+        answer = keeping.backup(db, keeping.BackupRequest(options.target))
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        output.say(found["message"])
+        output.say(answer.message)
     return 0

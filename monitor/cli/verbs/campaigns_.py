@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from datetime import datetime
 
 from monitor.cli import output
 from monitor.cli.database import opened
@@ -18,13 +19,27 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        found = campaigns.campaigns(db)
+        answer = campaigns.campaigns(db)
     if options.json:
-        output.document(found)
-    else:
-        shown = ("campaign", "machine", "method", "runs", "days", "first_run_at", "last_run_at")
-        rows = [{**one, **{key: str(one[key])[:10] for key in shown[-2:]}} for one in found["campaigns"]]
-        output.listing(rows, "no campaign yet; type `monitor import FOLDER`", shown)
-        for one in found["withdrawn"]:
-            output.say(f"withdrawn on {one['withdrawn_at'][:10]}: {one['campaign']} ({one['reason']})")
+        output.document(answer)
+        return 0
+    rows = [
+        {
+            "campaign": row.campaign,
+            "machine": row.machine,
+            "method": row.method,
+            "runs": row.runs if row.rows is None else f"{row.rows} rows",
+            "days": row.days,
+            "first_run_at": _day(row.first_run_at),
+            "last_run_at": _day(row.last_run_at),
+        }
+        for row in answer.campaigns
+    ]
+    output.listing(rows, "no campaign yet; type `monitor import FOLDER`")
+    for campaign in answer.withdrawn:
+        output.say(f"withdrawn on {campaign.withdrawn_at:%Y-%m-%d}: {campaign.campaign} ({campaign.reason})")
     return 0
+
+
+def _day(moment: datetime | None) -> str:
+    return "" if moment is None else f"{moment:%Y-%m-%d}"

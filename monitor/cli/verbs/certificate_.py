@@ -9,7 +9,7 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
-from monitor.cli.parser import common, told
+from monitor.cli.parser import common, described
 from monitor.documents import to_document
 from monitor.exceptions import InputError
 from monitor.workflow.certificate.answer import (
@@ -42,7 +42,7 @@ EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/la
 
 def options(parser: ArgumentParser) -> None:
     verbs = parser.add_subparsers(dest="what", metavar="issue|show|verify|amend|withdraw", required=True)
-    issued = verbs.add_parser("issue", **told("a certificate for one run", EXAMPLE))
+    issued = verbs.add_parser("issue", **described("a certificate for one run", EXAMPLE))
     issued.add_argument("campaign", metavar="CAMPAIGN")
     issued.add_argument(
         "--run", type=int, metavar="N", dest="number_of_run",
@@ -55,7 +55,9 @@ def options(parser: ArgumentParser) -> None:
     )
     issued.add_argument("--reason", default="", help="why it is replaced")
     issued.set_defaults(run=_issue)
-    shown = verbs.add_parser("show", **told("one certificate, or all", "monitor certificate show 2026-0001"))
+    shown = verbs.add_parser(
+        "show", **described("one certificate, or all", "monitor certificate show 2026-0001")
+    )
     shown.add_argument("number", nargs="?", metavar="NUMBER")
     shown.add_argument(
         "--remake", type=Path, metavar="PATH",
@@ -74,7 +76,7 @@ def options(parser: ArgumentParser) -> None:
     shown.set_defaults(run=_show)
     verified = verbs.add_parser(
         "verify",
-        **told(
+        **described(
             "is a file an unaltered certificate of this database?",
             "monitor certificate verify certificate-2026-0001.pdf",
         ),
@@ -86,7 +88,7 @@ def options(parser: ArgumentParser) -> None:
     verified.set_defaults(run=_verify)
     amended = verbs.add_parser(
         "amend",
-        **told(
+        **described(
             "a new certificate that replaces another and says so; the old one is marked",
             "monitor certificate amend 2026-0001 --laboratory laboratory.toml --reason 'wrong customer'",
         ),
@@ -101,7 +103,9 @@ def options(parser: ArgumentParser) -> None:
     amended.set_defaults(run=_amend)
     withdrawn = verbs.add_parser(
         "withdraw",
-        **told("mark as withdrawn", "monitor certificate withdraw 2026-0001 --reason 'the bar was damaged'"),
+        **described(
+            "mark as withdrawn", "monitor certificate withdraw 2026-0001 --reason 'the bar was damaged'"
+        ),
     )
     withdrawn.add_argument("number", metavar="NUMBER")
     withdrawn.add_argument("--reason", required=True)

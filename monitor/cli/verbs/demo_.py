@@ -29,6 +29,8 @@ from monitor.workflow.demo import (
     MAIN,
     RUN,
     WEEK,
+    DemoAnswer,
+    DemoStep,
     examples_folder,
     fresh_database,
 )
@@ -46,9 +48,31 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     folder = examples_folder()
     database = fresh_database(options.out)
-    figures = options.out / "figures"
-    steps: list[tuple[str, ModuleType, list[str]]] = [
-        ("import the campaigns", import_, [str(folder / name) for name in EXAMPLES]),
+    steps = []
+    for text, verb, arguments in _steps(folder, options.out):
+        name = verb.__name__.rpartition(".")[2].rstrip("_")
+        if not options.json:
+            command = " ".join(_quoted(part) for part in ("--db", str(database), name, *arguments))
+            output.say(f"\n# {text}\n$ monitor {command}")
+        status = _call(verb, name, str(database), arguments, options.json)
+        if status != 0:
+            raise InputError(f"the step '{text}' ended with status {status}")
+        steps.append(DemoStep(text, name, tuple(arguments)))
+    files = sorted(str(path) for path in options.out.rglob("*") if path.is_file() and path.suffix != ".svg")
+    if options.json:
+        output.document(DemoAnswer(options.out, tuple(steps), tuple(files)))
+    else:
+        output.say(f"\n{options.out} now holds:")
+        for file in files:
+            output.say(f"  {file}")
+    return 0
+
+
+def _steps(examples: Path, out: Path) -> list[tuple[str, ModuleType, list[str]]]:
+    """Return what each step is, its verb, and the arguments of the verb."""
+    figures = out / "figures"
+    return [
+        ("import the campaigns", import_, [str(examples / name) for name in EXAMPLES]),
         ("identify the geometric errors of every run", identify_, [MAIN]),
         ("what the days differ in", stats_, [MAIN, "--figures", str(figures / MAIN)]),
         ("uncertainty of all thirteen together", uncertainty_, [MAIN, "--run", str(RUN), "--method", "both"]),
@@ -67,33 +91,15 @@ def run(options: Namespace) -> int:
         (
             "a calibration certificate",
             certificate_,
-            ["issue", MAIN, "--run", str(RUN), "--laboratory", str(folder / "laboratory.toml"),
-             "--out", str(options.out)],
+            ["issue", MAIN, "--run", str(RUN), "--laboratory", str(examples / "laboratory.toml"),
+             "--out", str(out)],
         ),
         (
             "the weekly health report",
             report_,
-            ["--week", WEEK, "--campaign", MAIN, "--out", str(options.out)],
+            ["--week", WEEK, "--campaign", MAIN, "--out", str(out)],
         ),
     ]  # fmt: skip
-    done = []
-    for words, verb, arguments in steps:
-        name = verb.__name__.rpartition(".")[2].rstrip("_")
-        if not options.json:
-            command = " ".join(_quoted(part) for part in ("--db", str(database), name, *arguments))
-            output.say(f"\n# {words}\n$ monitor {command}")
-        status = _call(verb, name, str(database), arguments, options.json)
-        if status != 0:
-            raise InputError(f"the step '{words}' ended with status {status}")
-        done.append({"step": words, "verb": name, "arguments": arguments})
-    files = sorted(str(path) for path in options.out.rglob("*") if path.is_file() and path.suffix != ".svg")
-    if options.json:
-        output.document({"out": str(options.out), "steps": done, "files": files})
-    else:
-        output.say(f"\n{options.out} now holds:")
-        for file in files:
-            output.say(f"  {file}")
-    return 0
 
 
 def _quoted(text: str) -> str:
@@ -104,7 +110,7 @@ def _call(verb: ModuleType, name: str, database: str, arguments: list[str], sile
     """Run a verb as a user would type it."""
     parser = Parser(prog=f"monitor {name}")
     verb.options(parser)
-    found = parser.parse_args(arguments, Namespace(db=database))
-    function = getattr(found, "run", None) or verb.run
+    options = parser.parse_args(arguments, Namespace(db=database))
+    function = getattr(options, "run", None) or verb.run
     with contextlib.redirect_stdout(io.StringIO()) if silent else contextlib.nullcontext():
-        return int(function(found))
+        return int(function(options))

@@ -16,15 +16,17 @@ EXAMPLE = "monitor export tables --format csv"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("folder", type=Path, metavar="DIR")
-    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", dest="format_")
+    parser.add_argument(
+        "--format", choices=("csv", "parquet"), default="csv", dest="format_", help="csv (default) or parquet"
+    )
 
 
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("writing"):
-        found = keeping.export(db, options.folder, options.format_)
+        answer = keeping.export(db, keeping.ExportRequest(options.folder, options.format_))
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        for file in found["files"]:
-            output.say(file)
+        for file in answer.files:
+            output.say(str(file))
     return 0

@@ -39,7 +39,7 @@ def run(options: Namespace) -> int:
     with opened(options) as db, output.working("identifying"), db.transaction():
         answers = [
             identify(db, IdentifyRequest(campaign, options.model, options.number))
-            for campaign in campaigns.chosen(db, options.campaign)
+            for campaign in campaigns.selected_campaigns(db, options.campaign)
         ]
     if options.json:
         output.document(answers[0] if options.campaign is not None else IdentificationsAnswer(tuple(answers)))

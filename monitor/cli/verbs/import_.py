@@ -8,7 +8,7 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.workflow.intake import campaigns
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLE = "monitor import examples/five-days examples/cold-cold"
 
@@ -19,13 +19,14 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    with opened(options) as db, output.stepping("importing", len(options.folder)) as begin:
-        found = campaigns.import_folders(db, options.folder, begin)
+    request = ImportRequest(options.folder)
+    with opened(options) as db, output.stepping("importing", len(request.folders)) as progress:
+        answer = import_folders(db, request, progress=progress)
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        for one in found["imported"]:
-            output.say(one["message"])
-            for note in one["notes"]:
+        for folder in answer.imported:
+            output.say(folder.message)
+            for note in folder.notes:
                 output.say(f"note: {note}")
     return 0

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import opened
-from monitor.cli.parser import common, told
+from monitor.cli.parser import common, described
 from monitor.cli.residual_output import files, four_digits
 from monitor.workflow.explain.request import HistoryRequest
-from monitor.workflow.explain.versions import CurveVersion, MachineVersion, history
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.explain.versions import history
 from monitor.workflow.model.answer import ChangeModelAnswer
 from monitor.workflow.model.change import add_effect, remove_effect
 from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest, ShowModelRequest
@@ -22,12 +23,12 @@ EXAMPLE = 'monitor model add "EXX:reversal" --to samba --as with-reversal --camp
 
 def options(parser: ArgumentParser) -> None:
     verbs = parser.add_subparsers(dest="what", metavar="list|show|add|remove|history", required=True)
-    listed = verbs.add_parser("list", **told("all models and versions", "monitor model list"))
+    listed = verbs.add_parser("list", **described("all models and versions", "monitor model list"))
     listed.set_defaults(run=_list)
-    shown = verbs.add_parser("show", **told("what a model contains", "monitor model show with-reversal"))
+    shown = verbs.add_parser("show", **described("what a model contains", "monitor model show with-reversal"))
     shown.add_argument("name", metavar="NAME")
     shown.set_defaults(run=_show)
-    added = verbs.add_parser("add", **told("a new version with one more effect", EXAMPLE))
+    added = verbs.add_parser("add", **described("a new version with one more effect", EXAMPLE))
     added.add_argument("effect", metavar="EFFECT")
     added.add_argument("--to", required=True, metavar="NAME", help="the model, or a version of it: NAME@2")
     added.add_argument("--as", dest="as_", metavar="NEW", help="another name for the new version")
@@ -36,7 +37,9 @@ def options(parser: ArgumentParser) -> None:
     added.set_defaults(run=_add)
     removed = verbs.add_parser(
         "remove",
-        **told("a new version without one effect", "monitor model remove EXX:reversal --from with-reversal"),
+        **described(
+            "a new version without one effect", "monitor model remove EXX:reversal --from with-reversal"
+        ),
     )
     removed.add_argument("effect", metavar="EFFECT")
     removed.add_argument("--from", dest="from_", required=True, metavar="NAME")
@@ -44,7 +47,9 @@ def options(parser: ArgumentParser) -> None:
     removed.set_defaults(run=_remove)
     past = verbs.add_parser(
         "history",
-        **told("the error falling, step by step", "monitor model history with-reversal --figures figures"),
+        **described(
+            "the error falling, step by step", "monitor model history with-reversal --figures figures"
+        ),
     )
     past.add_argument("name", metavar="NAME")
     past.add_argument("--campaign", metavar="CAMPAIGN", help="default: where it was last compared")

@@ -19,9 +19,9 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with output.working("restoring"):
-        found = keeping.restore_to(options.source, Path(options.db))
+        answer = keeping.restore_backup(keeping.RestoreRequest(options.source, Path(options.db)))
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        output.say(found["message"])
+        output.say(answer.message)
     return 0

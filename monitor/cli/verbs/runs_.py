@@ -19,12 +19,11 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        campaigns.load(db, options.campaign)
-        found = campaigns.runs(db, options.campaign)
+        answer = campaigns.runs(db, campaigns.RunsRequest(options.campaign))
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        output.listing(found["runs"], "no run")
-        for note in found["notes"]:
+        output.listing(answer.runs, "no run")
+        for note in answer.notes:
             output.say(f"note: {note}")
     return 0

@@ -1,4 +1,4 @@
-"""Hash everything anew and hold it against the audit: is the database as it was written?"""
+"""Hash everything anew and compare it with the audit: is the database as it was written?"""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("verifying"):
-        found = keeping.verify(db)
+        answer = keeping.verify(db)
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        for fault in found["faults"]:
+        for fault in answer.faults:
             output.say(fault)
-        verdict = "as it was written" if found["ok"] else "NOT as it was written"
+        verdict = "as it was written" if answer.ok else "NOT as it was written"
         output.say(
-            f"{options.db} is {verdict}: {found['entries']} entries, the last with hash {found['last_sha256']}"
+            f"{options.db} is {verdict}: {answer.entries} entries, the last with hash {answer.last_sha256}"
         )
-    return 0 if found["ok"] else 1
+    return 0 if answer.ok else 1

@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.workflow.intake.withdrawals import withdraw
+from monitor.workflow.intake.withdrawals import WithdrawRequest, withdraw
 
 EXAMPLE = 'monitor withdraw five-days --reason "balls 3 and 5 were exchanged in the file"'
 
@@ -20,12 +20,12 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        found = withdraw(db, options.campaign, options.reason)
+        answer = withdraw(db, WithdrawRequest(options.campaign, options.reason))
     if options.json:
-        output.document(found)
+        output.document(answer)
         return 0
-    output.say(found["message"])
-    for number in found["certificates"]:
+    output.say(answer.message)
+    for number in answer.certificates:
         output.say(
             f"certificate {number} rests on it: `monitor certificate amend {number}` or `withdraw {number}`"
         )

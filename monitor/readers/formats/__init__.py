@@ -1,1 +1,1 @@
-"""The formats that can be read: one file a format, found by its ``READER``."""
+"""The formats that can be read: one file a format, registered by its ``READER``."""

@@ -1,4 +1,4 @@
-"""Figures of a curve: what was measured, and the residual of one model after the other."""
+"""Draws a curve: the measured response, and the residual of one model after the other."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from monitor.reporting.palette import BLUE, INK, ORANGE, PAGE_WIDTH_MM
 
 PANEL_MM = 30.0
 HEAD_MM = 22.0
-#: More panels than these are a book, not a figure: the first ones and the last are drawn.
+#: Of more panels than these the first ones and the last are drawn.
 MOST_PANELS = 5
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """The residual (n,) of a model and what is said above it."""
+    """The residual (n,) of a model and the title of its panel."""
 
     title: str
     values: Array
@@ -38,8 +38,8 @@ def residuals_figure(
     outliers: npt.NDArray[np.bool_],
     title: str,
 ) -> Figure:
-    """The response (n,) over one input (n,) on top, below it the residual (n,) of each model, ``outliers`` ringed."""
-    if any(one.values.shape != x.shape for one in residuals) or measured.shape != x.shape:
+    """Draw the response (n,) over an input (n,) and the residual (n,) of each model, ``outliers`` ringed."""
+    if any(residual.values.shape != x.shape for residual in residuals) or measured.shape != x.shape:
         raise DataError(f"response and residuals must have the {len(x)} rows of {x_name}")
     shown = [*residuals[: MOST_PANELS - 1], residuals[-1]] if len(residuals) > MOST_PANELS else [*residuals]
     with style():
@@ -47,13 +47,18 @@ def residuals_figure(
         axes = figure.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
         axes[0].plot(x, measured, ".", color=INK, markersize=3.0)
         axes[0].set_ylabel(response)
-        for panel, one in zip(axes[1:], shown, strict=True):
+        for panel, residual in zip(axes[1:], shown, strict=True):
             zero_line(panel)
-            panel.plot(x, one.values, ".", color=BLUE, markersize=3.0)
+            panel.plot(x, residual.values, ".", color=BLUE, markersize=3.0)
             panel.plot(
-                x[outliers], one.values[outliers], "o", markersize=6.0, markerfacecolor="none", color=ORANGE
+                x[outliers],
+                residual.values[outliers],
+                "o",
+                markersize=6.0,
+                markerfacecolor="none",
+                color=ORANGE,
             )
-            panel.set_title(one.title)
+            panel.set_title(residual.title)
             panel.set_ylabel("residual")
         axes[-1].set_xlabel(x_name)
     return figure

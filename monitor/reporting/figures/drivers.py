@@ -1,8 +1,9 @@
-"""Figures of what the model leaves against what drives it, and against what an effect predicts."""
+"""Draws the residual of a model against what drives it, and against the prediction of an effect."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -15,41 +16,48 @@ from monitor.reporting.figures.style import caption, new_figure, style, zero_lin
 from monitor.reporting.palette import BLUE, FAINT, INK, MID, ORANGE, PAGE_WIDTH_MM
 
 
-def residual_against_driver(
-    driver: npt.ArrayLike,
-    residual_um: npt.ArrayLike,
-    *,
-    title: str,
-    driver_name: str,
-    residual_name: str = "residual / µm",
-    group: npt.ArrayLike | None = None,
-    bins: int = 8,
-    after_um: npt.ArrayLike | None = None,
-) -> Figure:
-    """Residuals (n,) µm against a driver (n,), with the mean of each group and ± 1 standard error of it.
+@dataclass(frozen=True)
+class DrivenResiduals:
+    """Residuals (n,) µm at the values of a driver (n,).
 
     ``group`` (n,) assigns the groups; without it the driver is cut into ``bins`` of equal numbers of points.
-    ``after_um`` (n,) are the residuals once a missing effect was added: their means are drawn beside the others.
+    ``after_um`` (n,) are the residuals after a missing effect was added.
+    """
+
+    driver: npt.ArrayLike
+    residual_um: npt.ArrayLike
+    group: npt.ArrayLike | None = None
+    bins: int = 8
+    after_um: npt.ArrayLike | None = None
+
+
+def residual_against_driver(
+    residuals: DrivenResiduals, *, title: str, driver_name: str, residual_name: str = "residual / µm"
+) -> Figure:
+    """Draw residuals against a driver, with the mean of each group and ± 1 standard error of it.
+
     The means are drawn to guide the eye and are no stored result.
     """
-    x, y = np.asarray(driver, dtype=np.float64), np.asarray(residual_um, dtype=np.float64)
+    x = np.asarray(residuals.driver, dtype=np.float64)
+    y = np.asarray(residuals.residual_um, dtype=np.float64)
     if x.shape != y.shape or x.ndim != 1:
         raise DataError(f"driver and residual_um must have one shape (n,), but have {x.shape} and {y.shape}")
     keep = np.isfinite(x) & np.isfinite(y)
     x, y = x[keep], y[keep]
-    labels = _equal_parts(x, bins) if group is None else np.asarray(group)[keep]
-    after = None if after_um is None else np.asarray(after_um, dtype=np.float64)[keep]
+    group, after = residuals.group, residuals.after_um
+    labels = _equal_parts(x, residuals.bins) if group is None else np.asarray(group)[keep]
+
     with style():
         figure = new_figure(0.72 * PAGE_WIDTH_MM, 78.0, title)
         axes = figure.subplots()
         zero_line(axes)
         axes.scatter(x, y, s=6, color=MID, alpha=0.45, linewidths=0, zorder=1)
         _group_means(axes, x, y, labels, "o-", ORANGE)
-        words = "grey: single probings; circles: means of groups, ± 1 standard error"
+        legend = "grey: single probings; circles: means of groups, ± 1 standard error"
         if after is not None:
-            _group_means(axes, x, after, labels, "s-", BLUE)
-            words += "; squares: the same with what is missing added"
-        caption(figure, words)
+            _group_means(axes, x, np.asarray(after, dtype=np.float64)[keep], labels, "s-", BLUE)
+            legend += "; squares: the same with what is missing added"
+        caption(figure, legend)
         axes.set_xlabel(driver_name)
         axes.set_ylabel(residual_name)
     return figure
@@ -58,7 +66,7 @@ def residual_against_driver(
 def _group_means(
     axes: Axes, x: Array, y: Array, labels: npt.NDArray[np.generic], look: str, colour: str
 ) -> None:
-    """Means (g,) of the groups of ``labels`` (n,) with their standard errors, joined by a line."""
+    """Draw the means (g,) of the groups of ``labels`` (n,) with their standard errors, joined by a line."""
     centres, means, errors = [], [], []
     for label in dict.fromkeys(labels.tolist()):
         inside = labels == label
@@ -85,7 +93,7 @@ def _group_means(
 def predicted_against_measured(
     predicted_um: npt.ArrayLike, measured_um: npt.ArrayLike, *, title: str, noise_um: float | None = None
 ) -> Figure:
-    """What an effect predicts (n,) against the residual measured without it (n,), both in µm.
+    """Draw the prediction of an effect (n,) against the residual measured without it (n,), both in µm.
 
     Points on the line of equality are explained; ``noise_um`` draws a band of ± 2 standard deviations.
     """

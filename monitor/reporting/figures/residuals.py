@@ -1,4 +1,4 @@
-"""Figures of what the model leaves: by group and over the workspace."""
+"""Draws the residuals of a model: by group and over the workspace."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from monitor.exceptions import DataError
@@ -29,58 +30,69 @@ def residual_bars(
     width_mm: float = PAGE_WIDTH_MM,
     height_mm: float = 62.0,
 ) -> Figure:
-    """RMS residuals in µm as bars, one panel a grouping: ``{"target": (labels, rms_um), ...}``.
+    """Draw RMS residuals in µm as bars, one panel a grouping: ``{"target": (labels, rms_um), ...}``.
 
     ``level_um`` is the probe's repeatability or stated uncertainty, drawn as a line named ``level_name``.
     Bars above twice the level are marked.
     """
     if not groups:
         raise DataError("groups is empty; a grouping such as 'target' with its labels and RMS is needed")
-    counts = [max(len(labels), 3) for labels, _ in groups.values()]
+    bars = {kind: (list(labels), _rms(kind, labels, rms)) for kind, (labels, rms) in groups.items()}
+    counts = [max(len(labels), 3) for labels, _ in bars.values()]
     say = texts_of()
+    limit = math.inf if level_um is None else 2.0 * level_um
     with style():
         figure = new_figure(width_mm, height_mm, title)
-        marked = False
-        panels = figure.subplots(1, len(groups), squeeze=False, sharey=True, width_ratios=counts)[0]
-        for axes, (kind, (labels, rms)) in zip(panels, groups.items(), strict=True):
-            values = np.asarray(rms, dtype=np.float64)
-            if values.shape != (len(labels),):
-                raise DataError(f"the RMS by {kind} must have shape ({len(labels)},), but has {values.shape}")
-            high = np.zeros(len(values), dtype=bool) if level_um is None else values > 2.0 * level_um
-            bars = axes.bar(
-                np.arange(len(labels)),
-                values,
-                width=0.66,
-                color=[ORANGE if mark else BLUE for mark in high],
-                zorder=2,
-            )
-            for bar, mark in zip(bars, high, strict=True):
-                bar.set_hatch("////" if mark else "")
-                bar.set_edgecolor("white" if mark else BLUE)
-                bar.set_linewidth(0.0)
-            # Thirty short labels fit across a page; long ones take their width, some 1.5 mm a letter.
-            room = min(1.0, 5.7 / (1.5 + 1.5 * max(map(len, labels), default=1)))
-            fitting = 30 * len(labels) / sum(counts) * width_mm / PAGE_WIDTH_MM * room
-            step = max(1, math.ceil(len(labels) / max(2 if room < 1.0 else 4, fitting)))
-            axes.set_xticks(np.arange(len(labels))[::step], list(labels)[::step])
+        panels = figure.subplots(1, len(bars), squeeze=False, sharey=True, width_ratios=counts)[0]
+        for axes, (kind, (labels, rms)) in zip(panels, bars.items(), strict=True):
+            _bars(axes, rms, rms > limit)
+            _label(axes, labels, sum(counts), width_mm)
             axes.set_xlabel(say("figures.by", kind=kind), labelpad=2)
             axes.grid(axis="y", color=PALE, linewidth=0.4)
             axes.margins(x=0.02 if len(labels) > 8 else 0.08)
             if level_um is not None:
                 reference_line(axes, level_um)
-            marked = marked or bool(np.any(high))
         if level_um is not None:
-            more = say("figures.hatched") if marked else ""
-            caption(figure, say("figures.dashed", name=level_name, level=f"{level_um:.2g}") + more)
+            hatched = any(bool(np.any(rms > limit)) for _, rms in bars.values())
+            dashed = say("figures.dashed", name=level_name, level=f"{level_um:.2g}")
+            caption(figure, dashed + (say("figures.hatched") if hatched else ""))
         panels[0].set_ylabel(say("figures.residual_axis"))
-        top = max(float(np.nanmax(np.asarray(rms, dtype=np.float64))) for _, rms in groups.values())
+        top = max(float(np.nanmax(rms)) for _, rms in bars.values())
         panels[0].set_ylim(0.0, 1.18 * max(top, level_um or 0.0) or 1.0)
     return figure
 
 
+def _rms(kind: str, labels: Sequence[str], rms: npt.ArrayLike) -> Array:
+    values = np.asarray(rms, dtype=np.float64)
+    if values.shape != (len(labels),):
+        raise DataError(f"the RMS by {kind} must have shape ({len(labels)},), but has {values.shape}")
+    return values
+
+
+def _bars(axes: Axes, rms: Array, marked: npt.NDArray[np.bool_]) -> None:
+    """Draw bars; those that are ``marked`` are hatched, in the accent colour."""
+    colours = [ORANGE if mark else BLUE for mark in marked]
+    bars = axes.bar(np.arange(len(rms)), rms, width=0.66, color=colours, zorder=2)
+    for bar, mark in zip(bars, marked, strict=True):
+        bar.set_hatch("////" if mark else "")
+        bar.set_edgecolor("white" if mark else BLUE)
+        bar.set_linewidth(0.0)
+
+
+def _label(axes: Axes, labels: list[str], count: int, width_mm: float) -> None:
+    """Label as many bars as have room on a figure of ``count`` bars.
+
+    Thirty short labels fit across a page; long ones take their width, some 1.5 mm a letter.
+    """
+    room = min(1.0, 5.7 / (1.5 + 1.5 * max(map(len, labels), default=1)))
+    fitting = 30 * len(labels) / count * width_mm / PAGE_WIDTH_MM * room
+    step = max(1, math.ceil(len(labels) / max(2 if room < 1.0 else 4, fitting)))
+    axes.set_xticks(np.arange(len(labels))[::step], labels[::step])
+
+
 @dataclass(frozen=True)
 class View:
-    """How residual vectors (n, 3) are drawn: ``magnify`` times enlarged, within ``reach`` mm of the ``middle`` (3,).
+    """The view of residual vectors (n, 3): ``magnify`` times enlarged, within ``reach`` mm of the ``middle`` (3,).
 
     ``large`` (n,) marks the largest tenth, ``key`` is the length in µm of the bar that explains the arrows.
     """
@@ -93,15 +105,15 @@ class View:
     key: float
 
 
-def view_of(place: Array, size: Array) -> View:
-    """The view of residuals (n, 3) µm at places (n, 3) mm, one scale for all three sides."""
-    length = np.linalg.norm(size, axis=1)
-    extent = float(np.max(np.ptp(place, axis=0)))
+def view_of(positions: Array, residuals: Array) -> View:
+    """Return the view of residuals (n, 3) µm at positions (n, 3) mm, one scale for all three sides."""
+    length = np.linalg.norm(residuals, axis=1)
+    extent = float(np.max(np.ptp(positions, axis=0)))
     longest = float(np.max(length))
-    seen = longest > 0.0 and extent > 0.0
+    visible = longest > 0.0 and extent > 0.0
     return View(
-        magnify=nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if seen else 1.0,
-        middle=(np.max(place, axis=0) + np.min(place, axis=0)) / 2,
+        magnify=nice(_LONGEST_ARROW * extent / (longest * 1e-3)) if visible else 1.0,
+        middle=(np.max(positions, axis=0) + np.min(positions, axis=0)) / 2,
         reach=0.66 * extent or 1.0,
         large=length >= np.quantile(length, 0.9),
         longest=longest,
@@ -112,24 +124,24 @@ def view_of(place: Array, size: Array) -> View:
 def residual_vectors(
     positions_mm: npt.ArrayLike, residuals_um: npt.ArrayLike, *, title: str, frame: str = "machine frame"
 ) -> Figure:
-    """Residuals (n, 3) µm as magnified arrows at ``positions_mm`` (n, 3), seen along Z, Y and X.
+    """Draw residuals (n, 3) µm as magnified arrows at ``positions_mm`` (n, 3), in views along Z, Y and X.
 
     The largest tenth is drawn in the accent colour, thicker. All three views share one magnification, printed below.
     """
-    place, size = _points(positions_mm, residuals_um)
-    view = view_of(place, size)
+    positions, residuals = _points(positions_mm, residuals_um)
+    view = view_of(positions, residuals)
     large, magnify, middle, reach = view.large, view.magnify, view.middle, view.reach
     with style():
         figure = new_figure(PAGE_WIDTH_MM, 71.0, title)
         panels = figure.subplots(1, 3)
         for axes, (across, up) in zip(panels, ((0, 1), (0, 2), (1, 2)), strict=True):
-            axes.scatter(place[:, across], place[:, up], s=3, color=PALE, linewidths=0, zorder=1)
-            for chosen, colour, width in ((~large, BLUE, 0.005), (large, ORANGE, 0.0095)):
+            axes.scatter(positions[:, across], positions[:, up], s=3, color=PALE, linewidths=0, zorder=1)
+            for rows, colour, width in ((~large, BLUE, 0.005), (large, ORANGE, 0.0095)):
                 axes.quiver(
-                    place[chosen, across],
-                    place[chosen, up],
-                    size[chosen, across] * 1e-3 * magnify,
-                    size[chosen, up] * 1e-3 * magnify,
+                    positions[rows, across],
+                    positions[rows, up],
+                    residuals[rows, across] * 1e-3 * magnify,
+                    residuals[rows, up] * 1e-3 * magnify,
                     angles="xy",
                     scale_units="xy",
                     scale=1.0,
@@ -163,16 +175,18 @@ def residual_vectors(
     return figure
 
 
-def _points(positions: npt.ArrayLike, residuals: npt.ArrayLike) -> tuple[Array, Array]:
-    place, size = np.asarray(positions, dtype=np.float64), np.asarray(residuals, dtype=np.float64)
-    if place.ndim != 2 or place.shape != size.shape or place.shape[1] != 3 or not len(place):
+def _points(positions_mm: npt.ArrayLike, residuals_um: npt.ArrayLike) -> tuple[Array, Array]:
+    positions = np.asarray(positions_mm, dtype=np.float64)
+    residuals = np.asarray(residuals_um, dtype=np.float64)
+    shapes = positions.shape, residuals.shape
+    if positions.ndim != 2 or shapes[0] != shapes[1] or shapes[0][1] != 3 or not len(positions):
         raise DataError(
-            f"positions_mm and residuals_um must have one shape (n, 3), but have {place.shape} and {size.shape}"
+            f"positions_mm and residuals_um must have one shape (n, 3), but have {shapes[0]} and {shapes[1]}"
         )
-    return place, size
+    return positions, residuals
 
 
 def nice(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that does not exceed ``value``."""
+    """Return the largest of 1, 2, 5 times a power of ten that does not exceed ``value``."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9))

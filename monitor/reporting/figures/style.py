@@ -60,7 +60,7 @@ _RC: Any = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """The look of all figures; everything drawn and saved inside it is the same on every machine."""
+    """Set the look of all figures; what is drawn and saved inside it is the same on every machine."""
     with rc_context():
         rcdefaults()
         rcParams.update(_RC)
@@ -68,7 +68,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(width_mm: float, height_mm: float, title: str = "") -> Figure:
-    """An empty figure with the finding as its title, broken into lines that fit; call inside ``style()``."""
+    """Return an empty figure with the finding as its title, broken into lines; call inside ``style()``."""
     size = (width_mm / MILLIMETRES_PER_INCH, height_mm / MILLIMETRES_PER_INCH)
     figure = Figure(figsize=size, layout="constrained")
     figure.get_layout_engine().set(w_pad=0.04, h_pad=0.05)  # type: ignore[call-arg,union-attr]
@@ -76,7 +76,7 @@ def new_figure(width_mm: float, height_mm: float, title: str = "") -> Figure:
         # A bold letter of DejaVu Sans is on the average 0.62 of its size wide.
         letters = int(size[0] * 72.0 / (0.62 * _TITLE_SIZE))
         figure.suptitle(
-            textwrap.fill(_kept_together(title), letters),
+            textwrap.fill(_with_units(title), letters),
             x=0.008,
             ha="left",
             fontsize=_TITLE_SIZE,
@@ -86,31 +86,31 @@ def new_figure(width_mm: float, height_mm: float, title: str = "") -> Figure:
 
 
 def caption(figure: Figure, text: str) -> None:
-    """Small letters below the figure that say what its signs mean, broken into lines that fit."""
+    """Write what the signs of a figure mean below it, in small letters, broken into lines that fit."""
     # A letter of DejaVu Sans is on the average 0.56 of its size wide.
     letters = int(figure.get_size_inches()[0] * 72.0 / (0.56 * _CAPTION_SIZE))
     figure.supxlabel(
-        textwrap.fill(_kept_together(text), letters), x=0.008, ha="left", fontsize=_CAPTION_SIZE, color=INK
+        textwrap.fill(_with_units(text), letters), x=0.008, ha="left", fontsize=_CAPTION_SIZE, color=INK
     )
 
 
 def zero_line(axes: Axes, *, vertical: bool = False) -> None:
-    """The line of zero, behind the data."""
+    """Draw the line of zero, behind the data."""
     (axes.axvline if vertical else axes.axhline)(0.0, color=MID, linewidth=0.6, zorder=0.5)
 
 
 def reference_line(axes: Axes, level: float) -> None:
-    """A dashed level across, in front of the data; the caption or a label names it."""
+    """Draw a dashed level across, in front of the data; the caption or a label names it."""
     axes.axhline(level, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
 
 
-def _kept_together(text: str) -> str:
-    """A number and its unit stay on one line."""
+def _with_units(text: str) -> str:
+    """Return a text in which a number and its unit stay on one line."""
     return re.sub(r"(\d) (?=[%°µ]|mm\b|m\b|K\b)", "\\1\N{NO-BREAK SPACE}", text)
 
 
 def svg(figure: Figure) -> bytes:
-    """The figure as SVG with its letters as outlines: it looks the same everywhere."""
+    """Return the figure as SVG with its letters as outlines: it looks the same everywhere."""
     out = io.BytesIO()
     with style():
         figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
@@ -118,7 +118,7 @@ def svg(figure: Figure) -> bytes:
 
 
 def png(figure: Figure, dpi: float = PNG_DPI) -> bytes:
-    """The figure as PNG without date or software name."""
+    """Return the figure as PNG without date or software name."""
     out = io.BytesIO()
     with style():
         figure.savefig(out, format="png", dpi=dpi, metadata={"Software": None})
@@ -127,9 +127,9 @@ def png(figure: Figure, dpi: float = PNG_DPI) -> bytes:
 
 def save(figure: Figure, path: str | Path) -> Path:
     """Write the figure as the path's ending says: ``.svg`` or ``.png``. Raises InputError for another one."""
-    place = Path(path)
+    file = Path(path)
     writers = {".svg": svg, ".png": png}
-    if place.suffix.lower() not in writers:
-        raise InputError(f"a figure is saved as .svg or .png, not as '{place.name}'")
-    place.write_bytes(writers[place.suffix.lower()](figure))
-    return place
+    if file.suffix.lower() not in writers:
+        raise InputError(f"a figure is saved as .svg or .png, not as '{file.name}'")
+    file.write_bytes(writers[file.suffix.lower()](figure))
+    return file

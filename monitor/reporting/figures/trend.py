@@ -1,4 +1,4 @@
-"""Figures of the long view: one parameter over the dates, and several selections of runs side by side."""
+"""Draws one parameter over the dates, and several selections of runs side by side."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
@@ -26,10 +27,10 @@ def parameter_over_time(
     changes: Sequence[float] = (),
     events: Mapping[float, str] | None = None,
 ) -> Figure:
-    """Runs of one parameter, ``values`` ± ``expanded`` (n,) over ``days`` since 1970 (n,).
+    """Draw the runs of one parameter, ``values`` ± ``expanded`` (n,) over ``days`` since 1970 (n,).
 
     ``line`` is the drift and its band: days, level and half-width (m,) each; ``limit`` that of the absolute value;
-    ``changes`` and ``events`` (day to words) are upright lines. Raises DataError for arrays of unequal length.
+    ``changes`` and ``events`` (day to text) are upright lines. Raises DataError for arrays of unequal length.
     """
     t, y, half = (np.asarray(array, dtype=np.float64) for array in (days, values, expanded))
     if not t.shape == y.shape == half.shape or t.ndim != 1 or not len(t):
@@ -44,21 +45,9 @@ def parameter_over_time(
             at, level, width = (np.asarray(array, dtype=np.float64) for array in line)
             axes.plot(at, level, color=ORANGE, linewidth=1.4, label="drift since the last change", zorder=3)
             axes.fill_between(at, level - width, level + width, color=PALE, linewidth=0, zorder=1)
-        for number, at_change in enumerate(changes):
-            axes.axvline(
-                at_change, color=ORANGE, linewidth=1.1, linestyle=(0, (4, 2)),
-                label="change found" if number == 0 else None,
-            )  # fmt: skip
-        for number, (at_event, words) in enumerate((events or {}).items()):
-            moment = at_event
-            axes.axvline(moment, color=INK, linewidth=0.8, label="event recorded" if number == 0 else None)
-            axes.annotate(
-                words, (moment, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2), textcoords="offset points",
-                rotation=90, va="top", fontsize=6, color=INK,
-            )  # fmt: skip
-        if limit is not None:
-            for side in (-limit, limit):
-                reference_line(axes, side)
+        _changes_and_events(axes, changes, events or {})
+        for side in () if limit is None else (-limit, limit):
+            reference_line(axes, side)
         # Days since 1970 are what matplotlib counts its dates in.
         locator = AutoDateLocator(minticks=3, maxticks=8)  # type: ignore[no-untyped-call]
         axes.xaxis.set_major_locator(locator)
@@ -66,11 +55,29 @@ def parameter_over_time(
         axes.set_ylabel(unit, labelpad=2)
         axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
         axes.legend(loc="best", fontsize=6.5, ncols=2)
-        said = ["grey: 95 % band of the drift"] if line is not None else []
-        said += ["dashed across: the limits of the absolute value"] if limit is not None else []
-        if said:
-            caption(figure, "; ".join(said))
+        legend = ["grey: 95 % band of the drift"] if line is not None else []
+        legend += ["dashed across: the limits of the absolute value"] if limit is not None else []
+        if legend:
+            caption(figure, "; ".join(legend))
     return figure
+
+
+def _changes_and_events(axes: Axes, changes: Sequence[float], events: Mapping[float, str]) -> None:
+    """Draw upright lines; the first of each kind is named in the legend."""
+    for number, day in enumerate(changes):
+        axes.axvline(
+            day,
+            color=ORANGE,
+            linewidth=1.1,
+            linestyle=(0, (4, 2)),
+            label="change found" if number == 0 else None,
+        )
+    for number, (day, text) in enumerate(events.items()):
+        axes.axvline(day, color=INK, linewidth=0.8, label="event recorded" if number == 0 else None)
+        axes.annotate(
+            text, (day, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2), textcoords="offset points",
+            rotation=90, va="top", fontsize=6, color=INK,
+        )  # fmt: skip
 
 
 def selections_side_by_side(
@@ -82,7 +89,7 @@ def selections_side_by_side(
     title: str,
     meaning: str,
 ) -> Figure:
-    """Expanded uncertainties (selections, parameters) of several selections of runs, bars side by side, a panel a unit.
+    """Draw expanded uncertainties (selections, parameters) of selections of runs as bars, a panel a unit.
 
     After Los 2017, Figure 4.6. ``meaning`` says what the bars are. NaN leaves a bar out.
     """
@@ -90,7 +97,7 @@ def selections_side_by_side(
     if values.shape != (len(selections), len(names)):
         raise DataError(f"expanded must be ({len(selections)}, {len(names)}), not {values.shape}")
     kinds = list(dict.fromkeys(units))
-    members = [[place for place, unit in enumerate(units) if unit == kind] for kind in kinds]
+    members = [[index for index, unit in enumerate(units) if unit == kind] for kind in kinds]
     width = 0.8 / max(len(selections), 1)
     shades = (BLUE, ORANGE, MID, INK, PALE)
     with style():
@@ -106,7 +113,7 @@ def selections_side_by_side(
                     color=shades[row % len(shades)], edgecolor=INK, linewidth=0.3, label=name,
                     hatch=("", "///", "...", "xxx")[row % 4],
                 )  # fmt: skip
-            axes.set_xticks(np.arange(len(part)), [names[place] for place in part], rotation=60)
+            axes.set_xticks(np.arange(len(part)), [names[index] for index in part], rotation=60)
             axes.set_ylabel(kind, labelpad=2)
             axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
         panels[0].legend(loc="upper left", fontsize=6.5)

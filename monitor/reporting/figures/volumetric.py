@@ -1,4 +1,4 @@
-"""Figures of the volumetric error: slices through the workspace, with its uncertainty; expected uncertainties."""
+"""Draws the volumetric error in slices through the workspace, with its uncertainty; expected uncertainties."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def volumetric_slices(
     title: str,
     note: str = "",
 ) -> Figure:
-    """Three slices through the middle of a regular grid of points (n, 3), one across each axis.
+    """Draw three slices through the middle of a regular grid of points (n, 3), one across each axis.
 
     ``vectors_um`` (n, 3) is the error along the machine's axes, ``expanded_um`` (n,) the expanded uncertainty of its
     length. Colour is the length of the error, arrows are its part in the slice. Raises DataError for what is no grid.
@@ -41,8 +41,8 @@ def volumetric_slices(
     with style():
         figure = new_figure(PAGE_WIDTH_MM, 86.0 if title else 62.0, title)
         panels = figure.subplots(1, 3)
-        for one, axes in zip(slices, panels, strict=True):
-            _slice(axes, one, scale)
+        for part, axes in zip(slices, panels, strict=True):
+            _slice(axes, part, scale)
         colours = figure.colorbar(panels[0].collections[0], ax=list(panels), shrink=0.8, aspect=24, pad=0.015)
         colours.set_label("length of the error / µm")
         colours.outline.set_linewidth(0.4)
@@ -51,12 +51,12 @@ def volumetric_slices(
     return figure
 
 
-def _slice(axes: Axes, one: Slice, scale: Normalize) -> None:
-    first, second = np.array(one.first_mm), np.array(one.second_mm)
+def _slice(axes: Axes, part: Slice, scale: Normalize) -> None:
+    first, second = np.array(part.first_mm), np.array(part.second_mm)
     axes.pcolormesh(
         first,
         second,
-        np.array(one.lengths_um).T,
+        np.array(part.lengths_um).T,
         cmap=_LENGTHS,
         norm=scale,
         shading="gouraud",
@@ -65,14 +65,14 @@ def _slice(axes: Axes, one: Slice, scale: Normalize) -> None:
     x, y = np.meshgrid(first, second, indexing="ij")
     length = 0.16 * max(np.ptp(first), np.ptp(second)) / float(scale.vmax or 1.0)
     axes.quiver(
-        x, y, np.array(one.first_um) * length, np.array(one.second_um) * length, angles="xy", scale_units="xy",
+        x, y, np.array(part.first_um) * length, np.array(part.second_um) * length, angles="xy", scale_units="xy",
         scale=1.0, color=INK, width=0.006, zorder=4,
     )  # fmt: skip
     picks = [np.unique(np.linspace(0, len(level) - 1, _NUMBERS).astype(int)) for level in (first, second)]
     for i in picks[0]:
         for j in picks[1]:
             axes.annotate(
-                f"±{one.expanded_um[i][j]:.1f}", (first[i], second[j]), xytext=(0, -7),
+                f"±{part.expanded_um[i][j]:.1f}", (first[i], second[j]), xytext=(0, -7),
                 textcoords="offset points", ha="center", va="top", fontsize=5.5, color=INK, zorder=5,
                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},
             )  # fmt: skip
@@ -80,9 +80,9 @@ def _slice(axes: Axes, one: Slice, scale: Normalize) -> None:
     axes.set_xlim(float(first[0]) - room[0], float(first[-1]) + room[0])
     axes.set_ylim(float(second[0]) - room[1], float(second[-1]) + room[1])
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel(f"{one.along[0]} / mm", labelpad=1)
-    axes.set_ylabel(f"{one.along[1]} / mm", labelpad=1)
-    axes.set_title(f"{one.across} = {round(one.at_mm) + 0.0:.0f} mm")
+    axes.set_xlabel(f"{part.along[0]} / mm", labelpad=1)
+    axes.set_ylabel(f"{part.along[1]} / mm", labelpad=1)
+    axes.set_title(f"{part.across} = {round(part.at_mm) + 0.0:.0f} mm")
 
 
 def expected_uncertainties(
@@ -94,13 +94,13 @@ def expected_uncertainties(
     title: str,
     note: str = "",
 ) -> Figure:
-    """Expected standard uncertainties (k,) of a plan, and of another beside it; NaN where a plan gives no number."""
-    now = np.asarray(present, dtype=np.float64)
-    then = None if proposed is None else np.asarray(proposed, dtype=np.float64)
+    """Draw expected standard uncertainties (k,) of a plan, and of another beside it; NaN where there is no number."""
+    before = np.asarray(present, dtype=np.float64)
+    after = None if proposed is None else np.asarray(proposed, dtype=np.float64)
     if (
-        now.shape != (len(names),)
+        before.shape != (len(names),)
         or len(units) != len(names)
-        or (then is not None and then.shape != now.shape)
+        or (after is not None and after.shape != before.shape)
     ):
         raise DataError(f"{len(names)} parameters need as many units and uncertainties")
     at = np.arange(len(names), dtype=np.float64)
@@ -108,20 +108,25 @@ def expected_uncertainties(
         figure = new_figure(PAGE_WIDTH_MM, 70.0, title)
         axes = figure.subplots()
         axes.plot(
-            at - (0.12 if then is not None else 0.0), now, "o", color=BLUE, markersize=5, label="present plan"
+            at - (0.12 if after is not None else 0.0),
+            before,
+            "o",
+            color=BLUE,
+            markersize=5,
+            label="present plan",
         )
-        if then is not None:
+        if after is not None:
             axes.plot(
-                at + 0.12, then, "s", color=ORANGE, markerfacecolor="white", markeredgewidth=1.4, markersize=5,
+                at + 0.12, after, "s", color=ORANGE, markerfacecolor="white", markeredgewidth=1.4, markersize=5,
                 label="proposed plan",
             )  # fmt: skip
-            axes.vlines(at, 0.0, np.nanmax([now, then]), color=MID, linewidth=0.2, zorder=0)
+            axes.vlines(at, 0.0, np.nanmax([before, after]), color=MID, linewidth=0.2, zorder=0)
             axes.legend(loc="upper left", ncols=2, fontsize=7)
         axes.set_xticks(
             at, [f"{name}\n{unit}" for name, unit in zip(names, units, strict=True)], rotation=0, fontsize=6
         )
         axes.set_ylim(
-            0.0, 1.2 * float(np.nanmax(np.concatenate([now, [] if then is None else then, [1e-9]])))
+            0.0, 1.2 * float(np.nanmax(np.concatenate([before, [] if after is None else after, [1e-9]])))
         )
         axes.set_ylabel("expected standard uncertainty")
         if note:

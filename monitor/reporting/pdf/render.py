@@ -1,4 +1,4 @@
-"""Templates to HTML and PDF: our own fonts, nothing fetched, the same bytes for the same record.
+"""Fills templates in as HTML and PDF: our fonts, nothing fetched, the same bytes for the same record.
 
 PDF/A-3u, tagged. WeasyPrint takes document dates from the template, the file's identifier is given, and the
 dates inside the embedded fonts come from SOURCE_DATE_EPOCH, which is set while the file is written.
@@ -50,12 +50,12 @@ class UnprintableError(InputError):
 
 
 def html_of(template: str, context: dict[str, Any], extra_fonts: Sequence[Path] = ()) -> str:
-    """A template of ``reports/`` filled in; a name that the context lacks is an error, all text is escaped."""
+    """Fill in a template of ``reports/``; a name that the context lacks is an error, all text is escaped."""
     return _environment().get_template(template).render(**context, fonts=_font_faces(extra_fonts))
 
 
 def pieces_of(template: str, context: dict[str, Any]) -> Iterator[str]:
-    """As ``html_of``, for a browser: without the addresses of our fonts, and piece by piece as it is filled in."""
+    """Fill in as ``html_of``, for a browser: piece by piece, and without the addresses of our fonts."""
     yield from _environment().get_template(template).generate(**context, fonts=[])
 
 
@@ -67,7 +67,7 @@ def pdf_of(
     extra_fonts: Sequence[Path] = (),
     attached: Sequence[Attached] = (),
 ) -> bytes:
-    """The PDF/A-3u of a page. ``identifier`` and ``moment`` (with an offset) make its bytes reproducible.
+    """Make the PDF/A-3u of a page. ``identifier`` and ``moment`` (with an offset) make its bytes reproducible.
 
     ``attached`` files travel inside it, named in the catalogue's ``/AF`` once each.
 
@@ -77,14 +77,14 @@ def pdf_of(
     if attached:
         options["attachments"] = [
             Attachment(
-                file_obj=BytesIO(one.content),
-                name=one.name,
-                description=one.description,
+                file_obj=BytesIO(file.content),
+                name=file.name,
+                description=file.description,
                 created=moment,
                 modified=moment,
-                relationship=one.relationship,
+                relationship=file.relationship,
             )
-            for one in attached
+            for file in attached
         ]
     source = HTML(string=html, url_fetcher=_OwnFonts(extra_fonts), base_url="about:blank")
     try:
@@ -98,7 +98,7 @@ def pdf_of(
 
 
 def certificate_html(record: CertificateRecord, extra_fonts: Sequence[Path] = ()) -> str:
-    """The certificate as one page of HTML. Raises IncompleteCertificateError, UnprintableError."""
+    """Make the certificate as one page of HTML. Raises IncompleteCertificateError, UnprintableError."""
     context = certificate_context(record)
     _check_letters(record, extra_fonts)
     return html_of("certificate.html", context, extra_fonts)
@@ -109,7 +109,7 @@ def certificate_pdf(
     extra_fonts: Sequence[Path] = (),
     inputs: Mapping[str, Any] | None = None,
 ) -> bytes:
-    """The certificate as PDF/A-3u: the same bytes for the same record and ``inputs``.
+    """Make the certificate as PDF/A-3u: the same bytes for the same record and ``inputs``.
 
     Its data travel inside it: the record with the ``inputs`` as JSON, estimates and covariance as CSV.
 
@@ -136,12 +136,12 @@ def _each_once(document: Any, pdf: Any) -> None:
 
 
 class _OwnFonts(URLFetcher):  # type: ignore[misc]
-    """Gives our fonts and inline pictures, and nothing from a disk or a network."""
+    """Fetches our fonts and inline pictures, and nothing from a disk or a network."""
 
     def __init__(self, extra: Sequence[Path]) -> None:
         super().__init__(allowed_protocols=("data",), allow_redirects=False)
         self._files = {f"{_FONT_SCHEME}{file}": file for _, _, file in FONT_FILES}
-        self._extra = {f"{_FONT_SCHEME}extra-{place}": path for place, path in enumerate(extra)}
+        self._extra = {f"{_FONT_SCHEME}extra-{index}": path for index, path in enumerate(extra)}
 
     def fetch(self, url: str, headers: dict[str, str] | None = None) -> Any:
         if url in self._files:
@@ -162,26 +162,26 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.tests["wider_than"] = lambda words, mm: in_mm(words, LETTERS_PT) > mm
+    environment.tests["wider_than"] = lambda text, mm: in_mm(text, LETTERS_PT) > mm
     environment.filters["capitalize_first"] = lambda text: text[:1].upper() + text[1:]
     return environment
 
 
 def _font_faces(extra: Sequence[Path]) -> list[dict[str, str]]:
-    """Family, weight and address of every font, ours first."""
-    own = [
+    """Return family, weight and address of every font, ours first."""
+    fonts = [
         {"family": family, "weight": str(weight), "url": _FONT_SCHEME + file}
         for family, weight, file in FONT_FILES
     ]
-    return own + [
-        {"family": f"Extra {place}", "weight": "100 900", "url": f"{_FONT_SCHEME}extra-{place}"}
-        for place in range(len(extra))
+    return fonts + [
+        {"family": f"Extra {index}", "weight": "100 900", "url": f"{_FONT_SCHEME}extra-{index}"}
+        for index in range(len(extra))
     ]
 
 
 @contextmanager
 def _reproducible(moment: datetime) -> Iterator[None]:
-    """SOURCE_DATE_EPOCH set to ``moment``, one document at a time."""
+    """Set SOURCE_DATE_EPOCH to ``moment``, one document at a time."""
     with _EPOCH_LOCK, warnings.catch_warnings():
         # WeasyPrint 70 leaves closing its colour profile to the garbage collector.
         warnings.filterwarnings("ignore", "unclosed file.*sRGB2014", ResourceWarning)
@@ -197,8 +197,8 @@ def _reproducible(moment: datetime) -> Iterator[None]:
 
 
 def _check_letters(record: CertificateRecord, extra: Sequence[Path]) -> None:
-    """No system font steps in, so that a certificate looks alike everywhere: letters without a font are refused."""
-    known = _letters(None).union(*(_letters(path) for path in extra))
+    """Raise UnprintableError for letters without a font: no system font replaces ours, so all copies look alike."""
+    printable = _letters(None).union(*(_letters(path) for path in extra))
     used = set(_text_of(record)) - set("\n\r\t")
     hidden = sorted(
         letter for letter in used if letter in _REORDERING or unicodedata.category(letter) == "Cc"
@@ -208,7 +208,7 @@ def _check_letters(record: CertificateRecord, extra: Sequence[Path]) -> None:
         raise UnprintableError(
             f"the certificate's texts hold signs that are not seen but change what is: {shown}; take them out"
         )
-    missing = sorted(letter for letter in used if ord(letter) not in known)
+    missing = sorted(letter for letter in used if ord(letter) not in printable)
     if missing:
         shown = ", ".join(f"{letter} (U+{ord(letter):04X})" for letter in missing[:8])
         raise UnprintableError(

@@ -1,6 +1,6 @@
-"""What a certificate's electronic signature says: does it cover the whole file, fit it, and lead to a trusted one?
+"""Checks an electronic signature: whether it covers the whole file, fits it, and leads to a trusted certificate.
 
-By pyHanko, an optional extra. Making signatures is ``signing``.
+By pyHanko, an optional extra. ``signing`` makes signatures.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any
 
 from monitor.exceptions import InputError
 
-#: Any of these bytes says that a file carries a signature, or did before somebody changed it.
+#: A file with any of these bytes carries a signature, or carried one before it was altered.
 _MARKS = (b"/ByteRange", b"/ETSI.CAdES.detached", b"/Adobe.PPKLite", b"/Type /Sig")
 
 
 @dataclass(frozen=True)
 class SignatureFinding:
-    """What a file's signature says: None for ``good`` where it carries none."""
+    """The finding about a file's signature: None for ``good`` where it carries none."""
 
     good: bool | None
     signer: str | None
@@ -28,24 +28,23 @@ class SignatureFinding:
 
 
 def is_signed(pdf: bytes) -> bool:
-    """Whether a file carries a signature, whole or broken."""
+    """Return whether a file carries a signature, whole or broken."""
     return any(mark in pdf for mark in _MARKS)
 
 
 def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None = None) -> SignatureFinding:
-    """Whether a PDF's signature covers the whole file and fits it.
+    """Check whether a PDF's signature covers the whole file and fits it.
 
     ``trusted`` is a PEM or DER file with the certificates that a signer's must lead to; without one nothing is
-    said of who signed beyond the name in the certificate. ``at`` (with an offset) is when the signature was there, as
-    somebody else than the signer knows: certificates end, and what was signed before stays signed. Without it they
-    have to be valid now (ETSI EN 319 102-1, 5.2.6: past validation needs a proof of existence). Never raises for the
-    file's own faults: they are the finding. Raises InputError where pyHanko is not installed or ``trusted`` cannot be
-    read.
+    concluded about the signer beyond the name in the certificate. ``at`` (with an offset) is a time at which the
+    signature existed, from another source than the signer: certificates end, and what was signed before stays signed.
+    Without it they have to be valid today (ETSI EN 319 102-1, 5.2.6: past validation needs a proof of existence).
+    Never raises for the file's own faults: they are the finding. Raises InputError where pyHanko is not installed or
+    ``trusted`` cannot be read.
     """
     need_pyhanko()
     from pyhanko.pdf_utils.reader import PdfFileReader
     from pyhanko.sign.validation import validate_pdf_signature
-    from pyhanko.sign.validation.status import SignatureCoverageLevel
 
     moment = at or datetime.now(UTC)
     context = _context(trusted, moment)
@@ -53,40 +52,65 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
     logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
     logging.getLogger("pyhanko_certvalidator").setLevel(logging.CRITICAL)
     try:
-        found = PdfFileReader(io.BytesIO(pdf)).embedded_signatures
-        if not found:
-            lost = is_signed(pdf)
-            words = ("the file carries a signature that is no field of it any more: altered",) if lost else ()
-            return SignatureFinding(False if lost else None, None, words)
-        (one,) = found
-        status = validate_pdf_signature(one, signer_validation_context=context)
-        signer = one.signer_cert.subject.human_friendly
-        first, last = one.signer_cert.not_valid_before, one.signer_cert.not_valid_after
-        clean = _room_is_clean(pdf, [int(number) for number in one.byte_range])
+        signatures = PdfFileReader(io.BytesIO(pdf)).embedded_signatures
+        if not signatures:
+            return _without_signature(pdf)
+        (signature,) = signatures
+        status = validate_pdf_signature(signature, signer_validation_context=context)
+        certificate = _Certificate(
+            signature.signer_cert.subject.human_friendly,
+            signature.signer_cert.not_valid_before,
+            signature.signer_cert.not_valid_after,
+        )
+        clean = _room_is_clean(pdf, [int(number) for number in signature.byte_range])
     except Exception as error:  # an altered file breaks the reader in as many ways as there are bytes
-        return SignatureFinding(
-            False, None, (f"the file's signature cannot be read: {_words(error)}: altered",)
-        )
-    faults = []
-    if not status.intact:
-        faults.append("the file was altered after it was signed")
-    if not clean:
-        faults.append("the room that the signature leaves unsigned was altered")
-    if not status.valid:
-        faults.append("the signature does not fit its certificate")
-    if status.coverage != SignatureCoverageLevel.ENTIRE_FILE or not status.docmdp_ok:
-        faults.append("the signature does not cover the whole file: something was added afterwards")
-    if trusted is not None and not first <= moment <= last:
-        faults.append(
+        message = f"the file's signature cannot be read: {_message(error)}: altered"
+        return SignatureFinding(False, None, (message,))
+    faults = _faults_of_file(status, clean)
+    if trusted is not None:
+        faults += _faults_of_signer(status, certificate, moment)
+    return SignatureFinding(not faults, certificate.signer, tuple(faults))
+
+
+@dataclass(frozen=True)
+class _Certificate:
+    signer: str
+    first: datetime
+    last: datetime
+
+
+def _without_signature(pdf: bytes) -> SignatureFinding:
+    """Return the finding of a file in which the reader sees no signature: never signed, or altered."""
+    if not is_signed(pdf):
+        return SignatureFinding(None, None, ())
+    message = "the file carries a signature that is no field of it any more: altered"
+    return SignatureFinding(False, None, (message,))
+
+
+def _faults_of_file(status: Any, clean: bool) -> list[str]:
+    from pyhanko.sign.validation.status import SignatureCoverageLevel
+
+    whole = status.coverage == SignatureCoverageLevel.ENTIRE_FILE and status.docmdp_ok
+    checks = (
+        (status.intact, "the file was altered after it was signed"),
+        (clean, "the room that the signature leaves unsigned was altered"),
+        (status.valid, "the signature does not fit its certificate"),
+        (whole, "the signature does not cover the whole file: something was added afterwards"),
+    )
+    return [fault for passed, fault in checks if not passed]
+
+
+def _faults_of_signer(status: Any, certificate: _Certificate, moment: datetime) -> list[str]:
+    signer, first, last = certificate.signer, certificate.first, certificate.last
+    if not first <= moment <= last:
+        return [
             f"the certificate of {signer} is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d}, not on {moment:%Y-%m-%d}"
-        )
-    elif trusted is not None and not status.trusted:
-        faults.append(f"the certificate of {signer} does not lead to a trusted one")
-    return SignatureFinding(not faults, signer, tuple(faults))
+        ]
+    return [] if status.trusted else [f"the certificate of {signer} does not lead to a trusted one"]
 
 
 def _room_is_clean(pdf: bytes, covered: list[int]) -> bool:
-    """Whether the part that no signature can cover, its own, holds it and zeros alone (ISO 32000-2, 12.8.1).
+    """Return whether the part that no signature can cover, its own, holds it and zeros alone (ISO 32000-2, 12.8.1).
 
     Without this a byte behind the signature, or the case of one of its hexadecimal digits, could be changed unseen.
     """
@@ -124,5 +148,5 @@ def _context(trusted: Path | None, moment: datetime) -> Any:
     return ValidationContext(trust_roots=roots, allow_fetching=False, moment=moment)
 
 
-def _words(error: Exception) -> str:
+def _message(error: Exception) -> str:
     return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__

@@ -1,4 +1,4 @@
-"""Signing a certificate: PAdES baseline B-B (ETSI EN 319 142-1:2016, 6) by pyHanko, an optional extra.
+"""Signs a certificate: PAdES baseline B-B (ETSI EN 319 142-1:2016, 6) by pyHanko, an optional extra.
 
 With a ``FileKey`` (PKCS#12 file, extra ``sign``) or a ``TokenKey`` (PKCS#11: smart card, hardware module; extra
 ``token``), whose private key never leaves the token. The signature is appended to the PDF, which stays as it was below
@@ -20,7 +20,7 @@ from monitor.exceptions import InputError
 from monitor.reporting.signature.signature import need_pyhanko
 
 _FIELD = "Signature"
-#: Where the signature's own bytes are kept; a certificate chain of three with RSA 4096 needs about 12 000.
+#: Bytes reserved for the signature itself; a certificate chain of three with RSA 4096 needs about 12 000.
 _ROOM_BYTES = 32_768
 
 
@@ -52,7 +52,7 @@ Key = FileKey | TokenKey
 
 
 def sign(pdf: bytes, key: Key) -> bytes:
-    """The PDF with a signature by ``key``.
+    """Return the PDF with a signature by ``key``.
 
     Raises InputError where the extra is not installed, the key cannot be opened, or is not there, and where its
     certificate is not valid today.
@@ -83,12 +83,12 @@ def sign(pdf: bytes, key: Key) -> bytes:
 
 
 def _check_in_force(certificate: Any) -> None:
-    """A signature with a certificate that has ended, or has not begun, is accepted by nobody."""
-    first, last, now = certificate.not_valid_before, certificate.not_valid_after, datetime.now(UTC)
-    if not first <= now <= last:
+    """Raise InputError for a certificate that has ended or not begun: no reader accepts its signatures."""
+    first, last, today = certificate.not_valid_before, certificate.not_valid_after, datetime.now(UTC)
+    if not first <= today <= last:
         raise InputError(
             f"the signing certificate of {certificate.subject.human_friendly} is valid from {first:%Y-%m-%d} to "
-            f"{last:%Y-%m-%d}, not today ({now:%Y-%m-%d}); sign with one that is"
+            f"{last:%Y-%m-%d}, not today ({today:%Y-%m-%d}); sign with one that is"
         )
 
 
@@ -148,6 +148,6 @@ def _token_signer(key: TokenKey) -> Iterator[Any]:
 
 
 def _why(error: Exception) -> str:
-    """What the token says; its errors are mostly the names of return codes, such as PinIncorrect."""
-    said = str(error).strip()
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+    """Return the message of a token; its errors are mostly the names of return codes, such as PinIncorrect."""
+    message = str(error).strip()
+    return f"{type(error).__name__}: {message}" if message else type(error).__name__

@@ -1,4 +1,4 @@
-"""How wide a text of our own font is on paper: for what has to fit before the page is laid out."""
+"""The width of a text in our font: for what has to fit before the page is laid out."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ BOLD = 1.12
 
 
 @lru_cache(maxsize=4096)
-def in_units(words: str) -> int:
-    """The width of a text in the font's units; a letter that it lacks counts an em."""
+def in_units(text: str) -> int:
+    """Return the width of a text in the font's units; a letter that it lacks counts an em."""
     em, widths = _widths()
-    return sum(widths.get(ord(letter), em) for letter in words)
+    return sum(widths.get(ord(letter), em) for letter in text)
 
 
 def units_an_em() -> int:
-    """The font's units an em."""
+    """Return the font's units an em."""
     return _widths()[0]
 
 
-def in_mm(words: str, points: float) -> float:
-    """The width of a text in mm, in letters of so many points."""
-    return in_units(words) / units_an_em() * points * MILLIMETRES_A_POINT
+def in_mm(text: str, points: float) -> float:
+    """Return the width of a text in mm, in letters of so many points."""
+    return in_units(text) / units_an_em() * points * MILLIMETRES_A_POINT
 
 
 @cache

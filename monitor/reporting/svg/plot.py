@@ -1,4 +1,4 @@
-"""A plot as a few lines of SVG, written by hand: a hundred machines' pages a night have to cost nothing.
+"""Draws a plot as a few lines of SVG, without a drawing library: quick enough for a hundred pages a night.
 
 The figures of the command line are drawn by matplotlib (``figures_*``); one of them costs 0.1 to 0.3 s and 40 to
 120 kB, these 1 ms and 5 kB. All lengths are in units of a tenth of a millimetre.
@@ -32,7 +32,7 @@ class Drawing:
     def line(
         self, x1: float, y1: float, x2: float, y2: float, colour: str, width: float, dash: str = ""
     ) -> None:
-        """A straight line."""
+        """Add a straight line."""
         dashes = f' stroke-dasharray="{dash}"' if dash else ""
         self.marks.append(
             f'<path d="M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}" stroke="{colour}" '
@@ -40,28 +40,28 @@ class Drawing:
         )
 
     def path(self, d: str, *, stroke: str = "none", width: float = 0.0, fill: str = "none") -> None:
-        """Any path: many lines of one look in one mark."""
+        """Add any path: many lines of one look in one mark."""
         self.marks.append(f'<path d="{d}" stroke="{stroke}" stroke-width="{width:g}" fill="{fill}"/>')
 
     def dots(self, d: str, colour: str, size: float) -> None:
-        """Round dots where the lines of no length of ``d`` stand: one mark for all of them."""
+        """Add round dots at the lines of no length of ``d``, in one mark."""
         self.marks.append(
             f'<path d="{d}" stroke="{colour}" stroke-width="{size:g}" stroke-linecap="round" fill="none"/>'
         )
 
     def text(
-        self, x: float, y: float, words: str, *, anchor: str = "start", bold: bool = False, colour: str = INK,
+        self, x: float, y: float, text: str, *, anchor: str = "start", bold: bool = False, colour: str = INK,
         turned: bool = False,
     ) -> None:  # fmt: skip
-        """Words, their base line at ``y``; ``turned`` reads upwards."""
+        """Add a text with its base line at ``y``; ``turned`` reads upwards."""
         weight = ' font-weight="700"' if bold else ""
         turn = f' transform="rotate(-90 {x:.1f} {y:.1f})"' if turned else ""
         self.marks.append(
-            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"{weight}{turn}>{escape(words)}</text>'
+            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"{weight}{turn}>{escape(text)}</text>'
         )
 
     def svg(self) -> str:
-        """The picture, to stand in a page as it is."""
+        """Return the picture, for the inside of a page."""
         return (
             f'<svg class="plot" role="img" xmlns="http://www.w3.org/2000/svg" width="{self.width_mm:g}mm" '
             f'height="{self.height_mm:g}mm" viewBox="0 0 {self.width_mm * SCALE:g} {self.height_mm * SCALE:g}" '
@@ -82,23 +82,23 @@ class Panel:
     up: tuple[float, float]
 
     def x(self, value: float) -> float:
-        """Where a value lies from left to right."""
+        """Return the position of a value from left to right."""
         return self.left + self.width * (value - self.across[0]) / (self.across[1] - self.across[0])
 
     def y(self, value: float) -> float:
-        """Where a value lies from top to bottom."""
+        """Return the position of a value from top to bottom."""
         return self.top + self.height * (self.up[1] - value) / (self.up[1] - self.up[0])
 
     def frame(
         self, on: Drawing, across: str, up: str, *, ticks: int = 5, named: dict[float, str] | None = None
     ) -> None:
-        """Axes with ticks and names; ``named`` ticks across take the place of numbers."""
+        """Draw axes with ticks and names; ``named`` ticks across replace numbers."""
         bottom = self.top + self.height
         shown = {at: tick_words(at) for at in nice_ticks(*self.across, ticks)} if named is None else named
-        for value, words in shown.items():
+        for value, label in shown.items():
             at = self.x(value)
             on.line(at, bottom, at, bottom + 8, MID, 2)
-            on.text(at, bottom + 12 + LETTER, words, anchor="middle")
+            on.text(at, bottom + 12 + LETTER, label, anchor="middle")
         for value in nice_ticks(*self.up, ticks + 1):
             at = self.y(value)
             on.line(self.left, at, self.left + self.width, at, PALE, 1.5)
@@ -115,23 +115,23 @@ class Panel:
 
 
 def nice_ticks(low: float, high: float, most: int) -> list[float]:
-    """At most ``most`` round numbers between two ends, a step of 1, 2 or 5 times a power of ten apart."""
+    """Return at most ``most`` round numbers between two ends, a step of 1, 2 or 5 times a power of ten apart."""
     if not high > low:
         return [low]
     least = (high - low) / most
     power = 10.0 ** math.floor(math.log10(least))
-    step = next(one * power for one in (1.0, 2.0, 5.0, 10.0) if one * power >= least * (1.0 - 1e-9))
+    step = next(digit * power for digit in (1.0, 2.0, 5.0, 10.0) if digit * power >= least * (1.0 - 1e-9))
     first = math.ceil(low / step - 1e-9)
-    return [place * step for place in range(first, math.floor(high / step + 1e-9) + 1)]
+    return [index * step for index in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
 def tick_words(value: float, sign: str = ".") -> str:
-    """A number along an axis, with the decimal ``sign`` of a language."""
+    """Write a number along an axis, with the decimal ``sign`` of a language."""
     return f"{value:.6g}".replace("-", "\N{MINUS SIGN}").replace(".", sign) if abs(value) > 1e-12 else "0"
 
 
 def arrow_head(x1: float, y1: float, x2: float, y2: float, size: float) -> str:
-    """The path of a triangle at the end of a line from (x1, y1), smaller on a short line, none on a point."""
+    """Return the path of a triangle at the end of a line from (x1, y1), smaller on a short line, none on a point."""
     length = math.hypot(x2 - x1, y2 - y1)
     if length < 1.0:
         return ""

@@ -1,13 +1,16 @@
-"""A parameter's history in one line of a table: dots with intervals, tolerance lines, where it changed.
+"""Draws a parameter's history in one line of a table: dots with intervals, tolerance lines, changes.
 
-Written as SVG by hand: thirteen of them a machine and a hundred machines a night have to cost nothing.
+Written as SVG without a drawing library: a night has thirteen of them for each of a hundred machines.
 """
 
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.records import Array
 from monitor.reporting.health.records import ParameterHealth
@@ -20,8 +23,22 @@ _SCALE, _EDGE = 10.0, 8.0
 MOST = 80
 
 
+@dataclass(frozen=True)
+class _Points:
+    """Where the runs (n,) stand in the picture: their middles ``x`` and ``y``, half of each bar, the step in x.
+
+    ``this_week`` (n,) marks the runs of the week.
+    """
+
+    x: Array
+    y: Array
+    half: Array
+    step: float
+    this_week: npt.NDArray[np.bool_]
+
+
 def sparkline(parameter: ParameterHealth, factor: float) -> str:
-    """The history as a data address; the bars are ``factor`` times each run's standard uncertainty.
+    """Return the history as a data address; the bars are ``factor`` times each run's standard uncertainty.
 
     Runs stand side by side in the order of time, those of this week dark and filled. A vertical line marks a
     change, dashed horizontal lines the tolerance where it lies in or near the range of the values.
@@ -32,47 +49,22 @@ def sparkline(parameter: ParameterHealth, factor: float) -> str:
     half = np.where(np.isfinite(half), half, 0.0)
     low, high = _range(values, half, parameter.tolerance)
     width, height = WIDTH_MM * _SCALE, HEIGHT_MM * _SCALE
-    inner_w, inner_h = width - 2 * _EDGE, height - 2 * _EDGE
-    step = inner_w / max(len(values), 8)
-    x = _EDGE + inner_w - step * (len(values) - np.arange(len(values)) - 0.5)
-    y = _EDGE + inner_h * (high - values) / (high - low)
-    bar = inner_h * half / (high - low)
-    marks = [f'<rect x="0" y="0" width="{width:.0f}" height="{height:.0f}" fill="{FAINT}"/>']
-    for level in (-(parameter.tolerance or 0.0), 0.0, parameter.tolerance or 0.0):
-        if low <= level <= high:
-            at = _EDGE + inner_h * (high - level) / (high - low)
-            limit = parameter.tolerance is not None and level != 0.0
-            look = (
-                f'stroke="{INK}" stroke-width="2.4" stroke-dasharray="9 5"'
-                if limit
-                else f'stroke="{MID}" stroke-width="1.2"'
-            )
-            marks.append(f'<line x1="0" x2="{width:.0f}" y1="{at:.1f}" y2="{at:.1f}" {look}/>')
-    times = history.times[-MOST:]
-    for changed in parameter.changed_at:
-        after = [place for place, at in enumerate(times) if at >= changed]
-        if after and times[0] < changed:
-            at = float(x[after[0]]) - step / 2
-            marks.append(
-                f'<line x1="{at:.1f}" x2="{at:.1f}" y1="2" y2="{height - 2:.0f}" stroke="{ORANGE}" stroke-width="3.2"/>'
-            )
-    own = np.array(history.this_week[-MOST:], dtype=bool)
-    for week, colour in ((False, MID), (True, BLUE)):
-        # One path for all bars and one for all dots (round ends of lines of no length): the PDF is twice as quick.
-        dots = "".join(
-            f"M{at:.1f} {here:.1f}h0" for at, here in zip(x[own == week], y[own == week], strict=True)
-        )
-        if not dots:
-            continue
-        bars = "".join(
-            f"M{at:.1f} {here - long:.1f}V{here + long:.1f}"
-            for at, here, long in zip(x[own == week], y[own == week], bar[own == week], strict=True)
-        )
-        marks.append(f'<path d="{bars}" fill="none" stroke="{colour}" stroke-width="2"/>')
-        for wide, ink in ((10.2, colour),) if week else ((10.2, colour), (6.6, "white")):
-            marks.append(
-                f'<path d="{dots}" fill="none" stroke="{ink}" stroke-width="{wide}" stroke-linecap="round"/>'
-            )
+    inner_width, inner_height = width - 2 * _EDGE, height - 2 * _EDGE
+    step = inner_width / max(len(values), 8)
+    columns = np.arange(len(values), dtype=np.float64)
+    points = _Points(
+        x=_EDGE + inner_width - step * (len(values) - columns - 0.5),
+        y=_EDGE + inner_height * (high - values) / (high - low),
+        half=inner_height * half / (high - low),
+        step=step,
+        this_week=np.array(history.this_week[-MOST:], dtype=bool),
+    )
+    marks = [
+        f'<rect x="0" y="0" width="{width:.0f}" height="{height:.0f}" fill="{FAINT}"/>',
+        *_levels(parameter.tolerance, low, high),
+        *_changes(parameter, points),
+        *_runs(points),
+    ]
     picture = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH_MM}mm" height="{HEIGHT_MM}mm" '
         f'viewBox="0 0 {width:.0f} {height:.0f}">{"".join(marks)}</svg>'
@@ -80,8 +72,52 @@ def sparkline(parameter: ParameterHealth, factor: float) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(picture.encode("ascii")).decode("ascii")
 
 
+def _levels(tolerance: float | None, low: float, high: float) -> Iterator[str]:
+    """Yield the lines of zero and of the tolerance that lie within the range."""
+    width, inner_height = WIDTH_MM * _SCALE, HEIGHT_MM * _SCALE - 2 * _EDGE
+    for level in (-(tolerance or 0.0), 0.0, tolerance or 0.0):
+        if low <= level <= high:
+            y = _EDGE + inner_height * (high - level) / (high - low)
+            limit = tolerance is not None and level != 0.0
+            look = (
+                f'stroke="{INK}" stroke-width="2.4" stroke-dasharray="9 5"'
+                if limit
+                else f'stroke="{MID}" stroke-width="1.2"'
+            )
+            yield f'<line x1="0" x2="{width:.0f}" y1="{y:.1f}" y2="{y:.1f}" {look}/>'
+
+
+def _changes(parameter: ParameterHealth, points: _Points) -> Iterator[str]:
+    """Yield a line at every change between two of the runs."""
+    times, height = parameter.history.times[-MOST:], HEIGHT_MM * _SCALE
+    for changed in parameter.changed_at:
+        after = [index for index, time in enumerate(times) if time >= changed]
+        if after and times[0] < changed:
+            x = float(points.x[after[0]]) - points.step / 2
+            yield (
+                f'<line x1="{x:.1f}" x2="{x:.1f}" y1="2" y2="{height - 2:.0f}" stroke="{ORANGE}" stroke-width="3.2"/>'
+            )
+
+
+def _runs(points: _Points) -> Iterator[str]:
+    """Yield the bars and dots of the runs, those of this week last.
+
+    One path for all bars and one for all dots (round ends of lines of no length): the PDF is twice as quick.
+    """
+    for week, colour in ((False, MID), (True, BLUE)):
+        rows = points.this_week == week
+        middles = list(zip(points.x[rows], points.y[rows], points.half[rows], strict=True))
+        if not middles:
+            continue
+        dots = "".join(f"M{x:.1f} {y:.1f}h0" for x, y, _ in middles)
+        bars = "".join(f"M{x:.1f} {y - half:.1f}V{y + half:.1f}" for x, y, half in middles)
+        yield f'<path d="{bars}" fill="none" stroke="{colour}" stroke-width="2"/>'
+        for size, ink in ((10.2, colour),) if week else ((10.2, colour), (6.6, "white")):
+            yield f'<path d="{dots}" fill="none" stroke="{ink}" stroke-width="{size}" stroke-linecap="round"/>'
+
+
 def _range(values: Array, half: Array, tolerance: float | None) -> tuple[float, float]:
-    """What the picture spans: all values with their bars, and the tolerance where that leaves them legible."""
+    """Return the range of the picture: all values with their bars, and the tolerance where that leaves them legible."""
     low, high = float((values - half).min()), float((values + half).max())
     span = max(high - low, 1e-9 * max(abs(high), abs(low)), 1e-30)
     for level in () if tolerance is None else (-tolerance, tolerance):

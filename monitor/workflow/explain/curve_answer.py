@@ -84,10 +84,10 @@ def _curve_missing(curve: CurveCampaign, effect: Missing) -> CurveMissing:
         effect=effect.effect,
         certain=effect.certain,
         noise_alone_p=effect.noise_alone,
-        meaning=effect.words.meaning,
-        cause=effect.words.cause,
-        remedy=effect.words.remedy,
-        described_in=effect.words.described_in,
+        meaning=effect.description.meaning,
+        cause=effect.description.cause,
+        remedy=effect.description.remedy,
+        described_in=effect.description.described_in,
         amplitude=effect.amplitude,
         u=effect.u,
         unit=effect.units[0].name,
@@ -114,12 +114,12 @@ def _curve_missing(curve: CurveCampaign, effect: Missing) -> CurveMissing:
     )
 
 
-def curve_explain_answer(explanation: CurveExplanation, model: str) -> ExplainAnswer:
+def curve_explanation(explanation: CurveExplanation, model: str) -> ExplainAnswer:
     """The explanation of a curve: what a comparison says, what the model lacks, and the rows that were left out."""
     curve = explanation.first.problem.curve
     comparison = curve_comparison(compare_curve(explanation.first, lacks=bool(explanation.missing)), model)
     if explanation.suspect and not explanation.missing:
-        # An outlier is named as such: the verdict is the one without it.
+        # An outlier is reported as such: the verdict is that of the fit without it.
         verdict = compare_curve(explanation.final, lacks=False).verdict
         comparison = replace(comparison, verdict=verdict)
     missing = tuple(_curve_missing(curve, effect) for effect in explanation.missing)

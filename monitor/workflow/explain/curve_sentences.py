@@ -21,7 +21,7 @@ FEWEST_TOGETHER, NEAR = 5, 3
 
 
 def correlation(noise: CurveNoise) -> str:
-    """The noise in words: both of its numbers, for what a mean is worth depends on how slowly it fades."""
+    """The correlation of neighbouring rows, and how slowly it fades: what a mean is worth depends on both."""
     neighbours = f"correlation {noise.lag_one:.2f}"
     return (
         f"{neighbours}, times {noise.slow:.2f} with each further row" if noise.lag_one > 0.0 else neighbours

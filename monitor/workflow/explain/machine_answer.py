@@ -38,8 +38,8 @@ def micrometres(length: float | None) -> float | None:
     return None if length is None else MICROMETRE.to_display(length)
 
 
-def machine_comparison(comparison: ChainComparison, verdict: Verdict | None = None) -> MachineComparison:
-    """The comparison of a machine in micrometres, with another ``verdict`` where one is named."""
+def machine_comparison(comparison: ChainComparison) -> MachineComparison:
+    """The comparison of a machine in micrometres."""
     um = MICROMETRE.to_display
     return MachineComparison(
         campaign=comparison.campaign,
@@ -52,7 +52,7 @@ def machine_comparison(comparison: ChainComparison, verdict: Verdict | None = No
         stated_uncertainty_um=um(comparison.stated_uncertainty),
         lack_of_fit=lack_of_fit_test(comparison.lack_of_fit),
         excess_over_statement_p=comparison.excess_p_value,
-        verdict=verdict or comparison.verdict,
+        verdict=comparison.verdict,
         by={
             kind: {
                 name: MachinePart(um(part.rms), um(part.largest), part.count) for name, part in parts.items()
@@ -67,10 +67,10 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
     return MachineMissing(
         rank=effect.rank,
         effect=effect.effect,
-        meaning=effect.words.meaning,
-        cause=effect.words.cause,
-        remedy=effect.words.remedy,
-        described_in=effect.words.described_in,
+        meaning=effect.description.meaning,
+        cause=effect.description.cause,
+        remedy=effect.description.remedy,
+        described_in=effect.description.described_in,
         amplitude=unit.to_display(effect.amplitude),
         u=unit.to_display(effect.u),
         unit=unit.name,
@@ -90,7 +90,7 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
             {f"{axis.lower()}_deg": round(DEGREE.to_display(angle), 6) for axis, angle in pose.items()}
             for pose in effect.separation.poses
         ),
-        standard_deviations_apart=DeviationsApart(effect.separation.now, effect.separation.then),
+        standard_deviations_apart=DeviationsApart(effect.separation.before, effect.separation.after),
         varies_from_run_to_run=effect.varies,
         searched=searched_value(effect),
     )
@@ -121,11 +121,11 @@ def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | Ch
     return (*moved, *(_step(step, units) for step in explanation.steps))
 
 
-def explain_answer(explanation: Explanation) -> ExplainAnswer:
+def machine_explanation(explanation: Explanation) -> ExplainAnswer:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
     missing = tuple(_machine_missing(effect) for effect in explanation.missing)
-    comparison = machine_comparison(explanation.comparison, Verdict.SOMETHING_IS_MISSING if missing else None)
+    comparison = machine_comparison(explanation.comparison)
     findings = MachineFindings(
         target_word=problem.target_word,
         held_out="runs" if len(problem.runs) > 1 else "blocks of poses",

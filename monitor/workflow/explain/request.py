@@ -39,7 +39,7 @@ class ExplainRequest:
 
 @dataclass(frozen=True)
 class HistoryRequest:
-    """Fit every version of a model to a campaign: with None that on which the model was last used."""
+    """Fit every version of a model to a campaign; with None to that on which the model was last used."""
 
     model: str
     campaign: str | None = None

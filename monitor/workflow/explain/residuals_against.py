@@ -21,9 +21,9 @@ from monitor.workflow.explain.residuals import drivers_followed, in_machine_fram
 
 #: Up to so many different values of a driver are groups of their own; of more, parts of equal width are made.
 OWN_GROUPS, PARTS = 16, 10
-#: Single points kept for a picture; more only blacken it.
+#: Single points of a picture; more only blacken it.
 POINTS = 240
-#: Digits kept of what is only drawn.
+#: Significant digits of what is only drawn.
 DIGITS = 4
 
 
@@ -31,7 +31,7 @@ DIGITS = 4
 class Against:
     """Residuals (n,) in µm along what an effect displaces, against what drives it (n,), before and after it is added.
 
-    ``after`` is None where no fit has the effect. ``driver`` and ``along`` are in words.
+    ``after`` is None where no fit has the effect. ``driver`` and ``along`` are text for people.
     """
 
     driver: str
@@ -51,7 +51,7 @@ def against_effect(explanation: Explanation, effect: str) -> Against | None:
     channel, their product) that which it follows most. None for an effect that cannot be drawn so.
 
     A positive residual is what the measurement calls for. Of a channel that also changes from run to run, only the
-    change within the run is seen, since balls and tip are free in every run: then it is taken from its mean there.
+    change within the run acts, since balls and tip are free in every run: it is taken from its mean in the run.
     """
     fit = explanation.final
     fitted = _fitted(fit, effect)

@@ -33,7 +33,7 @@ class CurveEstimate:
 
 @dataclass(frozen=True)
 class MachineRun:
-    """A run of a machine; ``note`` is what has to be known before its numbers are used, empty for nothing."""
+    """A run of a machine; ``note`` is a warning to those who use its numbers, empty for none."""
 
     run: int
     parameters: Mapping[str, Estimate]

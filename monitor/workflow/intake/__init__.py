@@ -1,1 +1,1 @@
-"""Campaign folders into the database, and what is there."""
+"""Intake: campaign folders into the database, lists of campaigns and runs, withdrawals."""

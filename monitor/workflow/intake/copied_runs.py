@@ -1,7 +1,7 @@
 """Runs of one folder that are copies of each other: refused, since counted as independent they halve every u.
 
-Readings without noise are the exception: whoever simulates them exactly gets equal runs by right. They are known by
-residuals at the rounding of the file, which no machine leaves.
+Readings without noise are the exception: whoever simulates them exactly gets equal runs by right. They are recognised
+by residuals at the rounding of the file, which no machine leaves.
 """
 
 from __future__ import annotations
@@ -61,10 +61,12 @@ def _rms(db: Database, campaign: Campaign, run: int) -> float:
     """Root mean square of the residuals of a run in mm; infinite where it cannot be identified."""
     try:
         model = as_model(resolve(db, None, campaign.method))
-        one = only_run(campaign, run)
+        single_run = only_run(campaign, run)
         # Who simulates without noise may state none either, and nothing can be weighed by it.
-        one = replace(one, probe=replace(one.probe, standard_uncertainty=MICROMETRE.to_internal(1.0)))
-        return float(campaign_method(campaign).identify(one, model).runs[0].rms)
+        single_run = replace(
+            single_run, probe=replace(single_run.probe, standard_uncertainty=MICROMETRE.to_internal(1.0))
+        )
+        return float(campaign_method(campaign).identify(single_run, model).runs[0].rms)
     except MonitorError:
         return float("inf")
 

@@ -1,22 +1,42 @@
-"""Withdrawing a campaign that should not have been imported, so that the corrected folder can take its place."""
+"""Withdrawing a campaign that should not have been imported, so that the corrected folder can take its name."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass, field
+from datetime import datetime
 
+from monitor.documents import IN_UTC
 from monitor.store import Database, withdraw_campaign
 
-Document = dict[str, Any]
+
+@dataclass(frozen=True)
+class WithdrawRequest:
+    """A campaign that is to count no longer, and why."""
+
+    campaign: str
+    reason: str
 
 
-def withdraw(db: Database, campaign: str, reason: str) -> Document:
+@dataclass(frozen=True)
+class WithdrawAnswer:
+    """The withdrawn campaign; ``certificates`` are the numbers that are valid or drafts and rest on it."""
+
+    campaign: str
+    machine: str
+    reason: str
+    withdrawn_at: datetime = field(metadata=IN_UTC)
+    certificates: tuple[str, ...]
+    message: str
+
+
+def withdraw(db: Database, request: WithdrawRequest) -> WithdrawAnswer:
     """Let a campaign count no longer; its certificates are named. Raises InputError without a reason, NotFoundError."""
-    done = withdraw_campaign(db, campaign, reason)
-    return {
-        "campaign": done.campaign,
-        "machine": done.machine,
-        "reason": done.reason,
-        "withdrawn_at": f"{done.withdrawn_at.isoformat()}Z",
-        "certificates": list(done.certificates),
-        "message": f"{done.campaign}: withdrawn, it no longer counts; its name is free for the corrected folder",
-    }
+    withdrawal = withdraw_campaign(db, request.campaign, request.reason)
+    return WithdrawAnswer(
+        withdrawal.campaign,
+        withdrawal.machine,
+        withdrawal.reason,
+        withdrawal.withdrawn_at,
+        withdrawal.certificates,
+        f"{withdrawal.campaign}: withdrawn, it no longer counts; its name is free for the corrected folder",
+    )

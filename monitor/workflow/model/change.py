@@ -5,7 +5,8 @@ from __future__ import annotations
 from monitor.exceptions import InputError, NotFoundError
 from monitor.store import Database, StoredModel, list_models, save_model
 from monitor.workflow.explain.request import HistoryRequest
-from monitor.workflow.explain.versions import CurveVersion, MachineVersion, history
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.explain.versions import history
 from monitor.workflow.model.answer import ChangeModelAnswer
 from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest
 from monitor.workflow.model.show import shown
@@ -16,8 +17,8 @@ from monitor.workflow.models import label, resolve
 def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
     """Make a version with one more effect, and fit its line to a campaign.
 
-    The effect must exist on one of the machines that are there, or for a curve in its ``campaign``, else in one of
-    the curves that are there. Raises EffectError, NotFoundError.
+    The effect must exist on one of the machines of the database, or for a curve in its ``campaign``, else in one of
+    the curves of the database. Raises EffectError, NotFoundError.
     """
     model = version_with(db, request)
     try:
@@ -71,7 +72,7 @@ def _checked_name(name: str | None, parent: StoredModel) -> str:
 def _changed(
     db: Database, model: StoredModel, new_name: str | None, steps: tuple[MachineVersion | CurveVersion, ...]
 ) -> ChangeModelAnswer:
-    """The answer; without a new name the name itself means another version from now on, which others have to know."""
+    """The answer, with a note for other users where the name without a version means another version from now on."""
     name, version = model.name, model.version
     note = None
     if version > 1 and new_name in (None, name):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -27,12 +27,12 @@ class Subjects(Protocol):
         """Return the base effects of each of them."""
 
     def meaning(self, effects: Sequence[str]) -> dict[str, str]:
-        """Return what effects mean on the first of them that has them; one that none has is left out."""
+        """Return the meaning of effects on the first subject that has them; effects that none has are left out."""
 
     def canonical(self, effect: str, campaign: str | None) -> str:
         """Return the text of an effect in its own words.
 
-        Raises NotFoundError where there is none that could have it, EffectError where none has it or its base has.
+        Raises NotFoundError without any subject, EffectError where none has the effect, InputError for a base effect.
         """
 
 
@@ -44,23 +44,11 @@ class Machines:
     method: ChainMethod | None
 
     def base(self) -> dict[str, tuple[str, ...]]:
-        base: dict[str, tuple[str, ...]] = {}
-        for machine in described_machines(self.db):
-            try:
-                base[machine.id] = self._base_of(chain_of(machine))
-            except DataError:
-                # A method that this machine cannot be calibrated by has no base on it.
-                continue
-        return base
+        return {machine: base for machine, _, base in self._calibrated()}
 
     def meaning(self, effects: Sequence[str]) -> dict[str, str]:
         meaning: dict[str, str] = {}
-        for machine in described_machines(self.db):
-            chain = chain_of(machine)
-            try:
-                self._base_of(chain)
-            except DataError:
-                continue
+        for _, chain, _ in self._calibrated():
             for text in effects:
                 try:
                     meaning.setdefault(text, describe(parse_effect(text, chain)).meaning)
@@ -73,23 +61,22 @@ class Machines:
         if not chains:
             raise NotFoundError("there is no machine yet that could have an effect; import a campaign first")
         text = _first(chains, lambda chain: parse_effect(effect, chain).text)
-        if self._is_base(text, chains):
+        bases = [base for _, _, base in self._calibrated()]
+        if bases and all(text in base for base in bases):
             raise InputError(f"{text} is free in every run already, whatever the model; add another effect")
         return text
 
-    def _base_of(self, chain: Chain) -> tuple[str, ...]:
-        """The effects that are free in every run of the method; those of the complete model for no method."""
-        return (base_effects if self.method is None else self.method.base_effects)(chain)
-
-    def _is_base(self, effect: str, chains: Sequence[Chain]) -> bool:
-        """Whether an effect is a base effect on every machine that the method can calibrate."""
-        answers = []
-        for chain in chains:
+    def _calibrated(self) -> Iterator[tuple[str, Chain, tuple[str, ...]]]:
+        """Yield the machines that the method can calibrate: name, chain, and the effects that are free in every run."""
+        base_of = base_effects if self.method is None else self.method.base_effects
+        for machine in described_machines(self.db):
+            chain = chain_of(machine)
             try:
-                answers.append(effect in self._base_of(chain))
+                base = base_of(chain)
             except DataError:
+                # A method that a machine cannot be calibrated by has no base on it.
                 continue
-        return bool(answers) and all(answers)
+            yield machine.id, chain, base
 
 
 @dataclass(frozen=True)
@@ -116,7 +103,7 @@ class Curves:
         return meaning
 
     def canonical(self, effect: str, campaign: str | None) -> str:
-        """As the protocol says; a ``campaign`` is the one curve that must have the effect."""
+        """Return the text as the protocol says; only the curve ``campaign`` counts where it is named."""
         names = curve_names(self.db) if campaign is None else (campaign,)
         if not names:
             raise NotFoundError(

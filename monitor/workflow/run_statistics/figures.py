@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from monitor.records import Campaign
-from monitor.reporting.figures.parameters import parameters_by_run
+from monitor.reporting.figures.parameters import ParametersOfRuns, parameters_by_run
 from monitor.store import StoredIdentification
 from monitor.workflow.figure_files import make_folder, save_figure
 from monitor.workflow.run_statistics.answer import StatisticsAnswer
@@ -27,12 +27,14 @@ def statistics_figure(
     moved = list(answer.moved)
     summary = f"differ between days: {', '.join(moved)}" if moved else "no parameter differs between days"
     figure = parameters_by_run(
-        [run.run for run in identification.runs],
-        [days[run.run] for run in identification.runs],
-        names,
-        [identification.units[column].name for column in columns],
-        estimate,
-        2.0 * u,
+        ParametersOfRuns(
+            [run.run for run in identification.runs],
+            [days[run.run] for run in identification.runs],
+            names,
+            [identification.units[column].name for column in columns],
+            estimate,
+            2.0 * u,
+        ),
         title=f"{answer.campaign}: {summary}",
         interval="± 2 standard uncertainties of the run",
         highlight=moved,

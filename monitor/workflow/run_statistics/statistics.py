@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.methods import campaign_method, require
 from monitor.records import Array, Campaign
 from monitor.statistics import AnalysisOfVariance, FalseDiscoveries, GroupTest, Homogeneity, Pooling
 from monitor.store import (
@@ -152,6 +153,7 @@ def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
     that the runs do not have, DataError for fewer than two runs.
     """
     campaign = load_campaign(db, request.campaign)
+    require(campaign_method(campaign).statistics, campaign, "stats")
     labels = _groups(db, campaign, request.by)
     taken = _taken(db, campaign, request)
     runs = [run.run for run, take in zip(campaign.runs, taken, strict=True) if take]

@@ -36,7 +36,7 @@ def select(db: Database, request: SelectionRequest) -> SelectionAnswer:
     """
     name, where = request.name, request.where
     campaign = load_campaign(db, request.campaign)
-    if name in set(list_campaigns(db)["campaign"]):
+    if name in {row.campaign for row in list_campaigns(db)}:
         raise InputError(f"--name {name}: a campaign has that name; a selection needs another")
     columns = campaign_columns(campaign)
     if name in columns:
@@ -67,6 +67,6 @@ def group(db: Database, name: str, campaign: str | None = None) -> StoredSelecti
             return find_selection(db, name, campaign)
         except NotFoundError:
             pass
-    if name in set(list_campaigns(db)["campaign"]):
+    if name in {row.campaign for row in list_campaigns(db)}:
         return None
     return find_selection(db, name)

@@ -1,0 +1,53 @@
+"""What people know of a machine: record an event, or list what was recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+from monitor.exceptions import InputError
+from monitor.store import NOTE, Database, StoredEvent, list_events, record_event
+from monitor.store.catalogue import check_machine
+
+
+@dataclass(frozen=True)
+class EventRequest:
+    """Record ``text`` as an event of a ``kind`` that happened ``at`` a moment with an offset; without text list them.
+
+    An event of any kind but a note splits the history of the machine.
+    """
+
+    machine: str
+    text: str | None = None
+    at: datetime | None = None
+    kind: str = NOTE
+
+    def __post_init__(self) -> None:
+        if self.at is not None and self.at.tzinfo is None:
+            at = self.at.isoformat()
+            raise InputError(f"--at {at} lacks its offset from UTC: write for example {at}-05:00")
+        if self.text is None:
+            return
+        if self.at is None:
+            raise InputError("say when it happened: --at 2026-03-05T07:00:00-05:00")
+        if not self.text.strip():
+            raise InputError("say in words what happened, for example 'B axis encoder changed'")
+        if self.at > datetime.now(UTC) + timedelta(hours=1):
+            raise InputError(
+                f"{self.at.isoformat()} lies in the future, and an event cannot be undone; give the time it had"
+            )
+
+
+@dataclass(frozen=True)
+class EventAnswer:
+    """The events of the machine, in the order of time."""
+
+    events: tuple[StoredEvent, ...]
+
+
+def event(db: Database, request: EventRequest) -> EventAnswer:
+    """Record what happened to a machine, or list what was recorded. Raises NotFoundError for an unknown machine."""
+    if request.text is not None and request.at is not None:
+        record_event(db, request.machine, request.at, request.kind, request.text)
+    check_machine(db, request.machine)
+    return EventAnswer(list_events(db, request.machine))
