@@ -346,7 +346,8 @@ def circles(imports: dict[str, set[str]]) -> list[list[str]]:
 
 
 def test_house_no_modules_import_each_other_in_a_circle() -> None:
-    assert circles(modules_imported(PACKAGE)) == CIRCLES
+    # Imports inside functions and under TYPE_CHECKING count: late imports are for speed, not to hide a circle.
+    assert circles(modules_imported(PACKAGE)) == []
 
 
 def test_house_a_circle_is_named(tmp_path: Path) -> None:
