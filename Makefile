@@ -6,8 +6,9 @@
 export MAKECMDGOALS
 RUN := .venv/bin/python
 PYTEST := $(RUN) -m pytest
-# A worker a core; -n 0 in ARGS runs them one after the other, in this process.
-PARALLEL := -n auto --dist worksteal
+# A worker a core; -n 0 in ARGS runs them one after the other, in this process. A file stays with one worker, in its order,
+# so that what its tests share is made once and no run depends on the clock.
+PARALLEL := -n auto --dist loadfile --no-loadscope-reorder
 # pytest ends with status 5 where there is nothing to collect; that is no failure for what may be empty.
 MAY_BE_EMPTY := || test $$? -eq 5
 

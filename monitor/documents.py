@@ -29,7 +29,7 @@ Record = TypeVar("Record")
 
 #: Metadata of a field that is left out of the document where it is None: ``field(default=None, metadata=OMITTED)``.
 OMITTED: Mapping[str, Any] = {"omitted": True}
-#: Metadata of a field whose record is written field by field into the document of its owner.
+#: Metadata of a field whose record, or mapping, is written key by key into the document of its owner.
 INLINED: Mapping[str, Any] = {"inlined": True}
 #: Metadata of a field whose datetime is in UTC without its zone, as the store has it: it is written with Z.
 IN_UTC: Mapping[str, Any] = {"utc": True}
@@ -87,7 +87,7 @@ def _plain_record(record: Any) -> dict[str, Any]:
         if value is None and (field.metadata.get("omitted") or field.metadata.get("inlined")):
             continue
         if field.metadata.get("inlined"):
-            document |= _plain_record(value)
+            document |= _plain(value)
         elif field.metadata.get("utc") and value is not None:
             document[_key(field)] = f"{value.isoformat()}Z"
         else:
@@ -163,7 +163,10 @@ def _keys(kind: Any) -> tuple[set[str], set[str]]:
     allowed: set[str] = set()
     for field in dataclasses.fields(kind):
         if field.metadata.get("inlined"):
-            inlined = [_keys(member) for member in _record_kinds(hints[field.name])]
+            members = [kind for kind in _record_kinds(hints[field.name]) if dataclasses.is_dataclass(kind)]
+            if not members:
+                continue
+            inlined = [_keys(member) for member in members]
             allowed |= set().union(*(keys for _, keys in inlined))
             if field.default is dataclasses.MISSING:
                 required |= set.intersection(*(keys for keys, _ in inlined))
@@ -197,6 +200,10 @@ def _record(kind: Any, value: Mapping[str, Any], path: str) -> Any:
     missing = []
     for field in dataclasses.fields(kind):
         if field.metadata.get("inlined"):
+            if typing.get_origin(hints[field.name]) in (dict, Mapping):
+                rest = {key: element for key, element in value.items() if key not in _keys(kind)[1]}
+                arguments[field.name] = _typed(hints[field.name], rest, path)
+                continue
             kinds = _record_kinds(hints[field.name])
             inlined = next((member for member in kinds if _keys(member)[0] <= set(value)), None)
             if inlined is not None or field.default is dataclasses.MISSING:

@@ -126,3 +126,34 @@ def test_a_moment_in_utc_is_written_with_z_and_a_local_one_without() -> None:
     assert document == {"at": "2026-03-02T14:00:00Z", "local": "2026-03-02T09:00:00"}
     assert from_document(_Moment, document) == moment
     assert to_document(_Moment(None, datetime(2026, 3, 2)))["at"] is None
+
+
+@dataclass(frozen=True)
+class _Length:
+    rms: float
+
+
+@dataclass(frozen=True)
+class _Response:
+    rms: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class _Angle:
+    angle: Mapping[str, float] = field(metadata=INLINED)
+    residual: _Response | _Length = field(metadata=INLINED)
+    seconds: float
+
+
+@pytest.mark.parametrize("residual", [_Length(0.5), _Response(0.5, "mm")])
+def test_alternatives_and_mappings_are_inlined_and_restored(residual: _Length | _Response) -> None:
+    answer = _Angle({"c_deg": 30.0}, residual, 12.0)
+    document = to_document(answer)
+    assert list(document) == [
+        "c_deg",
+        "rms",
+        *(["unit"] if isinstance(residual, _Response) else []),
+        "seconds",
+    ]
+    assert from_document(_Angle, document) == answer

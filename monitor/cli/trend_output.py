@@ -2,212 +2,269 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Iterator
 
 from monitor.cli import output
 from monitor.workflow.history import agreement
+from monitor.workflow.trend.answer import (
+    Between,
+    ConditionEffect,
+    Cycle,
+    DatedChange,
+    ParameterTrend,
+    TrendAnswer,
+    VectorState,
+    VolumetricForecast,
+    WarmUp,
+)
 
 #: From so many runs on it is said why there are no charts.
 FEWEST_RUNS = 10
+#: Below this probability that nothing is there, a dependence, a cycle or a warm-up is stated.
+STATED_P = 0.05
 
 
-def _three(value: float) -> str:
-    """Three digits, never in powers of ten."""
-    return f"{float(f'{value:.3g}'):.10g}"
-
-
-def _latest(one: dict[str, Any]) -> tuple[str, str, str]:
-    """The mean of the last day with its standard uncertainty and the number of its runs."""
-    value, u = one["latest"], one["latest_u"]
-    if not u:
-        return _three(value), "-", str(one["latest_runs"])
-    return output.rounded(value, u), output.two_digits(u), str(one["latest_runs"])
-
-
-def say(found: dict[str, Any]) -> None:
-    for note in found["notes"]:
+def say(answer: TrendAnswer) -> None:
+    """Print a page."""
+    for note in answer.notes:
         output.say(f"note: {note}")
-    for pair in found["agreement"]:
+    for pair in answer.agreement:
         output.say(agreement.sentence(pair))
-    if found["why"] is not None:
-        output.say(found["why"])
+    if answer.why is not None:
+        output.say(answer.why)
         return
-    runs, campaigns = found["runs"], len(found["campaigns"])
-    held = f"{runs} run{'s' if runs > 1 else ''} of {campaigns} campaign{'s' if campaigns > 1 else ''}"
-    if runs == 1:
-        latest = next(iter(found["parameters"].values()))["latest_at"]
+    if answer.runs == 1:
+        latest = next(iter(answer.parameters.values())).mean.latest_at or ""
         output.say(
-            f"{found['machine']}: {held}, of {latest[:16].replace('T', ' ')}; a history begins with the second run"
+            f"{answer.machine}: {_size(answer)}, of {_minute(latest)}; a history begins with the second run"
         )
         return
-    rows = []
-    for name, one in found["parameters"].items():
-        slope = one["slope_per_year"]
-        charts = one["control"]
-        alarms = [
-            kind for kind in ("shewhart", "ewma", "cusum") if charts.get(kind, {}).get("state") == "alarm"
-        ]
-        rows.append(
-            [
-                name, one["unit"], *_latest(one),
-                "-" if slope is None else output.rounded(slope, one["u_slope"]),
-                "-" if slope is None else output.two_digits(one['u_slope']), output.probability(one["p_value"]),
-                "-" if one["robust_slope_per_year"] is None else _three(one["robust_slope_per_year"]),
-                "-" if one["limit"] is None else f"{one['limit']:g}",
-                (one["crosses_limit_at"] or "-")[:10],
-                output.probability(one["in_tolerance_at_next_check"]),
-                "-" if charts["why"] else ", ".join(alarms) or "in control",
-            ]
-        )  # fmt: skip
-    names = ["parameter", "unit", "latest", "u", "n", "slope", "u", "p", "Theil-Sen", "limit", "crosses",
-             "in tolerance next", "charts"]  # fmt: skip
-    # A column that has nothing for any parameter is left out; the sentences below say why.
-    told = [place for place in range(len(names)) if any(row[place] != "-" for row in rows)]
+    _table(answer)
+    for sentence in _sentences(answer):
+        output.say(sentence)
+
+
+def _sentences(answer: TrendAnswer) -> Iterator[str]:
+    parameters = answer.parameters.items()
+    for name, parameter in parameters:
+        yield from (_change(name, change) for change in parameter.changes)
+    for name, parameter in parameters:
+        yield from _dependences(name, parameter)
+    yield from _charts(answer)
+    yield from _volumetric(answer.volumetric_error)
+    yield from _next_check(answer)
+    yield from _backtest(answer)
+    yield from dict.fromkeys(parameter.drift.why for _, parameter in parameters if parameter.drift.why)
+    for event in answer.events:
+        yield f"event {event.at[:10]}: {event.kind}, {event.description}"
+    yield from answer.figures or ()
+
+
+def _size(answer: TrendAnswer) -> str:
+    runs, campaigns = answer.runs, len(answer.campaigns)
+    return f"{runs} run{'s' if runs > 1 else ''} of {campaigns} campaign{'s' if campaigns > 1 else ''}"
+
+
+def _three(value: float | None) -> str:
+    """Three digits, never in powers of ten."""
+    return "-" if value is None else f"{float(f'{value:.3g}'):.10g}"
+
+
+#: The columns of the table: heading, and the cell of a parameter.
+_COLUMNS: dict[str, Callable[[ParameterTrend], str]] = {
+    "unit": lambda parameter: parameter.unit,
+    "latest": lambda parameter: _latest(parameter.mean.latest, parameter.mean.latest_u),
+    "u": lambda parameter: output.two_digits(parameter.mean.latest_u) if parameter.mean.latest_u else "-",
+    "n": lambda parameter: str(parameter.mean.latest_runs),
+    "slope": lambda parameter: output.rounded(parameter.drift.slope_per_year, parameter.drift.u_slope),
+    "u of slope": lambda parameter: output.two_digits(parameter.drift.u_slope),
+    "p": lambda parameter: output.probability(parameter.drift.p_value),
+    "Theil-Sen": lambda parameter: _three(parameter.drift.robust_slope_per_year),
+    "limit": lambda parameter: "-" if parameter.forecast.limit is None else f"{parameter.forecast.limit:g}",
+    "crosses": lambda parameter: (parameter.forecast.crosses_limit_at or "-")[:10],
+    "in tolerance next": lambda parameter: output.probability(parameter.forecast.in_tolerance_at_next_check),
+    "charts": lambda parameter: (
+        "-" if parameter.control.why else ", ".join(parameter.control.alarms) or "in control"
+    ),
+}
+#: Headings that are shorter on paper than what tells two columns apart.
+_HEADINGS = {"u of slope": "u"}
+
+
+def _latest(value: float, u: float | None) -> str:
+    return output.rounded(value, u) if u else _three(value)
+
+
+def _table(answer: TrendAnswer) -> None:
+    """The parameters. A column that has nothing for any of them is left out; the sentences below say why."""
+    columns = {
+        heading: [cell(parameter) for parameter in answer.parameters.values()]
+        for heading, cell in _COLUMNS.items()
+    }
+    columns = {heading: cells for heading, cells in columns.items() if any(text != "-" for text in cells)}
+    slopes = "; slopes a year" if "slope" in columns else ""
     output.table(
-        f"{found['machine']}: {held}" + ("; slopes a year" if names.index("slope") in told else ""),
-        [names[place] for place in told],
-        [[row[place] for place in told] for row in rows],
+        f"{answer.machine}: {_size(answer)}{slopes}",
+        ["parameter", *(_HEADINGS.get(heading, heading) for heading in columns)],
+        [list(row) for row in zip(answer.parameters, *columns.values(), strict=True)],
         text_columns=2,
     )
-    for name, one in found["parameters"].items():
-        for change in one["changes"]:
-            output.say(
-                f"{name}: {change['kind']} of {output.rounded(change['size'], change['u'])} {change['unit']} "
-                f"(u = {output.two_digits(change['u'])} {change['unit']}) at {_minute(change['at'])} "
-                f"({_place(change['interval'])}, p = {output.probability(change['p_value'])})"
-            )
-    for name, one in found["parameters"].items():
-        for condition in one["conditions"]:
-            if condition["q_value"] is not None and condition["q_value"] < 0.05:
-                beside = (
-                    f"; not told from {', '.join(condition['moves_with'])}" if condition["moves_with"] else ""
-                )
-                output.say(
-                    f"{name}: {output.rounded(condition['coefficient'], condition['u'])} {condition['unit']} "
-                    f"(u = {output.two_digits(condition['u'])} {condition['unit']}) with "
-                    f"{condition['channel']}{beside}"
-                )
-        for wave in one["cycles"]:
-            if wave["p_value"] is not None and wave["p_value"] < 0.05:
-                output.say(
-                    f"{name}: goes up and down by {output.rounded(wave['amplitude'], wave['u'])} {wave['unit']} (u = "
-                    f"{output.two_digits(wave['u'])} {wave['unit']}) over the {wave['cycle']}"
-                )
-        warm = one["warm_up"]
-        if warm is not None and warm["p_value"] < 0.05 and warm["stable_after_h"] is not None:
-            output.say(
-                f"{name}: warms up by {warm['amplitude']:.3g} {warm['unit']} with a time constant of "
-                f"{warm['tau_h']:.2g} h; stable after {warm['stable_after_h']:.2g} h"
-            )
-    _charts(found)
-    _forecasts(found)
-    for sentence in dict.fromkeys(one["why"] for one in found["parameters"].values() if one["why"]):
-        output.say(sentence)
-    for event in found["events"]:
-        output.say(f"event {event['at'][:10]}: {event['kind']}, {event['description']}")
-    for file in found.get("figures", []):
-        output.say(file)
 
 
-def _minute(at: str) -> str:
-    return at[:16].replace("T", " ")
+def _with_u(value: float, u: float, unit: str) -> str:
+    return f"{output.rounded(value, u)} {unit} (u = {output.two_digits(u)} {unit})"
 
 
-def _place(interval: list[str]) -> str:
+def _change(name: str, change: DatedChange) -> str:
+    return (
+        f"{name}: {change.kind} of {_with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
+        f"({_interval(change.interval)}, p = {output.probability(change.p_value)})"
+    )
+
+
+def _dependences(name: str, parameter: ParameterTrend) -> Iterator[str]:
+    """What the parameter goes with: conditions, cycles, the warm-up of a campaign."""
+    for effect in parameter.conditions:
+        if effect.q_value is not None and effect.q_value < STATED_P:
+            yield _condition(name, effect)
+    for wave in parameter.cycles:
+        if wave.p_value is not None and wave.p_value < STATED_P:
+            yield _cycle(name, wave)
+    warmth = parameter.warm_up
+    if warmth is not None and warmth.p_value < STATED_P and warmth.stable_after_h is not None:
+        yield _warm_up(name, warmth)
+
+
+def _condition(name: str, effect: ConditionEffect) -> str:
+    inseparable = f"; not told from {', '.join(effect.moves_with)}" if effect.moves_with else ""
+    return f"{name}: {_with_u(effect.coefficient, effect.u, effect.unit)} with {effect.channel}{inseparable}"
+
+
+def _cycle(name: str, wave: Cycle) -> str:
+    return f"{name}: goes up and down by {_with_u(wave.amplitude, wave.u, wave.unit)} over the {wave.cycle}"
+
+
+def _warm_up(name: str, warmth: WarmUp) -> str:
+    return (
+        f"{name}: warms up by {warmth.amplitude:.3g} {warmth.unit} with a time constant of "
+        f"{warmth.tau_h:.2g} h; stable after {warmth.stable_after_h:.2g} h"
+    )
+
+
+def _minute(at: str | None) -> str:
+    return (at or "")[:16].replace("T", " ")
+
+
+def _interval(interval: Between) -> str:
     """Between which dates, or times of one date, a change lies."""
-    low, high = interval
+    low, high = (end or "" for end in interval)
     digits = 10 if low[:10] != high[:10] else 16
     return f"between {low[:digits].replace('T', ' ')} and {high[:digits].replace('T', ' ')}"
 
 
-def _charts(found: dict[str, Any]) -> None:
+def _charts(answer: TrendAnswer) -> Iterator[str]:
     """What the charts were compared with, those of the vector, and why there are none."""
-    control = found["control"]
-    whys = [one["control"]["why"] for one in found["parameters"].values()]
-    if all(whys):
+    control = answer.control
+    whys = [parameter.control.why for parameter in answer.parameters.values()]
+    if control is None or all(whys):
         # Of histories of a few runs the other sentences say enough.
-        if len(found["parameters"]) and found["runs"] >= FEWEST_RUNS:
-            output.say(whys[0])
+        if whys and answer.runs >= FEWEST_RUNS:
+            yield whys[0] or ""
         return
-    output.say(
-        f"charts: reference period {control['reference_from'][:10]} to {control['reference_to'][:10]}, "
-        f"{control['reference_points']} {control['points']}; a false alarm once in "
-        f"{control['average_run_length']:g} {control['points']}"
+    period, vector = control.period, control.vector
+    yield (
+        f"charts: reference period {(period.reference_from or '')[:10]} to {(period.reference_to or '')[:10]}, "
+        f"{period.reference_points} {period.points}; a false alarm once in "
+        f"{period.average_run_length:g} {period.points}"
     )
-    vector = control["vector"]
-    if len(found["parameters"]) == 1:
+    if len(answer.parameters) == 1:
         return
-    if vector["why"] is not None:
-        output.say(vector["why"])
+    if vector.why is not None:
+        yield vector.why
         return
-    for key, name in (("t_squared", "T²"), ("mewma", "MEWMA")):
-        one = vector[key]
-        words = "in control"
-        if one["state"] == "alarm":
-            shares = sorted(one["shares"], key=lambda parameter: -one["shares"][parameter])[:3]
-            words = f"alarm, mostly of {', '.join(shares)}"
-        output.say(
-            f"{name} of {len(vector['parameters'])} parameters together: {words} "
-            f"({_three(one['value'])}, limit {_three(one['limit'])})"
+    for name, state in (("T²", vector.t_squared), ("MEWMA", vector.mewma)):
+        if state is not None:
+            yield _vector(name, state, len(vector.parameters or ()))
+
+
+def _vector(name: str, state: VectorState, count: int) -> str:
+    verdict = "in control"
+    if state.state == "alarm":
+        largest = sorted(state.shares, key=lambda parameter: -state.shares[parameter])[:3]
+        verdict = f"alarm, mostly of {', '.join(largest)}"
+    return (
+        f"{name} of {count} parameters together: {verdict} "
+        f"({_three(state.value)}, limit {_three(state.limit)})"
+    )
+
+
+def _volumetric(ahead: VolumetricForecast | None) -> Iterator[str]:
+    """The volumetric error ahead, and how good its forecasts were."""
+    if ahead is None:
+        return
+    if ahead.why is not None or ahead.predicted_interval_um is None:
+        if ahead.limit_um is not None and ahead.why is not None:
+            yield ahead.why
+        return
+    low, high = ahead.predicted_interval_um
+    crosses = (
+        "does not reach its limit"
+        if ahead.crosses_limit_at is None
+        else f"reaches its limit on {ahead.crosses_limit_at[:10]}"
+    )
+    yield (
+        f"volumetric error: {_three(ahead.latest_um)} µm by the drifts of all parameters together, limit "
+        f"{_three(ahead.limit_um)} µm; {crosses}{_crossing(ahead.crosses_limit_interval)}"
+    )
+    yield (
+        f"  at the next check, {(ahead.next_check or '')[:10]}: {_three(ahead.predicted_um)} µm "
+        f"({_three(low)} to {_three(high)} µm with 95 %), in tolerance with "
+        f"{output.probability(ahead.in_tolerance_at_next_check)}; check within "
+        f"{ahead.recommended_interval_days:.0f} days"
+    )
+    if ahead.backtest is not None:
+        yield (
+            f"  {ahead.backtest.inside} of {ahead.backtest.made} past days, each foretold by the days before it, lay "
+            f"in the interval ({_three(ahead.backtest.rms_um)} µm off, root mean square)"
         )
 
 
-def _forecasts(found: dict[str, Any]) -> None:
-    """The volumetric error ahead, how good the forecasts were, and when the machine is best checked again."""
-    ahead = found.get("volumetric_error")
-    if ahead is not None and ahead["why"] is None:
-        low, high = ahead["predicted_interval_um"]
-        crosses = "does not reach its limit" if ahead["crosses_limit_at"] is None else (
-            f"reaches its limit on {ahead['crosses_limit_at'][:10]}"
-        )  # fmt: skip
-        between = _between(ahead["crosses_limit_interval"])
-        output.say(
-            f"volumetric error: {_three(ahead['latest_um'])} µm by the drifts of all parameters together, limit "
-            f"{_three(ahead['limit_um'])} µm; {crosses}{between}"
-        )
-        output.say(
-            f"  at the next check, {ahead['next_check'][:10]}: {_three(ahead['predicted_um'])} µm "
-            f"({_three(low)} to {_three(high)} µm with 95 %), in tolerance with "
-            f"{output.probability(ahead['in_tolerance_at_next_check'])}; check within "
-            f"{ahead['recommended_interval_days']:.0f} days"
-        )
-        tested = ahead["backtest"]
-        if tested is not None:
-            output.say(
-                f"  {tested['inside']} of {tested['made']} past days, each foretold by the days before it, lay in the "
-                f"interval ({_three(tested['rms_um'])} µm off, root mean square)"
-            )
-    elif ahead is not None and ahead["limit_um"] is not None:
-        output.say(ahead["why"])
+def _next_check(answer: TrendAnswer) -> Iterator[str]:
+    """When the machine is best checked again."""
     intervals = {
-        name: one["recommended_interval_days"]
-        for name, one in found["parameters"].items()
-        if one["recommended_interval_days"] is not None
+        name: parameter.forecast.recommended_interval_days
+        for name, parameter in answer.parameters.items()
+        if parameter.forecast.recommended_interval_days is not None
     }
-    if intervals:
-        first = min(intervals, key=lambda name: intervals[name])
-        output.say(
-            f"check within {intervals[first]:.0f} days, for {first} ({found['parameters'][first]['recommended_by']})"
-        )
-        span = found["parameters"][first]["span_days"]
-        if intervals[first] > span:
-            output.say(
-                f"  its drift was seen over {span:.0f} days only; that it goes on for longer is a supposition"
-            )
-    tested = {
-        name: one["backtest"] for name, one in found["parameters"].items() if one["backtest"] is not None
-    }
-    if tested:
-        made, inside = (sum(one[key] for one in tested.values()) for key in ("made", "inside"))
-        worst = min(tested, key=lambda name: tested[name]["share_inside"])
-        output.say(
-            f"backtest, every day foretold by the days before it: {inside} of {made} later values "
-            f"({100 * inside / made:.0f} %) inside the 95 % forecast interval; least for {worst}, "
-            f"{tested[worst]['inside']} of {tested[worst]['made']}"
-        )
+    if not intervals:
+        return
+    name = min(intervals, key=lambda parameter: intervals[parameter])
+    first = answer.parameters[name]
+    yield f"check within {intervals[name]:.0f} days, for {name} ({first.forecast.recommended_by})"
+    span = first.drift.span_days
+    if intervals[name] > span:
+        yield f"  its drift was seen over {span:.0f} days only; that it goes on for longer is a supposition"
 
 
-def _between(interval: list[str | None] | None) -> str:
+def _backtest(answer: TrendAnswer) -> Iterator[str]:
+    """How good the forecasts of the parameters were."""
+    tests = {
+        name: parameter.backtest
+        for name, parameter in answer.parameters.items()
+        if parameter.backtest is not None
+    }
+    if not tests:
+        return
+    made, inside = sum(test.made for test in tests.values()), sum(test.inside for test in tests.values())
+    name = min(tests, key=lambda parameter: tests[parameter].share_inside)
+    yield (
+        f"backtest, every day foretold by the days before it: {inside} of {made} later values "
+        f"({100 * inside / made:.0f} %) inside the 95 % forecast interval; least for {name}, "
+        f"{tests[name].inside} of {tests[name].made}"
+    )
+
+
+def _crossing(interval: Between | None) -> str:
     if interval is None:
         return ""
     low, high = interval

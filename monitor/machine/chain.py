@@ -20,7 +20,7 @@ from monitor.records import Array
 
 @dataclass(frozen=True)
 class ChainPose:
-    """What the chain says of n poses.
+    """The chain at n poses.
 
     ``residual`` (..., 3) in mm, from target to tip in the frame of the last work axis. ``by_error``
     (..., 3, J, 2, 6) its derivative by every error of every joint (stage 0 location, 1 motion; components
@@ -97,20 +97,20 @@ class _Branch:
 
 def _multiply(joints: tuple[Joint, ...], first: int, positions: Array, errors: Array, keep: bool) -> _Branch:
     branch = _Branch(np.broadcast_shapes(positions.shape[:-1], errors.shape[:-3]), keep)
-    for place, joint in enumerate(joints, start=first):
+    for index, joint in enumerate(joints, start=first):
         branch.offset(joint)
-        branch.small(errors[..., place, 0, :])
-        branch.motion(joint, positions[..., place])
-        branch.small(errors[..., place, 1, :])
+        branch.small(errors[..., index, 0, :])
+        branch.motion(joint, positions[..., index])
+        branch.small(errors[..., index, 1, :])
     return branch
 
 
 def _derivatives(branch: _Branch, point: Array, to_work: Array, sign: float, out: Array) -> None:
     """Fill out (..., 3, joints, 2, 6): the motion of ``point`` with each error, seen in the work frame."""
-    for place, (shift, turn, centre) in enumerate(
+    for index, (shift, turn, centre) in enumerate(
         zip(branch.shifts, branch.turns, branch.centres, strict=True)
     ):
-        joint, stage = divmod(place, 2)
+        joint, stage = divmod(index, 2)
         out[..., joint, stage, :3] = sign * (to_work @ shift)
         lever = (point - centre)[..., None, :]
         moved = np.cross(np.swapaxes(turn, -1, -2), lever)  # (..., axis, 3)

@@ -16,26 +16,24 @@ def gravity_in_joint_frames(chain: Chain, positions: Array) -> Array:
     of gravity by one part in ten thousand.
     """
     down = np.array(chain.gravity)
-    found = np.empty((len(positions), len(chain.joints), 3))
-    place = 0
-    for branch in (chain.work, chain.tool):
+    directions = np.empty((len(positions), len(chain.joints), 3))
+    for branch, first in ((chain.work, 0), (chain.tool, len(chain.work))):
         rotation = np.broadcast_to(np.eye(3), (len(positions), 3, 3))
-        for joint in branch:
+        for index, joint in enumerate(branch, start=first):
             if joint.turns:
-                rotation = rotation @ rotation_about(joint.direction, positions[:, place])
-            found[:, place] = np.einsum("nji,j->ni", rotation, down)
-            place += 1
-    return found
+                rotation = rotation @ rotation_about(joint.direction, positions[:, index])
+            directions[:, index] = np.einsum("nji,j->ni", rotation, down)
+    return directions
 
 
-def torques_in_joint_frames(chain: Chain, positions: Array, carried: int, place: Array) -> Array:
+def torques_in_joint_frames(chain: Chain, positions: Array, carried: int, centre_of_mass: Array) -> Array:
     """Torques (n, J, 3) mm about the origin of every axis, in its frame after its own motion, of a unit weight.
 
-    The weight hangs at ``place`` (3,) mm in the frame of joint ``carried``; joints that do not carry it feel none.
-    ``positions`` (n, J); the nominal chain is used, as for the direction.
+    The weight hangs at ``centre_of_mass`` (3,) mm in the frame of joint ``carried``; joints that do not carry it feel
+    none. ``positions`` (n, J); the nominal chain is used, as for the direction.
     """
     down = np.array(chain.gravity)
-    found = np.zeros((len(positions), len(chain.joints), 3))
+    torques = np.zeros((len(positions), len(chain.joints), 3))
     on_tool = carried >= len(chain.work)
     first = len(chain.work) if on_tool else 0
     rotation = np.broadcast_to(np.eye(3), (len(positions), 3, 3))
@@ -51,7 +49,7 @@ def torques_in_joint_frames(chain: Chain, positions: Array, carried: int, place:
             moved = step + positions[:, at, None] * np.array(joint.direction)
             origin = origin + np.einsum("nij,nj->ni", rotation, moved)
         frames.append((at, rotation, origin))
-    weight = origin + rotation @ place
+    weight = origin + rotation @ centre_of_mass
     for at, turned, centre in frames:
-        found[:, at] = np.einsum("nji,nj->ni", turned, np.cross(weight - centre, down))
-    return found
+        torques[:, at] = np.einsum("nji,nj->ni", turned, np.cross(weight - centre, down))
+    return torques

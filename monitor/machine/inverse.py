@@ -32,21 +32,21 @@ def touching_positions(chain: Chain, positions: Array, errors: Array, target: Ar
     arguments are as in ``evaluate``. Raises DataError where the linear axes cannot reach the target.
     """
     refuse_untouchable(chain)
-    found = np.array(positions, dtype=float)
-    linear = [place for place, joint in enumerate(chain.joints) if not joint.turns]
-    directions = np.array([chain.joints[place].direction for place in linear])
+    touching = np.array(positions, dtype=float)
+    linear = [index for index, joint in enumerate(chain.joints) if not joint.turns]
+    directions = np.array([chain.joints[index].direction for index in linear])
     for _ in range(STEPS):
-        seen = evaluate(chain, found, errors, target, tip, jacobian=True)
-        if np.abs(seen.residual).max(initial=0.0) < CLOSE_ENOUGH:
-            return found
-        assert seen.by_error is not None
-        shifts = seen.by_error[..., linear, MOTION, :3]  # (n, 3, axes, component)
+        pose = evaluate(chain, touching, errors, target, tip, jacobian=True)
+        if np.abs(pose.residual).max(initial=0.0) < CLOSE_ENOUGH:
+            return touching
+        assert pose.by_error is not None
+        shifts = pose.by_error[..., linear, MOTION, :3]  # (n, 3, axes, component)
         slopes = np.einsum("...rac,ac->...ra", shifts, directions)
-        step = np.einsum("...ar,...r->...a", np.linalg.pinv(slopes), seen.residual)
-        found[..., linear] -= step
-    miss = float(np.abs(evaluate(chain, found, errors, target, tip).residual).max())
+        step = np.einsum("...ar,...r->...a", np.linalg.pinv(slopes), pose.residual)
+        touching[..., linear] -= step
+    miss = float(np.abs(evaluate(chain, touching, errors, target, tip).residual).max())
     if miss > CLOSE_ENOUGH * 1e3:
         raise DataError(
             f"the linear axes of '{chain.topology}' cannot reach every target: {miss:.3g} mm are left"
         )
-    return found
+    return touching

@@ -78,9 +78,9 @@ class Chain:
 
     def index(self, name: str) -> int:
         """The place of an axis in ``joints``; TopologyError if the chain has no such axis."""
-        for place, joint in enumerate(self.joints):
+        for index, joint in enumerate(self.joints):
             if joint.name == name:
-                return place
+                return index
         raise TopologyError(
             f"topology '{self.topology}' has no axis {name}; it has {', '.join(j.name for j in self.joints)}"
         )
@@ -97,7 +97,7 @@ class Chain:
     def gravity(self) -> Vector:
         """The direction of gravity in the machine frame at all axes zero.
 
-        A topology does not tell it. The linear axis next to the tool is taken as the vertical one, as on
+        A topology does not state it. The linear axis next to the tool is taken as the vertical one, as on
         horizontal machines (Y carries the spindle head) and vertical ones (Z does); Z without such an axis.
         """
         if self.down is not None:
@@ -110,13 +110,13 @@ class Chain:
 
 
 def _tokens(text: str) -> list[tuple[str, bool]]:
-    found = []
+    tokens = []
     for match in TOKEN.finditer(text):
         spindle, axis, mark, wrong = match.groups()
         if wrong:
             raise TopologyError(f"topology '{text}': '{wrong}' has no meaning here; {EXAMPLE}")
-        found.append((spindle or axis or mark, spindle is not None))
-    return found
+        tokens.append((spindle or axis or mark, spindle is not None))
+    return tokens
 
 
 def _letter_axis(text: str, name: str, spindle: bool, branch: Branch) -> ChainAxis:
@@ -160,12 +160,12 @@ def chain_of_axes(
     ``signs`` gives +1 or -1 for axes that have none of their own; without one ISO 841 holds. Raises
     TopologyError for a sign that is neither, a direction that is no unit vector, an axis named twice.
     """
-    given = dict(signs or {})
+    stated = dict(signs or {})
     joints = []
     for axis in axes:
         # ISO 841: a positive reading moves the tool relative to the workpiece positively.
         usual = 1 if axis.branch == "tool" else -1
-        joints.append(_joint(axis, given.get(axis.name, usual) if axis.sign is None else axis.sign))
+        joints.append(_joint(axis, stated.get(axis.name, usual) if axis.sign is None else axis.sign))
     work = tuple(joint for joint in joints if joint.branch == "work")
     tool = tuple(joint for joint in joints if joint.branch == "tool")
     return Chain(topology_of(axes), work, tool, gravity)
@@ -190,7 +190,7 @@ def parse_topology(text: str, signs: Mapping[str, int] | None = None, gravity: V
         raise TopologyError(f"topology '{text}' must begin with w and end with t; {EXAMPLE}")
     if len(names) == 3:
         raise TopologyError(f"topology '{text}' has no axis; {EXAMPLE}")
-    spindles = [place for place, (_, spindle) in enumerate(tokens) if spindle]
+    spindles = [index for index, (_, spindle) in enumerate(tokens) if spindle]
     if len(spindles) > 1 or (spindles and (spindles[0] < bed or spindles[0] != len(tokens) - 2)):
         raise TopologyError(f"topology '{text}': the spindle in brackets belongs just before t; {EXAMPLE}")
     axes = [_letter_axis(text, name, spin, "work") for name, spin in reversed(tokens[1:bed])]

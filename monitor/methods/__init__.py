@@ -10,11 +10,12 @@ from monitor.methods.method import (
     ChainMethod,
     CurveMethod,
     Method,
+    Rehearsal,
     Stepwise,
     TouchPlan,
     Unable,
 )
-from monitor.methods.registry import campaign_method, method_named, methods
+from monitor.methods.registry import campaign_method, method_named, methods, require
 
 __all__ = [
     "Able",
@@ -22,10 +23,12 @@ __all__ = [
     "ChainMethod",
     "CurveMethod",
     "Method",
+    "Rehearsal",
     "Stepwise",
     "TouchPlan",
     "Unable",
     "campaign_method",
     "method_named",
     "methods",
+    "require",
 ]

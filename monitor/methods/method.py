@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
+
+import numpy as np
 
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
@@ -55,6 +57,32 @@ class Stepwise(Able):
     coefficients: Callable[[ChainProblem, Solution, int], tuple[StepwiseCoefficient, ...]]
 
 
+class VirtualCampaign(Protocol):
+    """Makes a campaign with an effect whose largest displacement is ``peak`` (mm), under a ``noise`` (mm) of a reading.
+
+    Raises EffectError for an effect that the virtual machine does not have or that does nothing in its plan.
+    """
+
+    def __call__(
+        self,
+        name: str,
+        rng: np.random.Generator,
+        *,
+        effect: str | None = None,
+        peak: float = 0.0,
+        noise: float = ...,
+    ) -> Campaign: ...
+
+
+@dataclass(frozen=True)
+class Rehearsal(Able):
+    """Virtual campaigns of a ``machine``; ``noise_um`` is the standard deviation of a reading where none is named."""
+
+    machine: Literal["machine tool", "robot"]
+    virtual_campaign: VirtualCampaign
+    noise_um: float
+
+
 class ExpectedAngles(Protocol):
     """What a plan of angles of a table promises.
 
@@ -97,7 +125,7 @@ class AngleCandidates(Protocol):
 
 
 @dataclass(frozen=True)
-class Words:
+class Nouns:
     """What a ``target`` and a ``row`` of a campaign are called, and ``tool_point`` where an effect is seen largest."""
 
     target: str
@@ -116,7 +144,7 @@ class Method:
     name: str
     title: str
     description: str
-    words: Words
+    nouns: Nouns
     statistics: Able | Unable
     coordinates: Able | Unable
     uncertainty: Able | Unable
@@ -125,6 +153,7 @@ class Method:
     map: Able | Unable
     trend: Able | Unable
     certificate: Able | Unable
+    rehearsal: Rehearsal | Unable
 
     @property
     def own_model(self) -> Model:
@@ -151,6 +180,7 @@ def nothing_to_refuse(campaign: Campaign, problem: ChainProblem) -> None:
     """Accept every campaign that has a problem."""
 
 
+NO_REHEARSAL = Unable("there is no virtual machine for it")
 NO_STEPWISE = Unable("all unknowns are found at once")
 NO_TOUCH_PLAN = Unable("what a plan cannot tell apart, identify names with what to do")
 
@@ -180,6 +210,7 @@ class ChainMethod(Method):
     map: Able | Unable = Able()
     trend: Able | Unable = Able()
     certificate: Able | Unable = Able()
+    rehearsal: Rehearsal | Unable = NO_REHEARSAL
 
     def identify(
         self, campaign: Campaign, model: Model | None = None, solve: Solver = solve_problem
@@ -212,3 +243,4 @@ class CurveMethod(Method):
     map: Able | Unable = NO_MACHINE
     trend: Able | Unable = NO_MACHINE
     certificate: Able | Unable = NO_MACHINE
+    rehearsal: Rehearsal | Unable = NO_REHEARSAL

@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import overload
 
 from monitor.exceptions import DataError, InputError
-from monitor.methods.method import ChainMethod, CurveMethod
+from monitor.methods.method import Able, ChainMethod, CurveMethod, Unable
 from monitor.records import Campaign, CurveCampaign
 
 GROUP = "monitor.methods"
@@ -51,6 +51,14 @@ def campaign_method(campaign: Campaign | CurveCampaign) -> ChainMethod | CurveMe
     if not isinstance(method, kind):
         raise DataError(f"campaign {campaign.name} cannot have been measured by the method {method.name}")
     return method
+
+
+def require(ability: Able | Unable, campaign: Campaign, verb: str) -> None:
+    """Raise DataError, with the reason, where the method of a campaign has no answer to a verb."""
+    if isinstance(ability, Unable):
+        raise DataError(
+            f"{verb} has no answer for campaign {campaign.name}, which was measured by {campaign.method}: {ability.why}"
+        )
 
 
 def _built_in() -> Iterator[ChainMethod | CurveMethod]:

@@ -46,8 +46,8 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
     """Sentences on what to look at, each with the numbers that it rests on; empty for most campaigns."""
     return tuple(
         sentence
-        for found in (_short_runs, _travel, _angles, _places, _statements)
-        for sentence in found(campaign)
+        for check in (_short_runs, _travel, _angles, _places, _statements)
+        for sentence in check(campaign)
     )
 
 
@@ -150,7 +150,7 @@ def _places(campaign: Campaign) -> Iterator[str]:
     )
 
 
-def _pairs(campaign: Campaign, place: Mapping[str, Array]) -> tuple[Array, Array]:
+def _pairs(campaign: Campaign, declared: Mapping[str, Array]) -> tuple[Array, Array]:
     """Steps (n, 3) of X, Y, Z between targets probed at one pose of one run, and their declared distances (n,)."""
     probings = campaign.probings
     rows = np.flatnonzero(probings.run == probings.run[0])
@@ -162,12 +162,12 @@ def _pairs(campaign: Campaign, place: Mapping[str, Array]) -> tuple[Array, Array
     if fixed:
         _, pose = np.unique(np.column_stack(fixed), axis=0, return_inverse=True)
     pose = pose.reshape(-1)
-    known = np.array([name in place for name in probings.target[rows].tolist()])
+    has_place = np.array([name in declared for name in probings.target[rows].tolist()])
     read = np.column_stack([probings.readings[axis][rows] for axis in "XYZ"])
-    at = np.array([place.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
+    at = np.array([declared.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
     first, second = np.triu_indices(len(rows), 1)
-    kept = known[first] & known[second] & (pose[first] == pose[second])
-    first, second = first[kept], second[kept]
+    at_one_pose = has_place[first] & has_place[second] & (pose[first] == pose[second])
+    first, second = first[at_one_pose], second[at_one_pose]
     nominal = np.linalg.norm(at[first] - at[second], axis=1)
     apart = nominal > 0.0
     return (read[first] - read[second])[apart], nominal[apart]
@@ -198,8 +198,8 @@ def _statements(campaign: Campaign) -> Iterator[str]:
             f"length of {bar.length:g} mm: are both in mm?"
         )
     if all(name in balls for name in bar.balls):
-        one, other = (np.array(balls[name].nominal) for name in bar.balls)
-        apart = float(np.linalg.norm(one - other))
+        first, second = (np.array(balls[name].nominal) for name in bar.balls)
+        apart = float(np.linalg.norm(first - second))
         if abs(apart - bar.length) > DISTANCE_TOLERANCE * bar.length:
             yield (
                 f"the scale bar is {bar.length:g} mm long, but its balls {' and '.join(bar.balls)} are declared "

@@ -7,6 +7,7 @@ its unit. Only this room imports duckdb.
 
 from monitor.store.analyses import (
     StoredAnalysis,
+    analysis_text,
     check_analysis,
     latest_documents,
     list_analyses,
@@ -38,7 +39,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
-from monitor.store.events import NOTE, EventRow, list_events, machine_events, record_event
+from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
@@ -51,11 +52,13 @@ from monitor.store.identifications import (
 )
 from monitor.store.import_notes import campaign_notes, run_fingerprints
 from monitor.store.machine_runs import (
+    MachineDescription,
     RecordedRun,
     campaign_machines,
     campaign_tolerances,
     check_campaigns,
     identified_runs,
+    machine_descriptions,
     machine_runs,
     probing_counts,
 )
@@ -79,14 +82,16 @@ __all__ = [
     "Backup",
     "CampaignRow",
     "Database",
-    "EventRow",
     "FleetSums",
     "Imported",
+    "MachineDescription",
+    "MachineEvent",
     "MachineHistory",
     "RecordedRun",
     "RunRow",
     "StoredAnalysis",
     "StoredCertificate",
+    "StoredEvent",
     "StoredIdentification",
     "StoredModel",
     "StoredRefusal",
@@ -95,6 +100,7 @@ __all__ = [
     "Verification",
     "Withdrawal",
     "WithdrawnCampaign",
+    "analysis_text",
     "campaign_machines",
     "campaign_notes",
     "campaign_tolerances",
@@ -135,6 +141,7 @@ __all__ = [
     "load_curve",
     "load_identification",
     "load_model",
+    "machine_descriptions",
     "machine_events",
     "machine_history",
     "machine_runs",

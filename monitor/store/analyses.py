@@ -204,3 +204,9 @@ def check_analysis(db: Database, number: int) -> None:
         raise StoreError(
             f"the stored result {number} was altered after it was stored; `monitor verify` tells what else was"
         )
+
+
+def analysis_text(db: Database, number: int) -> str:
+    """The document of a stored result as it was written: the text that JSON is."""
+    ((text,),) = db.rows("SELECT document FROM v_analyses WHERE analysis_id = ?", [number])
+    return str(text)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta, timezone
 
 from monitor.documents import IN_UTC
 from monitor.exceptions import InputError
@@ -16,8 +16,8 @@ NOTE = "note"
 
 
 @dataclass(frozen=True)
-class EventRow:
-    """An event as the view ``v_events`` has it; ``happened_at_local`` is by the shop's clock."""
+class StoredEvent:
+    """A row of the view ``v_events``; times in UTC without a zone, ``happened_at_local`` by the shop's clock."""
 
     event_id: int
     machine: str
@@ -28,8 +28,17 @@ class EventRow:
     recorded_at: datetime = field(metadata=IN_UTC)
 
 
+@dataclass(frozen=True)
+class MachineEvent:
+    """What people know of a machine; ``at`` in the shop's offset from UTC."""
+
+    at: datetime
+    kind: str
+    description: str
+
+
 def record_event(db: Database, machine: str, happened_at: datetime, kind: str, description: str) -> int:
-    """Keep an event of a machine; its number. ``happened_at`` has an offset from UTC.
+    """Record an event of a machine; return its number. ``happened_at`` has an offset from UTC.
 
     Raises InputError for a time without an offset or an empty kind, NotFoundError for an unknown machine.
     """
@@ -59,22 +68,26 @@ def record_event(db: Database, machine: str, happened_at: datetime, kind: str, d
     return number
 
 
-def list_events(db: Database, machine: str | None = None) -> tuple[EventRow, ...]:
-    """Return the events of all machines or of one, by machine and time."""
-    return db.records(
-        EventRow,
-        "SELECT * FROM v_events WHERE $machine IS NULL OR machine = $machine ORDER BY machine, happened_at",
+def list_events(db: Database, machine: str | None = None) -> tuple[StoredEvent, ...]:
+    """The events of all machines or of one, by machine and time: the view ``v_events``."""
+    rows = db.rows(
+        "SELECT event_id, machine, happened_at, happened_at_local, kind, description, recorded_at FROM v_events "
+        "WHERE $machine IS NULL OR machine = $machine ORDER BY machine, happened_at",
         {"machine": machine},
     )
+    return tuple(StoredEvent(*row) for row in rows)
 
 
-def machine_events(db: Database, machine: str) -> list[tuple[datetime, str, str]]:
-    """Time (UTC), kind and description of the events of a machine, in the order of time."""
+def machine_events(db: Database, machine: str) -> list[MachineEvent]:
+    """The events of a machine, in the order of time."""
     rows = db.rows(
-        "SELECT happened_at, kind, description FROM v_events WHERE machine = ? ORDER BY happened_at",
+        "SELECT happened_at, utc_offset_s, kind, description FROM event WHERE machine = ? ORDER BY happened_at",
         [machine],
     )
-    return [(at.replace(tzinfo=UTC), kind, text) for at, kind, text in rows]
+    return [
+        MachineEvent(at.replace(tzinfo=UTC).astimezone(timezone(timedelta(seconds=offset))), kind, text)
+        for at, offset, kind, text in rows
+    ]
 
 
 def event_content(db: Database, number: int) -> str:

@@ -36,6 +36,27 @@ class RecordedRun:
         return self.started_at.replace(tzinfo=None)
 
 
+@dataclass(frozen=True)
+class MachineDescription:
+    """A machine as its latest campaign describes it; a text that is not stated is empty."""
+
+    machine: str
+    topology: str
+    manufacturer: str
+    model: str
+    serial_number: str
+    location: str
+
+
+def machine_descriptions(db: Database) -> list[MachineDescription]:
+    """Every machine that counts, by name."""
+    rows = db.rows(
+        "SELECT machine, topology, manufacturer, machine_model, serial_number, location "
+        "FROM v_machines ORDER BY machine"
+    )
+    return [MachineDescription(*("" if text is None else str(text) for text in row)) for row in rows]
+
+
 def machine_runs(db: Database, machine: str) -> list[RecordedRun]:
     """Every run of the campaigns of a machine that count, in the order of time.
 

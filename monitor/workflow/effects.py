@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
-from monitor.discovery.curve.candidates import catalogue as curve_catalogue
+from monitor.discovery.curve.catalogue import catalogue as curve_catalogue
 from monitor.documents import OMITTED
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker

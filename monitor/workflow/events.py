@@ -1,24 +1,35 @@
-"""Events of a machine: a crash, a repair, a compensation, a note; recorded and listed."""
+"""What people know of a machine: record an event, or list what was recorded."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
-from monitor.exceptions import InputError, NotFoundError
-from monitor.store import Database, EventRow, list_events, list_machines, record_event
+from monitor.exceptions import InputError
+from monitor.store import NOTE, Database, StoredEvent, list_events, record_event
+from monitor.store.catalogue import check_machine
 
 
 @dataclass(frozen=True)
 class EventRequest:
-    """An event to be recorded. Raises InputError without a text, and for a time in the future."""
+    """Record ``text`` as an event of a ``kind`` that happened ``at`` a moment with an offset; without text list them.
+
+    An event of any kind but a note splits the history of the machine.
+    """
 
     machine: str
-    at: datetime
-    kind: str
-    text: str
+    text: str | None = None
+    at: datetime | None = None
+    kind: str = NOTE
 
     def __post_init__(self) -> None:
+        if self.at is not None and self.at.tzinfo is None:
+            at = self.at.isoformat()
+            raise InputError(f"--at {at} lacks its offset from UTC: write for example {at}-05:00")
+        if self.text is None:
+            return
+        if self.at is None:
+            raise InputError("say when it happened: --at 2026-03-05T07:00:00-05:00")
         if not self.text.strip():
             raise InputError("say in words what happened, for example 'B axis encoder changed'")
         if self.at > datetime.now(UTC) + timedelta(hours=1):
@@ -28,30 +39,15 @@ class EventRequest:
 
 
 @dataclass(frozen=True)
-class EventsRequest:
-    """The events of a machine; of all machines where ``machine`` is None."""
+class EventAnswer:
+    """The events of the machine, in the order of time."""
 
-    machine: str | None = None
-
-
-@dataclass(frozen=True)
-class EventsAnswer:
-    """Recorded events by machine and time."""
-
-    events: tuple[EventRow, ...]
+    events: tuple[StoredEvent, ...]
 
 
-def record(db: Database, request: EventRequest) -> EventsAnswer:
-    """Record what happened to a machine; its events with the new one. Raises InputError, NotFoundError."""
-    record_event(db, request.machine, request.at, request.kind, request.text)
-    return EventsAnswer(list_events(db, request.machine))
-
-
-def events(db: Database, request: EventsRequest) -> EventsAnswer:
-    """List what was recorded of a machine, or of all. Raises NotFoundError for an unknown machine."""
-    machines = [str(name) for name in list_machines(db)["machine"]]
-    if request.machine is not None and request.machine not in machines:
-        raise NotFoundError(
-            f"there is no machine {request.machine!r}; there are {', '.join(machines) or 'none yet'}"
-        )
-    return EventsAnswer(list_events(db, request.machine))
+def event(db: Database, request: EventRequest) -> EventAnswer:
+    """Record what happened to a machine, or list what was recorded. Raises NotFoundError for an unknown machine."""
+    if request.text is not None and request.at is not None:
+        record_event(db, request.machine, request.at, request.kind, request.text)
+    check_machine(db, request.machine)
+    return EventAnswer(list_events(db, request.machine))

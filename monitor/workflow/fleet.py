@@ -2,30 +2,87 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Any
 
 import numpy as np
 
+from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
 from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
 from monitor.store import Database, FleetSums, fleet_sums, latest_tolerances
+from monitor.workflow.history.calendar import DAYS_PER_YEAR
+from monitor.workflow.history.drift import SHORTEST_DAYS
 from monitor.workflow.models import resolve
-from monitor.workflow.trend.parameter import DAYS_PER_YEAR, SHORTEST_DAYS
 
-Document = dict[str, Any]
-
-#: A drift that reaches the limit within so many years is worth a word now.
+#: A drift that reaches the limit within so many years needs attention now.
 SOON_YEARS = 1.0
 #: False discovery rate over all machines and parameters.
 RATE = 0.05
-#: Days of one machine usually differ: they are worth a word where they scatter so much more than runs.
+#: Days of one machine usually differ: they need attention where they scatter so much more than runs.
 DAYS_OVER_RUNS = 3.0
 #: Fewer days than this make a difference, not a drift.
 FEWEST_DAYS = 5
-#: The latest day stands out where it lies so many standard deviations of the days from their mean.
-STANDS_OUT = 3.0
+#: The latest day stands out where it lies so many standard deviations of the days from their mean, with so many days.
+STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
+
+
+@dataclass(frozen=True)
+class FleetRequest:
+    """Every machine and parameter under a model (the method's own by default); ``top`` rows are listed (0: all)."""
+
+    model: str | None = None
+    top: int = 20
+
+    def __post_init__(self) -> None:
+        if self.top < 0:
+            raise InputError(f"--top {self.top}: a number of rows, 0 for all")
+
+
+@dataclass(frozen=True)
+class FleetTableRow:
+    """A parameter of a machine: why it needs attention, the tests of its days, its drift, its latest day."""
+
+    rank: int
+    machine: str
+    parameter: str
+    attention: str
+    unit: str
+    n: int
+    days: int
+    mean: float
+    sd_all: float | None
+    sd_pooled: float | None
+    between_days: float | None
+    bartlett: float | None
+    bartlett_p: float | None
+    bartlett_q: float | None
+    anova_f: float | None
+    anova_p: float | None
+    anova_q: float | None
+    slope_per_year: float | None
+    u_slope: float | None
+    drift_p: float | None
+    drift_q: float | None
+    latest: float | None
+    latest_at: str | None
+    since: str | None
+    limit: float | None
+    years_to_limit: float | None
+
+
+@dataclass(frozen=True)
+class FleetAnswer:
+    """The most urgent rows of ``rows``, and how many of all need attention, by kind."""
+
+    machines: int
+    rows: int
+    values: int
+    false_discovery_rate: float
+    attention: Mapping[str, int]
+    table: tuple[FleetTableRow, ...]
 
 
 def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
@@ -60,7 +117,7 @@ def _rank(
         others = (sums.sum_m - sums.latest) / (k - 1.0)
         squares = sums.sum_mm - sums.latest**2 - (k - 1.0) * others**2
         sd = np.sqrt(np.maximum(squares, 0.0) / (k - 2.0) * (1.0 + 1.0 / (k - 1.0)))
-        z = np.abs(sums.latest - others) / np.where(k >= 6.0, sd, np.nan)
+        z = np.abs(sums.latest - others) / np.where(k >= FEWEST_TO_STAND_OUT, sd, np.nan)
         ratio = cells.between / cells.sd_pooled
         steepness = np.abs(drift.slope / drift.u)
     drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
@@ -73,12 +130,13 @@ def _rank(
         (1, drifting & (years >= 0.0) & (years < SOON_YEARS), -years),
         (0, share >= 1.0, share),
     ):
-        chosen = np.asarray(holds, dtype=np.bool_)
-        kind[chosen], measure[chosen] = number, np.nan_to_num(size)[chosen]
+        mask = np.asarray(holds, dtype=np.bool_)
+        kind[mask], measure[mask] = number, np.nan_to_num(size)[mask]
     return kind, measure, years
 
 
-WORDS = (
+#: The classes, the most urgent first.
+ATTENTION = (
     "out of tolerance",
     "drifts out of tolerance within a year",
     "the latest day stands out",
@@ -110,62 +168,63 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def fleet(db: Database, model: str | None = None, top: int | None = 20) -> Document:
-    """Every machine and parameter of one model (the method's own by default), the most urgent first.
+def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
+    """Every machine and parameter of one model, the most urgent first.
 
-    ``top`` rows are listed (None: all). Raises NotFoundError where nothing was identified.
+    Raises NotFoundError where nothing was identified.
     """
     name, version = None, None
-    if model is not None:
-        stored = resolve(db, model)
+    if request.model is not None:
+        stored = resolve(db, request.model)
         name, version = stored.name, stored.version
     sums = fleet_sums(db, name, version)
     cells, drift = cell_tests(sums)
     drift = _without_short_histories(sums, drift)
     limit = _limits(db, sums)
-    q = {
-        "anova": control_false_discoveries(cells.anova_p, rate=RATE).q_value,
-        "bartlett": control_false_discoveries(cells.bartlett_p, rate=RATE).q_value,
-        "drift": control_false_discoveries(drift.p_value, rate=RATE).q_value,
-    }
-    kind, measure, years = _rank(sums, cells, drift, q["drift"], limit)
+    q_values = {
+        test: control_false_discoveries(p_values, rate=RATE).q_value
+        for test, p_values in (
+            ("anova", cells.anova_p), ("bartlett", cells.bartlett_p), ("drift", drift.p_value)
+        )
+    }  # fmt: skip
+    kind, measure, years = _rank(sums, cells, drift, q_values["drift"], limit)
     order = np.lexsort((sums.parameter, sums.machine, -measure, kind))
-    rows = [
-        {
-            "rank": rank,
-            "machine": str(sums.machine[i]),
-            "parameter": str(sums.parameter[i]),
-            "attention": WORDS[int(kind[i])],
-            "unit": str(sums.unit[i]),
-            "n": int(sums.runs[i]),
-            "days": int(sums.groups[i]),
-            "mean": float(sums.origin[i] + cells.mean[i]),
-            "sd_all": _number(cells.sd_all[i]),
-            "sd_pooled": _number(cells.sd_pooled[i]),
-            "between_days": _number(cells.between[i]),
-            "bartlett": _number(cells.bartlett[i]),
-            "bartlett_p": _number(cells.bartlett_p[i]),
-            "bartlett_q": _number(q["bartlett"][i]),
-            "anova_f": _number(cells.anova_f[i]),
-            "anova_p": _number(cells.anova_p[i]),
-            "anova_q": _number(q["anova"][i]),
-            "slope_per_year": _number(drift.slope[i] * DAYS_PER_YEAR),
-            "u_slope": _number(drift.u[i] * DAYS_PER_YEAR),
-            "drift_p": _number(drift.p_value[i]),
-            "drift_q": _number(q["drift"][i]),
-            "latest": _number(sums.origin[i] + sums.latest[i]),
-            "latest_at": _date(float(sums.last_d[i])),
-            "since": _date(float(sums.since_d[i])),
-            "limit": _number(limit[i]),
-            "years_to_limit": _number(years[i]) if kind[i] == 1 else None,
-        }
-        for rank, i in enumerate(order[:top], start=1)
-    ]
-    return {
-        "machines": len(np.unique(sums.machine)),
-        "rows": len(sums.machine),
-        "values": int(sums.runs.sum()),
-        "false_discovery_rate": RATE,
-        "attention": {words: int((kind == number).sum()) for number, words in enumerate(WORDS)},
-        "table": rows,
-    }
+    rows = (
+        FleetTableRow(
+            rank=rank,
+            machine=str(sums.machine[i]),
+            parameter=str(sums.parameter[i]),
+            attention=ATTENTION[int(kind[i])],
+            unit=str(sums.unit[i]),
+            n=int(sums.runs[i]),
+            days=int(sums.groups[i]),
+            mean=float(sums.origin[i] + cells.mean[i]),
+            sd_all=_number(cells.sd_all[i]),
+            sd_pooled=_number(cells.sd_pooled[i]),
+            between_days=_number(cells.between[i]),
+            bartlett=_number(cells.bartlett[i]),
+            bartlett_p=_number(cells.bartlett_p[i]),
+            bartlett_q=_number(q_values["bartlett"][i]),
+            anova_f=_number(cells.anova_f[i]),
+            anova_p=_number(cells.anova_p[i]),
+            anova_q=_number(q_values["anova"][i]),
+            slope_per_year=_number(drift.slope[i] * DAYS_PER_YEAR),
+            u_slope=_number(drift.u[i] * DAYS_PER_YEAR),
+            drift_p=_number(drift.p_value[i]),
+            drift_q=_number(q_values["drift"][i]),
+            latest=_number(sums.origin[i] + sums.latest[i]),
+            latest_at=_date(float(sums.last_d[i])),
+            since=_date(float(sums.since_d[i])),
+            limit=_number(limit[i]),
+            years_to_limit=_number(years[i]) if kind[i] == 1 else None,
+        )
+        for rank, i in enumerate(order[: request.top or None], start=1)
+    )
+    return FleetAnswer(
+        machines=len(np.unique(sums.machine)),
+        rows=len(sums.machine),
+        values=int(sums.runs.sum()),
+        false_discovery_rate=RATE,
+        attention={label: int((kind == number).sum()) for number, label in enumerate(ATTENTION)},
+        table=tuple(rows),
+    )

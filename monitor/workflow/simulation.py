@@ -9,14 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from monitor.exceptions import InputError
-from monitor.methods.samba.virtual import virtual_campaign
-from monitor.methods.tracker.virtual import virtual_robot
+from monitor.methods import Rehearsal, methods
 from monitor.readers import write_campaign
 from monitor.units import MICROMETRE
-
-# Noise of a reading where the request names none, standard deviation: a touch of a probe, a point of a tracker.
-NOISE_OF_TOUCH_UM = 1.0
-NOISE_OF_TRACKER_UM = 20.0
 
 
 @dataclass(frozen=True)
@@ -24,7 +19,7 @@ class SimulateRequest:
     """A virtual campaign: its folder, the hidden effect with its largest displacement, and the noise of a reading.
 
     The campaign is named after ``out``. ``robot`` asks for a robot that a tracker observes instead of a machine tool
-    that ``samba`` touches.
+    that a probe touches.
     """
 
     out: Path
@@ -47,7 +42,18 @@ class SimulateRequest:
         """The noise in µm, that of the instrument where the request names none."""
         if self.noise_um is not None:
             return self.noise_um
-        return NOISE_OF_TRACKER_UM if self.robot else NOISE_OF_TOUCH_UM
+        return self.rehearsal.noise_um
+
+    @property
+    def rehearsal(self) -> Rehearsal:
+        """The virtual machine of the first method that has one of the kind."""
+        machine = "robot" if self.robot else "machine tool"
+        rehearsals = (method.rehearsal for method in methods().values())
+        return next(
+            rehearsal
+            for rehearsal in rehearsals
+            if isinstance(rehearsal, Rehearsal) and rehearsal.machine == machine
+        )
 
 
 @dataclass(frozen=True)
@@ -67,8 +73,7 @@ class SimulateAnswer:
 
 def simulate(request: SimulateRequest) -> SimulateAnswer:
     """Write a virtual campaign folder. Raises InputError for an effect that the machine or robot does not have."""
-    make = virtual_robot if request.robot else virtual_campaign
-    campaign = make(
+    campaign = request.rehearsal.virtual_campaign(
         request.out.resolve().name,
         np.random.default_rng(request.seed),
         effect=request.effect,

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import explain, fit
-from monitor.discovery.machine.scan import scan
+from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.variants import variants_of
-from monitor.discovery.machine.visible import see
+from monitor.discovery.search.scan import scan
 from monitor.effects.catalogue import catalogue, drivers_of
 from monitor.methods.samba.method import problem_of
 from monitor.readers import read_campaign
@@ -27,7 +27,7 @@ def test_full_scan_of_150_candidates_on_20_runs(benchmark: Any) -> None:
     effects = catalogue(problem.context.chain, base, drivers_of(problem.context))
     variants = [one for effect in effects for one in variants_of(effect) if one.tries == 1][:150]
     assert len(variants) == 150
-    found = benchmark(lambda: scan(see(now, variants)))
+    found = benchmark(lambda: scan(scene_of(now, variants)))
     assert [one.candidate.family for one in found.findings] == ["EXX:reversal"]
 
 

@@ -145,7 +145,7 @@ def arms(rng: np.random.Generator, runs: int) -> Campaign:
 
 def explained(campaign: Campaign) -> Explanation:
     """What the search says of a campaign under the method's base model."""
-    method = {one.NAME: one for one in (rotary_probing, free_form, l_shape)}[campaign.method]
+    method = {method.name: method for method in (rotary_probing, free_form, l_shape)}[campaign.method]
     return explain(campaign, method.problem_of(campaign), campaign.method, rng=np.random.default_rng(1))
 
 

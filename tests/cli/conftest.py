@@ -100,18 +100,26 @@ def examples() -> Path:
 
 
 @pytest.fixture(scope="session")
-def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A database with three campaigns. Verbs that only add results may use it; others take ``db``."""
-    path = tmp_path_factory.mktemp("filled") / "shop floor ü.duckdb"
+def filled_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A database with three campaigns and no results, to be copied."""
+    path = tmp_path_factory.mktemp("filled") / "filled.duckdb"
     assert main(["--db", str(path), "import", *(str(EXAMPLES / name) for name in CAMPAIGNS)]) == 0
     return path
 
 
+@pytest.fixture(scope="module")
+def filled(filled_once: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The module's copy of the three campaigns. Verbs that only add results may use it; others take ``db``."""
+    path = tmp_path_factory.mktemp("module") / "shop floor ü.duckdb"
+    shutil.copyfile(filled_once, path)
+    return path
+
+
 @pytest.fixture
-def db(filled: Path, tmp_path: Path) -> Path:
+def db(filled_once: Path, tmp_path: Path) -> Path:
     """A database of the test's own with the three campaigns."""
     path = tmp_path / "own.duckdb"
-    shutil.copyfile(filled, path)
+    shutil.copyfile(filled_once, path)
     return path
 
 
@@ -133,10 +141,10 @@ class Issued:
 
 
 @pytest.fixture(scope="session")
-def issued_once(filled: Path, laboratory: Path, tmp_path_factory: pytest.TempPathFactory) -> Issued:
+def issued_once(filled_once: Path, laboratory: Path, tmp_path_factory: pytest.TempPathFactory) -> Issued:
     folder = tmp_path_factory.mktemp("certificates") / "out folder ü"
     path = folder.parent / "issued.duckdb"
-    shutil.copyfile(filled, path)
+    shutil.copyfile(filled_once, path)
     for campaign, run in (("five-days", 20), ("five-days", 19), ("cold-cold", 3)):
         status = main(["--db", str(path), "certificate", "issue", campaign, "--run", str(run), "--date", "2026-03-10",
                        "--laboratory", str(laboratory), "--out", str(folder)])  # fmt: skip

@@ -144,11 +144,11 @@ def entries(path: Path) -> int:
         )
 
 
-@pytest.fixture(scope="session")
-def untouched(filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module")
+def untouched(filled_once: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A database that every refused verb leaves as it is."""
     path = tmp_path_factory.mktemp("untouched") / "x.duckdb"
-    path.write_bytes(filled.read_bytes())
+    path.write_bytes(filled_once.read_bytes())
     return path
 
 

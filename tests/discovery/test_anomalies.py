@@ -7,13 +7,13 @@ import pytest
 from by_path import simulator
 
 from monitor.discovery import Verdict, fit
-from monitor.discovery.machine.anomalies import bad_points, ball_moves, plan_places
+from monitor.discovery.machine.anomalies import bad_points, ball_moves, plan_cells
 from monitor.methods.samba.method import problem_of
 
 
 def test_places_are_the_same_probing_of_every_run(virtual_campaigns):
     campaign, told = virtual_campaigns.virtual(1, days=1, runs_per_day=3)
-    places = plan_places(fit(problem_of(campaign)))
+    places = plan_cells(fit(problem_of(campaign)))
     assert len(set(places)) == 62
     for sequence in (1, 30, 62):
         assert len(set(places[told["sequence"] == sequence])) == 1
@@ -24,7 +24,7 @@ def test_places_of_plans_that_differ_go_by_what_was_probed(virtual_campaigns):
         1, days=1, runs_per_day=2, keep=lambda told: (told["run"] == 1) | (told["sequence"] > 20)
     )
     found = fit(problem_of(campaign))
-    places = plan_places(found)
+    places = plan_cells(found)
     context = found.problem.context
     second = np.flatnonzero(context.run == 2)
     for row in second[:10]:
@@ -109,7 +109,7 @@ def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns
     assert found.varies
     assert found.held_out_after is None
     assert abs(found.amplitude - 2e-7) < 3 * found.u
-    assert "not recorded" in found.words.cause
+    assert "not recorded" in found.description.cause
     assert answer.suspect == ()
     assert answer.moves == ()
     assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING

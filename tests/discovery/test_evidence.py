@@ -10,12 +10,12 @@ import statsmodels.api as sm
 from by_path import simulator
 
 from monitor.discovery import fit
-from monitor.discovery.machine.evidence import Pool, weigh
-from monitor.discovery.machine.held_out import held_out_rms
-from monitor.discovery.machine.scan import amplitudes
+from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.variants import variants_of
 from monitor.discovery.machine.version_error import version_error
-from monitor.discovery.machine.visible import see
+from monitor.discovery.search.amplitudes import amplitudes
+from monitor.discovery.search.evidence import Pool, weigh
+from monitor.discovery.search.held_out import held_out_rms
 from monitor.effects import parse_effect
 from monitor.methods.samba.method import problem_of
 
@@ -33,7 +33,7 @@ def seen(virtual_campaigns):
     chain = now.problem.context.chain
     texts = ["EXX:reversal", "EBB:harmonic2", "EAX:poly1", "EYX:poly2"]
     variants = [one for text in texts for one in variants_of(parse_effect(text, chain))]
-    return now, see(now, variants), told
+    return now, scene_of(now, variants), told
 
 
 def test_projected_columns_are_the_residual_of_a_regression_on_the_runs_own_unknowns(seen):

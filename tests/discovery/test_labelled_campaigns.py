@@ -47,7 +47,7 @@ def test_spindle_growth_with_its_time_constant(example):
     assert found.peak == pytest.approx(6e-3, abs=1e-3)
     assert found.searched.name == "time constant"
     assert abs(found.searched.value - 18.0) < 2 * found.searched.u
-    assert "spindle" in found.words.meaning
+    assert "spindle" in found.description.meaning
     within_the_floor(found)
 
 
@@ -70,7 +70,7 @@ def test_reversal_of_x_is_half_the_reversal_error(example):
     (found,) = answer.missing
     assert found.effect == "EXX:reversal"
     assert abs(abs(found.amplitude) - 4e-3) < 3 * found.u
-    assert "backlash" in found.words.cause
+    assert "backlash" in found.description.cause
     within_the_floor(found)
 
 

@@ -13,8 +13,8 @@ from by_path import simulator
 
 from monitor.discovery import Explanation, explain, fit
 from monitor.discovery.machine.poses import poses_of_rows, widening
+from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.variants import variants_of
-from monitor.discovery.machine.visible import see
 from monitor.effects import parse_effect
 from monitor.exceptions import DataError
 from monitor.methods.tracker.method import METHOD as tracker
@@ -66,7 +66,7 @@ def test_uncertainty_is_wider_where_poses_share_something(robots, tmp_path, repe
     assert poses is not None
     chain = now.problem.context.chain
     texts = ("EBJ2:compliance@gravity", "ECJ1:lag", "EBJ3:harmonic1")
-    visible = see(now, [variants_of(parse_effect(text, chain))[0] for text in texts])
+    visible = scene_of(now, [variants_of(parse_effect(text, chain))[0] for text in texts])
     factors = [float(widening(visible, [one], poses).max()) for one in visible.candidates]
     assert low <= float(np.median(factors)) <= high
 

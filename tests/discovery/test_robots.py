@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from monitor.discovery import Explanation, Verdict, explain, fit
-from monitor.discovery.machine.held_out import held_out_error, pose_parts
+from monitor.discovery.machine.held_out import pose_parts
+from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.version_error import version_error
-from monitor.discovery.machine.visible import see
 from monitor.methods.model import Model
 from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
@@ -114,8 +114,8 @@ def test_blocks_of_poses_left_out_against_brute_force(robots, tmp_path):
     for part in range(10):
         without = fit(problem, rows == part, whole)
         total += float(np.sum((without.vectors[rows == part] / 0.02) ** 2))
-    seen = see(whole, [])
-    fast = held_out_error(whole, seen, seen.added, np.zeros(1, dtype=np.int64))
+    seen = scene_of(whole, [])
+    fast = seen.held_out_error(seen.shared)
     assert fast == pytest.approx(0.02 * np.sqrt(total / whole.readings), rel=1e-3)
     assert version_error(whole).held_out_rms == pytest.approx(fast)
 

@@ -41,8 +41,8 @@ def test_poses_tell_the_table_from_the_pivot(virtual_campaigns, explained, campa
     (found,) = explained(campaign_with(plan, 3, hidden)).missing
     assert {"EXC:harmonic2", "EXB:harmonic3"} <= names(found)
     assert all(rival.coincides for rival in found.rivals)
-    assert found.separation.now < 1.0
-    assert found.separation.then > 5.0
+    assert found.separation.before < 1.0
+    assert found.separation.after > 5.0
     assert found.separation.poses
     assert found.separation.together == ()
     (alone,) = explained(campaign_with(plan, 4, hidden, found.separation.poses)).missing

@@ -22,20 +22,25 @@ def bumped(virtual_campaigns):
     return virtual_campaigns.virtual(4, [bump, sim.Effect("EZC1:const@warmup", peak_um=6.0)])[0]
 
 
-def test_a_bump_is_one_table_and_nothing_is_missing_once_it_is_added(bumped, explained):
-    answer = explained(bumped)
-    found = [one.effect for one in answer.missing]
+@pytest.fixture(scope="module")
+def explanation(bumped, explained):
+    """What the plain model lacks of the bumped guideway."""
+    return explained(bumped)
+
+
+def test_a_bump_is_one_table_and_nothing_is_missing_once_it_is_added(bumped, explanation):
+    found = [one.effect for one in explanation.missing]
     assert len(found) == 2
     assert found[0].startswith("EYX:table(")
     assert found[1] == "EZC1:const@warmup"
-    assert answer.final.scale == pytest.approx(1.0, abs=0.03)
+    assert explanation.final.scale == pytest.approx(1.0, abs=0.03)
     added = problem_of(bumped, Model("samba", added=tuple(found)))
     assert not explain(bumped, added, "samba", rng=np.random.default_rng(1)).missing
 
 
-def test_the_ends_of_a_table_hold_what_the_base_can_do(bumped, explained):
+def test_the_ends_of_a_table_hold_what_the_base_can_do(explanation):
     """Straightness is the deviation from a straight line through the ends (ISO 230-1:2012, 3.5)."""
-    found = explained(bumped).missing[0]
+    found = explanation.missing[0]
     assert found.effect.count("!") == 2
     nodes = [float(word.strip("!)")) for word in found.effect.partition("(")[2].split(",")]
     values = np.interp(nodes, GRID, 8e-3 * np.exp(-(((GRID - 60.0) / 60.0) ** 2)))

@@ -13,6 +13,7 @@ import pytest
 import monitor.methods
 from monitor.exceptions import DataError, InputError
 from monitor.methods import (
+    Able,
     AnglePlan,
     ChainMethod,
     CurveMethod,
@@ -23,6 +24,7 @@ from monitor.methods import (
     method_named,
     methods,
     registry,
+    require,
 )
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.chain.touch import TouchProblem
@@ -62,7 +64,7 @@ def test_a_method_says_what_it_is(name: str) -> None:
     method = methods()[name]
     assert method_named(name) is method
     assert method.name == name == method.own_model.name
-    assert all([method.title, method.description, *vars(method.words).values()])
+    assert all([method.title, method.description, *vars(method.nouns).values()])
     assert not method.own_model.added
     abilities = [value for value in vars(method).values() if isinstance(value, Unable)]
     assert all(ability.why for ability in abilities)
@@ -150,6 +152,15 @@ def test_a_method_of_curves_fits_its_example(name: str) -> None:
 def test_a_campaign_of_an_unknown_method_is_refused_with_those_that_are_known() -> None:
     with pytest.raises(DataError, match="'ballbar' cannot be identified yet; these can: curve, free-form"):
         method_named("ballbar")
+
+
+def test_a_verb_without_an_answer_is_refused_with_the_reason() -> None:
+    campaign = example("samba")
+    require(Able(), campaign, "stats")
+    with pytest.raises(
+        DataError, match=r"stats has no answer for campaign .*, which was measured by samba: one run"
+    ):
+        require(Unable("one run"), campaign, "stats")
 
 
 def test_a_machine_cannot_have_been_measured_by_a_method_of_curves() -> None:

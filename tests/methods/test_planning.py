@@ -7,18 +7,11 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError, InputError
-from monitor.methods.chain.expected import candidate_touches, planned_context, sums_of
 from monitor.methods.chain.least_squares import solve
-from monitor.methods.chain.planning import (
-    STEP_RAD,
-    Candidates,
-    TimeModel,
-    _Search,
-    best_plan,
-    more_balls,
-    pose_grid,
-    quickest_plan,
-)
+from monitor.methods.planning.candidates import STEP_RAD, Candidates, TimeModel, more_balls, pose_grid
+from monitor.methods.planning.expected import sums_of
+from monitor.methods.planning.search import _Search, best_plan, quickest_plan
+from monitor.methods.planning.touches import candidate_touches, planned_context
 from monitor.methods.samba.method import problem_of
 from monitor.methods.samba.virtual import BALLS, BAR_LENGTH, ERRORS, GAINS, INDEXATIONS, virtual_campaign
 

@@ -72,15 +72,17 @@ def thirteen(rng, days, runs, component, height=0.0):
     ("days", "runs", "component", "most"),
     [(4, 5, 2.0, 8), (4, 5, 4.0, 9), (5, 4, 2.0, 8)],
 )
-def test_days_that_differ_much_in_all_parameters_raise_few_false_alarms(days, runs, component, most):
+def test_days_that_differ_much_in_all_parameters_raise_few_false_alarms(days, runs, component, most, seeds):
     rng = np.random.default_rng([days, int(component)])
     histories = thirteen(rng, days, runs, component)
     alarms = 0
-    for _ in range(40):
+    numbers = seeds(40, 12)
+    for _ in numbers:
         values, t, day = next(histories)
         found = find_changes(values, t, days=day, rng=rng)
         alarms += bool(found.changes or found.trends)
-    assert alarms <= most
+    # Of 12 histories more than five once in a thousand times.
+    assert alarms <= {40: most, 12: 5}[len(numbers)]
 
 
 def test_a_step_of_one_parameter_is_found_where_the_days_of_the_others_are_alike():

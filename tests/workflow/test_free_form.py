@@ -16,7 +16,9 @@ from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.model.request import ShowModelRequest
 from monitor.workflow.model.show import show_model
-from monitor.workflow.plan.planning import plan
+from monitor.workflow.plan.answer import AnglePlanAnswer
+from monitor.workflow.plan.plan import plan
+from monitor.workflow.plan.request import PlanRequest
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.volumetric.volumetric import volumetric_map
 
@@ -68,15 +70,17 @@ def test_the_map_knows_the_known_length(db):
 
 
 def test_plan_proposes_angles(db):
-    found = plan(db, "free-form-pocket", poses=2)
-    assert found["present"]["angles_deg"] == [0.0, 75.0, 130.0, 210.0]
-    assert found["present"]["probings"] == 368
-    assert len(found["next_angles_deg"]) == 2
-    assert found["proposed"]["median_expanded_shape_um"] < found["present"]["median_expanded_shape_um"]
+    answer = plan(db, PlanRequest("free-form-pocket", poses=2))
+    assert isinstance(answer, AnglePlanAnswer)
+    present, proposed = answer.present, answer.proposed
+    assert present.angles_deg == (0.0, 75.0, 130.0, 210.0)
+    assert present.probings == 368
+    assert len(answer.next_angles_deg) == 2
+    assert proposed.shape.median_expanded_shape_um < present.shape.median_expanded_shape_um
     with pytest.raises(InputError, match="a plan of the method free-form is its angles of the table"):
-        plan(db, "free-form-pocket", balls=4)
+        plan(db, PlanRequest("free-form-pocket", balls=4))
     with pytest.raises(InputError, match="choose 1 to 12 more angles"):
-        plan(db, "free-form-pocket", poses=13)
+        plan(db, PlanRequest("free-form-pocket", poses=13))
 
 
 def test_fig_9_raw_beside_identified(db, tmp_path):

@@ -17,6 +17,7 @@ import numpy as np
 import pypdf
 import pytest
 from by_path import load
+from monitor.workflow.history.health_series import FALSE_ALARM, Series, changes_of, drift_of
 
 from monitor.cli import main
 from monitor.documents import from_document, to_document
@@ -29,7 +30,6 @@ from monitor.store import Database, import_campaign, record_event
 from monitor.workflow.health.machine import Settings
 from monitor.workflow.health.report import report, stored_health
 from monitor.workflow.health.weeks import week_before, week_named
-from monitor.workflow.history.health_series import FALSE_ALARM, Series, changes_of, drift_of
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.volumetric.volumetric import volumetric_map
 

@@ -16,7 +16,7 @@ from by_path import load
 
 from monitor.discovery import Verdict
 from monitor.store import Database
-from monitor.workflow.events import EventRequest, record
+from monitor.workflow.events import EventRequest, event
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.identify.identify import identify
@@ -57,7 +57,7 @@ def test_table_4_only_the_z_offset_drifts(db):
 
 def test_table_4_compensation_moves_what_was_compensated(db):
     noon = datetime(2012, 3, 5, 12, 0, tzinfo=timezone(timedelta(hours=9)))
-    record(db, EventRequest("TILT-500", noon, "compensation", "dx, dy, dz and the zero of A"))
+    event(db, EventRequest("TILT-500", "dx, dy, dz and the zero of A", noon, "compensation"))
     (pair,) = trends(db, "TILT-500").document["agreement"]
     assert pair["kind"] == "event"
     assert pair["campaigns"] == ["tilting-table", "tilting-table-compensated"]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from monitor.workflow.history.change_search import search_changes
 
 from monitor.cli import main
 from monitor.exceptions import DataError, InputError, NotFoundError
@@ -26,7 +27,6 @@ from monitor.store import (
 )
 from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import fleet
-from monitor.workflow.history.change_search import search_changes
 from monitor.workflow.run_statistics.columns import group_labels
 from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.selections import select, side_by_side

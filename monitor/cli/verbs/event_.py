@@ -13,7 +13,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow import events
+from monitor.workflow.events import EventRequest, event
 
 EXAMPLE = 'monitor event HU40-T --at 2026-03-05T07:00:00-05:00 --kind repair "B axis encoder changed"'
 
@@ -33,26 +33,20 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    moment = None
-    if options.at is not None:
-        try:
-            moment = datetime.fromisoformat(options.at)
-        except ValueError:
-            raise InputError(f"--at {options.at}: write a time as 2026-03-05T07:00:00-05:00") from None
-        if moment.tzinfo is None:
-            raise InputError(
-                f"--at {options.at} lacks its offset from UTC: write for example {options.at}-05:00"
-            )
-    if options.text is not None and moment is None:
-        raise InputError("say when it happened: --at 2026-03-05T07:00:00-05:00")
+    request = EventRequest(
+        options.machine, options.text, None if options.at is None else _moment(options.at), options.kind
+    )
     with opened(options) as db:
-        if options.text is not None and moment is not None:
-            request = events.EventRequest(options.machine, moment, options.kind, options.text)
-            answer = events.record(db, request)
-        else:
-            answer = events.events(db, events.EventsRequest(options.machine))
+        answer = event(db, request)
     if options.json:
         output.document(answer)
     else:
         output.listing(answer.events, "nothing was recorded yet")
     return 0
+
+
+def _moment(text: str) -> datetime:
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        raise InputError(f"--at {text}: write a time as 2026-03-05T07:00:00-05:00") from None

@@ -11,8 +11,7 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.exceptions import InputError
-from monitor.workflow.fleet import fleet
+from monitor.workflow.fleet import FleetRequest, FleetTableRow, fleet
 
 EXAMPLE = "monitor fleet --top 50"
 
@@ -26,33 +25,34 @@ def options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    if options.top < 0:
-        raise InputError(f"--top {options.top}: a number of rows, 0 for all")
+    request = FleetRequest(options.model, options.top)
     with opened(options) as db, output.working("summing"):
-        found = fleet(db, options.model, options.top or None)
+        answer = fleet(db, request)
     if options.json:
-        output.document(found)
+        output.document(answer)
         return 0
-    machines = f"{found['machines']} machine{'' if found['machines'] == 1 else 's'}"
-    rows = [
-        [
-            str(one["rank"]), one["machine"], one["parameter"], one["attention"], one["unit"],
-            "-" if one["latest"] is None else f"{one['latest']:.3g}", f"{one['mean']:.3g}",
-            "-" if one["sd_pooled"] is None else output.two_digits(one['sd_pooled']),
-            "-" if one["between_days"] is None else output.two_digits(one['between_days']),
-            "-" if one["slope_per_year"] is None else f"{one['slope_per_year']:.3g}",
-            "-" if one["limit"] is None else f"{one['limit']:g}",
-            *(output.probability(one[f"{test}_q"]) for test in ("bartlett", "anova", "drift")),
-        ]
-        for one in found["table"]
-    ]  # fmt: skip
     output.table(
-        f"{machines}, {found['values']} values; q: false discovery rate over all rows",
+        f"{answer.machines} machine{'' if answer.machines == 1 else 's'}, {answer.values} values; "
+        "q: false discovery rate over all rows",
         ["rank", "machine", "parameter", "attention", "unit", "latest", "mean", "s runs", "s days", "a year", "limit",
          "Bartlett q", "ANOVA q", "drift q"],
-        rows, text_columns=5,
+        [_cells(row) for row in answer.table], text_columns=5,
     )  # fmt: skip
-    for words, count in found["attention"].items():
+    for attention, count in answer.attention.items():
         if count:
-            output.say(f"{count} of {found['rows']}: {words}")
+            output.say(f"{count} of {answer.rows}: {attention}")
     return 0
+
+
+def _cells(row: FleetTableRow) -> list[str]:
+    return [
+        str(row.rank), row.machine, row.parameter, row.attention, row.unit, _three(row.latest), _three(row.mean),
+        "-" if row.sd_pooled is None else output.two_digits(row.sd_pooled),
+        "-" if row.between_days is None else output.two_digits(row.between_days),
+        _three(row.slope_per_year), "-" if row.limit is None else f"{row.limit:g}",
+        output.probability(row.bartlett_q), output.probability(row.anova_q), output.probability(row.drift_q),
+    ]  # fmt: skip
+
+
+def _three(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

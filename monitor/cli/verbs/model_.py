@@ -11,7 +11,8 @@ from monitor.cli.database import opened
 from monitor.cli.parser import common, described
 from monitor.cli.residual_output import files, four_digits
 from monitor.workflow.explain.request import HistoryRequest
-from monitor.workflow.explain.versions import CurveVersion, MachineVersion, history
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.explain.versions import history
 from monitor.workflow.model.answer import ChangeModelAnswer
 from monitor.workflow.model.change import add_effect, remove_effect
 from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest, ShowModelRequest

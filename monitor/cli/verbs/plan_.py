@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
 
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.residual_output import files
 from monitor.cli.verbs import plan_angles
 from monitor.exceptions import InputError
-from monitor.workflow.plan.planning import plan, plan_figure
+from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlan, BallPlanAnswer, PlannedParameter, Pose
+from monitor.workflow.plan.plan import plan
+from monitor.workflow.plan.request import PlanRequest
 
 EXAMPLE = "monitor plan five-days --balls 4 --poses 10 --separate EBZ:poly2,EZZ:poly2"
 
@@ -38,16 +40,16 @@ def options(parser: ArgumentParser) -> None:
 
 
 def _wanted(texts: list[str]) -> dict[str, float]:
-    found = {}
+    wanted = {}
     for text in texts:
         name, _, number = text.partition("=")
         try:
-            found[name] = float(number)
+            wanted[name] = float(number)
         except ValueError:
             raise InputError(
                 f"--wanted {text}: write a parameter, = and a number, for example EA0C=2.5"
             ) from None
-    return found
+    return wanted
 
 
 def _separate(text: str | None) -> tuple[str, str] | None:
@@ -67,92 +69,101 @@ def _separate(text: str | None) -> tuple[str, str] | None:
 
 
 def run(options: Namespace) -> int:
-    wanted, separate = _wanted(options.wanted), _separate(options.separate)
+    request = PlanRequest(
+        options.campaign, options.model, options.balls, options.poses, _wanted(options.wanted),
+        _separate(options.separate), figures=options.figures,
+    )  # fmt: skip
     # One transaction: files that cannot be written leave no result behind.
     with opened(options) as db, output.working("planning"), db.transaction():
-        found = plan(
-            db, options.campaign, model=options.model, balls=options.balls, poses=options.poses, wanted=wanted,
-            separate=separate,
-        )  # fmt: skip
-        if options.figures is not None and "angles" in found:
-            raise InputError("--figures: a plan of table angles has no figure yet; leave it out")
-        if options.figures is not None:
-            found["figures"] = plan_figure(found, options.figures)
+        answer = plan(db, request)
     if options.json:
-        output.document(found)
-        return 0
-    if "angles" in found:
-        plan_angles.tables(found)
-        return 0
-    _tables(found)
-    if "separate" in found:
-        one = found["separate"]
-        output.say(f"{' and '.join(one['effects'])}: {one['verdict']}")
-        for pose in one["poses"]:
-            output.say(f"   {_pose(pose)}")
-    for file in found.get("figures", []):
-        output.say(file)
+        output.document(answer)
+    elif isinstance(answer, AnglePlanAnswer):
+        plan_angles.tables(answer)
+    else:
+        _tables(answer)
     return 0
 
 
-def _tables(found: dict[str, Any]) -> None:
-    present, proposed = found["present"], found.get("proposed")
-    output.say(f"{found['campaign']}: {_size(present)}")
-    if proposed:
+def _tables(answer: BallPlanAnswer) -> None:
+    proposed = answer.proposed
+    output.say(f"{answer.campaign}: {_size(answer.present)}")
+    if proposed is not None:
         output.say(f"proposed: {_size(proposed)}")
+    _parameters(answer)
+    time = answer.time_model
+    output.say(
+        f"time: {time.seconds_a_probing:.0f} s a probing and {time.seconds_an_indexation:.0f} s more for another "
+        f"indexation ({time.source})"
+    )
+    if proposed is not None:
+        _indexations(proposed)
+    blind = answer.blind_spots if proposed is None else proposed.blind_spots or ()
+    output.say(
+        f"blind spots: {len(blind)} effects leave nothing to see ({', '.join(blind[:6])}, ...); --json lists them"
+    )
+    if answer.separate is not None:
+        output.say(f"{' and '.join(answer.separate.effects)}: {answer.separate.verdict.value}")
+        for pose in answer.separate.poses:
+            output.say(f"   {_pose(pose)}")
+    files(answer.figures)
+
+
+def _parameters(answer: BallPlanAnswer) -> None:
+    """What the present plan promises of every parameter, and the proposed one beside it."""
+    proposed = answer.proposed
     columns = ["parameter", "unit", "u", "separation"]
-    columns += ["u proposed", "separation", "merit"] if proposed else []
-    rows = []
-    for name, one in present["parameters"].items():
-        row = [name, one["unit"], _u(one["u"]), f"{one['separation']:.2f}"]
-        if proposed:
-            other = proposed["parameters"][name]
-            merit = other["figure_of_merit"]
-            row += [_u(other["u"]), f"{other['separation']:.2f}", "-" if merit is None else f"{merit:.2f}"]
-        rows.append(row)
-    stated = found["stated_uncertainty_um"]
+    rows = [
+        [name, parameter.unit, _uncertainty(parameter.u), f"{parameter.separation:.2f}"]
+        for name, parameter in answer.present.parameters.items()
+    ]
+    if proposed is not None:
+        columns += ["u proposed", "separation", "merit"]
+        for row in rows:
+            row += _proposed_cells(proposed.parameters[row[0]])
     output.table(
-        f"expected standard uncertainties of one run, {stated:g} µm a coordinate",
+        f"expected standard uncertainties of one run, {answer.stated_uncertainty_um:g} µm a coordinate",
         columns,
         rows,
         text_columns=2,
     )
-    if proposed:
+    if proposed is not None:
         output.say(
             "merit: what an hour of the proposed plan tells of the parameter, against the present plan"
         )
-    for name in (proposed or present)["refused"]:
+    for name in (proposed or answer.present).refused:
         output.say(f"no number: this plan does not determine {name}")
-    time = found["time_model"]
-    output.say(
-        f"time: {time['seconds_a_probing']:.0f} s a probing and {time['seconds_an_indexation']:.0f} s more for another "
-        f"indexation ({time['from']})"
-    )
-    if proposed:
-        output.say(
-            "indexations (whether the stylus gets there unhindered, only a look at the machine tells):"
-        )
-        for pose in proposed["poses"]:
-            output.say(f"   {_pose(pose)}")
-        new = {name: place for name, place in proposed["ball_places_mm"].items() if name.startswith("new ")}
-        for name, place in new.items():
-            output.say(f"   ball {name} at {', '.join(f'{value:.0f}' for value in place)} mm")
-    blind = (proposed or found)["blind_spots"]
-    output.say(
-        f"blind spots: {len(blind)} effects leave nothing to see ({', '.join(blind[:6])}, ...); --json lists them"
-    )
 
 
-def _size(plan: dict[str, Any]) -> str:
+def _proposed_cells(parameter: PlannedParameter) -> list[str]:
+    merit = parameter.figure_of_merit
+    return [
+        _uncertainty(parameter.u),
+        f"{parameter.separation:.2f}",
+        "-" if merit is None else f"{merit:.2f}",
+    ]
+
+
+def _indexations(plan: BallPlan) -> None:
+    """Where the proposed plan probes, and where its new balls stand."""
+    output.say("indexations (whether the stylus gets there unhindered, only a look at the machine tells):")
+    for pose in plan.poses:
+        output.say(f"   {_pose(pose)}")
+    for name, position in plan.ball_places_mm.items():
+        if name.startswith("new "):
+            output.say(f"   ball {name} at {', '.join(f'{value:.0f}' for value in position)} mm")
+
+
+def _size(plan: BallPlan) -> str:
     return (
-        f"{len(plan['balls'])} balls ({', '.join(plan['balls'])}) at {len(plan['poses'])} indexations, "
-        f"{plan['probings']} probings in {plan['seconds'] / 60.0:.0f} min"
+        f"{len(plan.balls)} balls ({', '.join(plan.balls)}) at {len(plan.poses)} indexations, "
+        f"{plan.probings} probings in {plan.seconds / 60.0:.0f} min"
     )
 
 
-def _u(value: float | None) -> str:
+def _uncertainty(value: float | None) -> str:
     return "none" if value is None else f"{value:.2g}"
 
 
-def _pose(pose: dict[str, float]) -> str:
+def _pose(pose: Pose) -> str:
     return ", ".join(f"{axis[:-4].upper()} {value:g}°" for axis, value in pose.items())

@@ -2,61 +2,67 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from monitor.cli import output
+from monitor.workflow.plan.answer import AngleParameter, AnglePlanAnswer, AnglesOfTable
 
 
-def tables(found: dict[str, Any]) -> None:
+def tables(answer: AnglePlanAnswer) -> None:
     """The present plan, the worth of one more angle, the proposed plan."""
-    present, proposed, table = found["present"], found["proposed"], found["table"]
-    output.say(f"{found['campaign']}: {_size(present, table)}")
-    output.say(f"proposed: {_size(proposed, table)}")
-    rows = []
-    groups = dict.fromkeys(name.partition("(")[0] for name in present["parameters"])
-    for group in groups:
-        now, then = _largest(present, group), _largest(proposed, group)
-        unit = next(
-            one["unit"] for name, one in present["parameters"].items() if name.partition("(")[0] == group
-        )
-        rows.append([group, unit, now, then])
-    stated = found["stated_uncertainty_um"]
+    table = answer.table
+    output.say(f"{answer.campaign}: {_size(answer.present, table)}")
+    output.say(f"proposed: {_size(answer.proposed, table)}")
+    present, proposed = _by_group(answer.present), _by_group(answer.proposed)
     output.table(
-        f"largest expected standard uncertainty of one run, {stated:g} µm a probing",
+        f"largest expected standard uncertainty of one run, {answer.stated_uncertainty_um:g} µm a probing",
         ["of", "unit", "u", "u proposed"],
-        rows,
+        [
+            [group, parameters[0].unit, _largest(parameters), _largest(proposed[group])]
+            for group, parameters in present.items()
+        ],
         text_columns=2,
     )
-    axis = f"{table.lower()}_deg"
     output.table(
-        f"one more angle of {table}: expanded uncertainty of the shape, k = {found['k']:g}",
+        f"one more angle of {table}: expanded uncertainty of the shape, k = {answer.k:g}",
         [f"{table} / °", "largest / µm", "median / µm", "unseen", "points beyond the nodes"],
         [
-            [f"{one[axis]:g}", _u(one["largest_expanded_shape_um"]), _u(one["median_expanded_shape_um"]),
-             str(one["unseen_dimensions"]), str(one["points_beyond_nodes"])]
-            for one in found["angles"]
+            [
+                *(f"{degrees:g}" for degrees in plan.angle.values()),
+                _uncertainty(plan.shape.largest_expanded_shape_um),
+                _uncertainty(plan.shape.median_expanded_shape_um),
+                str(plan.unseen_dimensions),
+                str(plan.shape.points_beyond_nodes),
+            ]
+            for plan in answer.angles
         ],
         text_columns=1,
-    )  # fmt: skip
-    chosen = ", ".join(f"{angle:g}°" for angle in found["next_angles_deg"])
-    output.say(f"probe next at {table} = {chosen}")
+    )
+    angles = ", ".join(f"{degrees:g}°" for degrees in answer.next_angles_deg)
+    output.say(f"probe next at {table} = {angles}")
 
 
-def _largest(plan: dict[str, Any], group: str) -> str:
-    values = [one["u"] for name, one in plan["parameters"].items() if name.partition("(")[0] == group]
-    if any(value is None for value in values):
-        return "none"
-    return _u(max(values))
+def _by_group(plan: AnglesOfTable) -> dict[str, list[AngleParameter]]:
+    """The parameters by what stands before the bracket: ``EXX(110)`` belongs to ``EXX``."""
+    groups: dict[str, list[AngleParameter]] = {}
+    for name, parameter in plan.parameters.items():
+        groups.setdefault(name.partition("(")[0], []).append(parameter)
+    return groups
 
 
-def _size(plan: dict[str, Any], table: str) -> str:
-    angles = ", ".join(f"{angle:g}°" for angle in plan["angles_deg"])
-    said = f"{table} at {angles}: {plan['probings']} probings"
-    if plan["unseen_dimensions"]:
-        return f"{said}, {plan['unseen_dimensions']} dimensions unseen: no full identification"
-    largest, median = plan["largest_expanded_shape_um"], plan["median_expanded_shape_um"]
-    return f"{said}, U of the shape at most {_u(largest)} µm, median {_u(median)} µm (k = 2)"
+def _largest(parameters: list[AngleParameter]) -> str:
+    """The largest standard uncertainty; none where one of them has no number."""
+    numbers = [parameter.u for parameter in parameters if parameter.u is not None]
+    return _uncertainty(max(numbers) if len(numbers) == len(parameters) else None)
 
 
-def _u(value: float | None) -> str:
+def _size(plan: AnglesOfTable, table: str) -> str:
+    angles = ", ".join(f"{angle:g}°" for angle in plan.angles_deg)
+    size = f"{table} at {angles}: {plan.probings} probings"
+    if plan.unseen_dimensions:
+        return f"{size}, {plan.unseen_dimensions} dimensions unseen: no full identification"
+    largest = _uncertainty(plan.shape.largest_expanded_shape_um)
+    median = _uncertainty(plan.shape.median_expanded_shape_um)
+    return f"{size}, U of the shape at most {largest} µm, median {median} µm (k = 2)"
+
+
+def _uncertainty(value: float | None) -> str:
     return "none" if value is None else f"{value:.2g}"

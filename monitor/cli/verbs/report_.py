@@ -6,15 +6,16 @@ What the campaigns of the week still lack (identification, uncertainty, explanat
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from dataclasses import replace
 from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow.health.machine import Settings
 from monitor.workflow.health.mail import mail_report, read_mail_settings
 from monitor.workflow.health.report import report
+from monitor.workflow.health.request import ReportAnswer, ReportOptions, ReportRequest
 
 EXAMPLE = "monitor report --week 2026-W10 --out reports-out --fail-on-alarm"
 
@@ -55,41 +56,50 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     if options.mail is not None:
         read_mail_settings(options.mail)  # what is wrong with it is said before the work, not after
-    settings = Settings(options.model, tuple(options.campaign), options.risk)
+    request = ReportRequest(
+        options.week,
+        options.machine,
+        options.out,
+        ReportOptions(options.model, tuple(options.campaign), options.risk),
+        options.workers,
+    )
     with opened(options, threads=1) as db, output.working("reporting"):
-        found = report(
-            db, options.week, options.machine, options.out, settings=settings, workers=options.workers
-        )
-    found["mailed_to"], unsent = [], None
+        answer = replace(report(db, request), mailed_to=())
+    unsent = None
     try:
-        found["mailed_to"] = [] if options.mail is None else mail_report(options.mail, found)
+        if options.mail is not None:
+            answer = replace(answer, mailed_to=mail_report(options.mail, answer))
     except InputError as error:
-        unsent = error  # the report is there all the same, and is told before what went wrong
+        unsent = error  # the report is there all the same, and is printed before what went wrong
     if options.json:
-        output.document(found)
+        output.document(answer)
     else:
-        output.table(
-            f"week {found['week']}, {found['from']} to {found['to']}",
-            ["machine", "state", "what changed", "since", "P(out)", "next check"],
-            [
-                [
-                    one["machine"],
-                    one["state"],
-                    one["changed"],
-                    (one["since"] or "-")[:10],
-                    "-" if one["probability_out"] is None else f"{one['probability_out']:.2g}",
-                    one["next_check"],
-                ]
-                for one in found["machines"]
-            ],
-            text_columns=6,
-        )
-        if found["message"]:
-            output.say(found["message"])
-        for file in found["files"]:
-            output.say(file)
-        for address in found["mailed_to"]:
-            output.say(f"sent to {address}")
+        _say(answer)
     if unsent is not None:
         raise InputError(f"the report was written, but not sent: {unsent}") from unsent
-    return 1 if options.fail_on_alarm and found["alarms"] else 0
+    return 1 if options.fail_on_alarm and answer.alarms else 0
+
+
+def _say(answer: ReportAnswer) -> None:
+    output.table(
+        f"week {answer.week}, {answer.from_} to {answer.to}",
+        ["machine", "state", "what changed", "since", "P(out)", "next check"],
+        [
+            [
+                row.machine,
+                row.state,
+                row.changed,
+                "-" if row.since is None else f"{row.since:%Y-%m-%d}",
+                "-" if row.probability_out is None else f"{row.probability_out:.2g}",
+                row.next_check,
+            ]
+            for row in answer.machines
+        ],
+        text_columns=6,
+    )
+    if answer.message:
+        output.say(answer.message)
+    for file in answer.files:
+        output.say(file)
+    for address in answer.mailed_to or ():
+        output.say(f"sent to {address}")

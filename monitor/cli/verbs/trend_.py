@@ -15,7 +15,8 @@ from monitor.cli import output, trend_output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow.trend.trends import Choice, trends
+from monitor.workflow.trend.request import TrendRequest
+from monitor.workflow.trend.trends import trend
 
 EXAMPLE = "monitor trend HU40-T --since 2025-01-01 --figures figures"
 
@@ -54,41 +55,30 @@ def _date(text: str, option: str) -> datetime:
     return moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
 
 
+def _period(text: str) -> tuple[datetime, datetime]:
+    start, dots, end = text.partition("..")
+    if not dots:
+        raise InputError(f"--reference {text}: write two dates as 2026-01-01..2026-03-01")
+    return _date(start, "--reference"), _date(end, "--reference")
+
+
 def run(options: Namespace) -> int:
-    if not 0.0 < options.reliability < 1.0:
-        raise InputError(f"--reliability {options.reliability:g}: a probability lies between 0 and 1")
-    limit = options.volumetric_limit
-    if limit is not None and not 0.0 < limit < float("inf"):
-        raise InputError(f"--volumetric-limit {limit:g}: a limit in µm lies above zero")
-    if limit is not None and options.parameter is not None:
-        raise InputError("--volumetric-limit needs all parameters; leave out --parameter")
-    reference = None
-    if options.reference is not None:
-        start, dots, end = options.reference.partition("..")
-        if not dots:
-            raise InputError(f"--reference {options.reference}: write two dates as 2026-01-01..2026-03-01")
-        reference = (_date(start, "--reference"), _date(end, "--reference"))
-        if reference[0] >= reference[1]:
-            raise InputError(f"--reference {options.reference}: the first date must lie before the second")
-    choice = Choice(
+    request = TrendRequest(
+        machine=options.machine,
         parameter=options.parameter,
         since=None if options.since is None else _date(options.since, "--since"),
         next_check=None if options.next_check is None else _date(options.next_check, "--next-check"),
-        reference=reference,
+        reference=None if options.reference is None else _period(options.reference),
         reliability=options.reliability,
         campaigns=tuple(options.campaign),
         model=options.model,
-        volumetric_limit_um=limit,
+        volumetric_limit_um=options.volumetric_limit,
+        figures=options.figures,
     )
     with opened(options) as db, output.working("following"), db.transaction():
-        made = trends(db, options.machine, choice)
-        found = made.document
-        if options.figures is not None:
-            from monitor.workflow.trend.figures import trend_figures
-
-            found["figures"] = trend_figures(made, options.figures)
+        answer = trend(db, request)
     if options.json:
-        output.document(found)
-        return 0
-    trend_output.say(found)
+        output.document(answer)
+    else:
+        trend_output.say(answer)
     return 0

@@ -4,229 +4,210 @@ bend that a polynomial does as well, and lower the error on rows that took no pa
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from monitor.discovery.curve.candidates import POWERS, at_best, separable
-from monitor.discovery.curve.quality import folds
-from monitor.discovery.curve.scene import Scene, effect_of, orthonormal_to_full_precision
-from monitor.discovery.machine.evidence import Pool, weigh, without
-from monitor.discovery.machine.held_out import held_out_rms
-from monitor.discovery.machine.visible import SMALLEST_SHARE, Candidate, Visible
+from monitor.discovery.curve.candidates import at_best_value
+from monitor.discovery.curve.catalogue import POWERS
+from monitor.discovery.curve.noise_evidence import HALF, NoiseEvidence
+from monitor.discovery.curve.scene import CurveCandidate, CurveScene
+from monitor.discovery.search.acceptance import Acceptance, lowers_held_out_error
+from monitor.discovery.search.evidence import Evidence, Pool, weigh_beside
+from monitor.discovery.search.projection import orthonormal_to_full_precision, without
+from monitor.discovery.search.scene import family_count
 from monitor.effects.curve import SEARCHED, CurveEffect
 from monitor.records import Array
-from monitor.statistics.noise import Assessed, assess, p_value_against_noise, p_value_in_noise
 
 #: Fewer cycles than these over the range of an input can be a bend.
 MOST_BENDS = 2.0
+#: Two periods of one input are separated from a whole cycle over its range on (Rayleigh's criterion).
+APART = 1.0
 #: An effect that stands out of the noise by itself has to be likelier than noise alone at this level too.
 AGAINST_NOISE = 0.05
 #: Effects that are asked together whether they, rather than noise, make neighbours resemble each other.
 MOST_TOGETHER = 5
-#: The two explanations do not nest, and F makes too much of the better one. Noise of ENSO's length (correlation 0.85 in
-#: 40 % of the variance, what its annual cycle leaves) has two cycles as good as those of ENSO in 7.3 % of 300 series,
-#: where F and the price of the search come to 2.8 %; of 200 series of slower noise (0.95) 5 % have some as good as
-#: 0.3 %. Half the square root of what F says agrees with both within their scatter.
-HALF = 0.5
-#: Effects in company that noise alone would bring forth in at most so many series are told, as likely and with that
-#: probability; they count as found where it is below the rate of the scan.
+#: Effects in company that noise alone would bring forth in at most so many series are reported, as likely and with that
+#: probability; they are certain where it is below the rate of the scan.
 LIKELY = 0.1
-#: A line and a cycle together: slow noise (correlation 0.97 and independent readings) is taken for them at 0.05 in
+#: A line and a cycle together: slow noise (correlation 0.97 and independent readings) is mistaken for them at 0.05 in
 #: every fifth series of 100 rows.
 LINE_AGAINST_NOISE = 1e-6
 
 
-@dataclass
-class Acceptance:
-    """The last word on a finding; keeps in ``doubts`` how often noise alone would do as well as each effect that
-    stood."""
+class CurveAcceptance(Acceptance[CurveCandidate]):
+    """The rules of a search in a curve; ``doubts`` says by family how often noise alone would do as well as each effect
+    that stood."""
 
-    scene: Scene
-    visible: Visible
-    rate: float
-    doubts: dict[str, float] = field(default_factory=dict)
-    known: dict[tuple[str, ...], float] = field(default_factory=dict)
-    odds: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = field(default_factory=dict)
+    def __init__(self, scene: CurveScene, rate: float) -> None:
+        self.scene = scene
+        self.rate = rate
+        self.families = family_count(scene)
+        self.evidence = NoiseEvidence(scene)
+        self.doubts: dict[str, float] = {}
 
-    def is_a_bend(self, others: Sequence[Candidate], found: Candidate) -> bool:
-        """Whether a polynomial in the same input does as well at its price as a cycle, an exponential or a step: then
-        it is the simpler answer and has its turn."""
-        effect = effect_of(found)
-        x = self.scene.fit.problem.inputs.numbers.get(effect.column, np.zeros(1))
-        many = effect.shape == "sin" and float(np.ptp(x)) > MOST_BENDS * float(effect.value or 1.0)
-        if effect.shape not in SEARCHED or many:
+    def accepts(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
+        """Whether an effect stands in noise, beside a line too, and lowers Schwarz's criterion and the held-out
+        error."""
+        line = self._line(others, candidate)
+        if line is not None and not self.stands([*others, line], candidate):
             return False
-        problem, rows = self.scene.fit.settled, self.scene.fit.problem.order
-        y = problem.curve.measured[rows]
-        chosen = [effect_of(one) for one in others]
-        ends = []
-        for last in (effect, *(CurveEffect(effect.column, f"poly{power}") for power in POWERS[1:])):
-            left, rank = _left(y, problem.columns([*problem.effects, *chosen, last])[2][rows])
-            ends.append(len(y) * np.log(max(left, 1e-300)) + (rank + (last is effect)) * np.log(len(y)))
-        return bool(min(ends[1:]) <= ends[0])
+        if not self.stands(others, candidate) or not self._lowers_bic(others, candidate):
+            return False
+        return not self._is_a_bend(others, candidate) and lowers_held_out_error(self.scene, others, candidate)
 
-    def line(self, others: Sequence[Candidate], found: Candidate) -> Candidate | None:
-        """The straight line in the same input, where it is not in the model yet: a bend must say something beside it,
-        or the line is the simpler answer."""
-        column = effect_of(found).column
-        for one in self.pool.candidates:
-            effect = effect_of(one)
-            if effect.column == column and effect.order == 1 and effect_of(found).order != 1:
-                return None if any(effect_of(other) == effect for other in others) else one
-        return None
+    def at_best_value(self, selected: Sequence[CurveCandidate], index: int) -> CurveCandidate:
+        """The selected candidate at an index with its period or constant at the best value."""
+        return at_best_value(self.scene, selected, index)
 
-    @cached_property
-    def pool(self) -> Pool:
-        return Pool(tuple(one for one in self.visible.candidates if one.share > SMALLEST_SHARE))
+    def separable(
+        self, selected: Sequence[CurveCandidate], weighed: list[Evidence[CurveCandidate]]
+    ) -> list[Evidence[CurveCandidate]]:
+        """Evidence for candidates whose period, if any, lies far enough from those in the model and selected."""
+        problem = self.scene.curve.problem
+        rates: dict[str, list[float]] = {name: [] for name in problem.inputs.numbers}
+        for effect in (*problem.effects, *(candidate.effect for candidate in selected)):
+            if effect.shape == "sin" and effect.value:
+                rates[effect.column].append(1.0 / effect.value)
+        spans = {name: float(np.ptp(problem.inputs.numbers[name])) for name in rates}
 
-    def falls(self, others: Sequence[Candidate], found: Candidate) -> bool:
-        """Whether Schwarz's criterion of ordinary least squares falls: an effect that only shows in whitened rows
-        takes next to nothing of the error away."""
-        fitted, rows = self.scene.fit, self.scene.fit.problem.order
-        y = fitted.problem.curve.measured[rows]
-        problem, chosen = fitted.settled, [effect_of(one) for one in others]
-        # The lower powers that come along with a power count too.
-        before = _left(y, problem.columns([*problem.effects, *chosen])[2][rows])
-        after = _left(y, problem.columns([*problem.effects, *chosen, effect_of(found)])[2][rows])
-        price = (after[1] - before[1] + effect_of(found).free) * np.log(len(y))
-        return bool(len(y) * np.log(before[0] / max(after[0], 1e-300)) > price)
+        def is_apart(effect: CurveEffect) -> bool:
+            if effect.shape != "sin" or not effect.value:
+                return True
+            rate, least = 1.0 / effect.value, APART / spans[effect.column]
+            return all(abs(other - rate) >= least for other in rates[effect.column])
 
-    @cached_property
-    def families(self) -> int:
-        """How many kinds of effects are looked at."""
-        return len({one.family for one in self.visible.candidates if one.share > SMALLEST_SHARE})
+        return [evidence for evidence in weighed if is_apart(evidence.candidate.effect)]
 
-    def p_value(self, others: Sequence[Candidate], found: Candidate) -> float:
-        """In correlated noise, everything that was searched paid for."""
-        fitted, rows = self.scene.fit, self.scene.fit.problem.order
-        columns = [fitted.design, *(self.scene.columns(effect_of(one)) for one in others)]
-        key = (found.family, *sorted(one.family for one in others))
-        if key in self.known:
-            return self.known[key]
-        measured = fitted.problem.curve.measured
-        p = p_value_in_noise(
-            measured[rows], np.column_stack(columns)[rows], self.scene.columns(effect_of(found))[rows]
-        )
-        self.known[key] = min(1.0, p * found.variant.tries)
-        return self.known[key]
+    def outdoes(self, selected: Sequence[CurveCandidate], rival: CurveCandidate) -> bool:
+        """Whether a rival still says something beside the selected ones, noise allowed for."""
+        return self.stands_alone(selected, rival)
 
-    def stands(self, others: Sequence[Candidate], found: Candidate) -> bool:
+    def stands_alone(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
+        """Whether an effect stands out from correlated noise by itself, everything that was searched paid for."""
+        return self.evidence.p_value(others, candidate) * self.families <= self.rate
+
+    def stands(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
         """Whether correlated noise is no better explanation.
 
         Alone: the effect stands out from the noise that its model leaves, and its model is likelier than noise
         alone. In company: a line and cycles of one input look like correlated noise as long as one of them is not in
         the model, so they are asked together, and the rows have to be independent once all are in.
         """
-        asked = found.family
-        found = at_best(self.scene, self.visible, [*others, found], len(others))
-        p = self.p_value(others, found)
-        if p * self.families <= self.rate and self.likelier(others, [found], AGAINST_NOISE):
-            doubt: float | None = p * self.families
+        family = candidate.family
+        candidate = self.at_best_value([*others, candidate], len(others))
+        if self.stands_alone(others, candidate) and self.evidence.odds(others, [candidate]) <= AGAINST_NOISE:
+            doubt: float | None = self.evidence.p_value(others, candidate) * self.families
         else:
-            doubt = self.in_company(others, found)
+            doubt = self._doubt_in_company(others, candidate)
         if doubt is not None:
-            self.doubts[asked] = self.doubts[found.family] = doubt
+            self.doubts[family] = self.doubts[candidate.family] = doubt
         return doubt is not None
 
-    def in_company(self, others: Sequence[Candidate], found: Candidate) -> float | None:
-        """How often noise alone would bring forth a line or a cycle and what it needs beside it; None where that is too
-        often, or the rows stay dependent."""
-        line = effect_of(found).order == 1
-        if not (line or effect_of(found).shape == "sin"):
+    def _doubt_in_company(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> float | None:
+        """The rate at which noise alone would produce a line or a cycle and what it needs beside it; None where that
+        is too high, or the rows stay dependent."""
+        effect = candidate.effect
+        line = effect.order == 1
+        if not (line or effect.shape == "sin"):
             return None
-        if self.alone(others, found) * self.families > self.rate:
+        if self.evidence.p_value_in_white_noise(others, candidate) * self.families > self.rate:
             return None
-        kind = (effect_of(found).column, "sin")
-        same = (
-            [] if line else [one for one in others if (effect_of(one).column, effect_of(one).shape) == kind]
-        )
-        rest = [one for one in others if one not in same]
-        together = [found, *same]
+        cycles = [] if line else [other for other in others if _is_cycle(other, effect.column)]
+        rest = [other for other in others if line or not _is_cycle(other, effect.column)]
         # Slow noise is a line and some cycles too: one cycle has to make a line plain.
-        most = 2 if line else max(MOST_TOGETHER, len(same) + 1)
+        most = 2 if line else max(MOST_TOGETHER, len(cycles) + 1)
         level = LINE_AGAINST_NOISE if line else (LIKELY / HALF) ** 2
+        return self._doubt_together(rest, [candidate, *cycles], most, level)
+
+    def _doubt_together(
+        self, rest: Sequence[CurveCandidate], together: list[CurveCandidate], most: int, level: float
+    ) -> float | None:
+        """The doubt of effects, with as many cycles of their input added as make the rows independent."""
+        column = together[0].effect.column
         while len(together) <= most:
-            enough = len(together) > 1 and self.likelier(rest, together, level)
-            if enough and not self.noise_after([*rest, *together]).noticed:
-                return self.doubt_of_all(rest, together)
-            more = self.next_one([*rest, *together], kind)
-            if more is None:
+            likelier = len(together) > 1 and self.evidence.odds(rest, together) <= level
+            if likelier and not self.evidence.noise_after([*rest, *together]).noticed:
+                return self.evidence.doubt(rest, together)
+            cycle = self._next_cycle([*rest, *together], column)
+            if cycle is None:
                 return None
-            together.append(more)
+            together = [*together, cycle]
         return None
 
-    def design(self, others: Sequence[Candidate]) -> tuple[Array, Array]:
-        """Response (m,) and columns (m, c) of the model with others, rows in the order of time."""
-        fitted, rows = self.scene.fit, self.scene.fit.problem.order
-        columns = [fitted.design, *(self.scene.columns(effect_of(one)) for one in others)]
-        return fitted.problem.curve.measured[rows], np.column_stack(columns)[rows]
-
-    def likelier(self, others: Sequence[Candidate], together: Sequence[Candidate], level: float) -> bool:
-        """Whether effects together, their search paid for, explain the rows better than noise alone."""
-        key = _key(others, together)
-        if key not in self.odds:
-            y, x = self.design(others)
-            added = np.column_stack([self.scene.columns(effect_of(one)) for one in together])
-            price = np.prod([float(one.variant.tries) for one in together]) / math.factorial(len(together))
-            self.odds[key] = p_value_against_noise(y, x, added[self.scene.fit.problem.order]) * float(price)
-        return self.odds[key] <= level
-
-    def doubt_of_all(self, others: Sequence[Candidate], together: Sequence[Candidate]) -> float:
-        """How often noise alone would do as well as effects together beside others."""
-        self.likelier(others, together, LIKELY)
-        return HALF * math.sqrt(self.odds[_key(others, together)])
-
-    def alone(self, others: Sequence[Candidate], found: Candidate) -> float:
-        """p-value in independent noise, the search paid for."""
-        y, x = self.design(others)
-        own = self.scene.columns(effect_of(found))[self.scene.fit.problem.order]
-        return p_value_in_noise(y, x, own, white=True) * found.variant.tries
-
-    def noise_after(self, chosen: Sequence[Candidate]) -> Assessed:
-        """The noise that is left with the chosen ones in the model."""
-        return assess(*self.design(chosen))
-
-    def next_one(self, chosen: Sequence[Candidate], kind: tuple[str, str]) -> Candidate | None:
-        """The most convincing candidate of a kind (column, shape) beside the chosen ones, at its best value."""
-        stack = np.concatenate([self.visible.added, *(one.columns for one in chosen)], axis=1)
-        taken = {one.family for one in chosen}
-        apart = separable(self.scene.fit.problem)
-        found = weigh(self.pool, self.visible.residual, stack, self.visible.degrees_of_freedom)
+    def _next_cycle(self, selected: Sequence[CurveCandidate], column: str) -> CurveCandidate | None:
+        """The most convincing cycle of an input beside the selected candidates, at its best period."""
+        families = {candidate.family for candidate in selected}
+        weighed = weigh_beside(self.scene, self._pool, selected)
+        cycles = [
+            evidence
+            for evidence in self.separable(selected, weighed)
+            if _is_cycle(evidence.candidate, column)
+            and (evidence.candidate.effect.free or evidence.candidate.family not in families)
+        ]
+        if not cycles:
+            return None
         # What explains most, whatever its price: the price is paid for all together.
-        for one in sorted(found, key=lambda one: -one.explained):
-            effect = effect_of(one.candidate)
-            if (effect.column, effect.shape) != kind or (one.candidate.family in taken and not effect.free):
-                continue
-            if apart(chosen, one.candidate):
-                return at_best(self.scene, self.visible, [*chosen, one.candidate], len(chosen))
-        return None
+        best = max(cycles, key=lambda evidence: evidence.explained).candidate
+        return self.at_best_value([*selected, best], len(selected))
 
-    def __call__(self, others: Sequence[Candidate], found: Candidate) -> bool:
-        line = self.line(others, found)
-        if line is not None and not self.stands([*others, line], found):
+    @cached_property
+    def _pool(self) -> Pool[CurveCandidate]:
+        return Pool(tuple(candidate for candidate in self.scene.candidates if candidate.visible))
+
+    def _line(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> CurveCandidate | None:
+        """The straight line in the same input, where it is not in the model yet: a bend must say something beside it,
+        or the line is the simpler answer."""
+        effect = candidate.effect
+        if effect.order == 1:
+            return None
+        lines = (line for line in self._pool.candidates if line.effect.order == 1)
+        line = next((other for other in lines if other.effect.column == effect.column), None)
+        in_model = line is not None and any(other.effect == line.effect for other in others)
+        return None if in_model else line
+
+    def _remainder(self, effects: Sequence[CurveEffect]) -> tuple[float, int]:
+        """Sum of squares that the model with further effects leaves of the response, and the rank of its columns.
+
+        The lower powers that come along with a power count too.
+        """
+        fit, rows = self.scene.curve.fit, self.scene.curve.problem.order
+        columns = fit.settled.columns([*fit.settled.effects, *effects])[2][rows]
+        return _remainder(fit.problem.curve.measured[rows], columns)
+
+    def _is_a_bend(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
+        """Whether a polynomial in the same input does as well at its price as a cycle, an exponential or a step: then
+        it is the simpler answer and has its turn."""
+        effect = candidate.effect
+        x = self.scene.curve.problem.inputs.numbers.get(effect.column, np.zeros(1))
+        many = effect.shape == "sin" and float(np.ptp(x)) > MOST_BENDS * float(effect.value or 1.0)
+        if effect.shape not in SEARCHED or many:
             return False
-        if not self.stands(others, found) or not self.falls(others, found) or self.is_a_bend(others, found):
-            return False
-        before = np.concatenate([self.visible.added, *(one.columns for one in others)], axis=1)
-        after = np.concatenate([before, found.columns], axis=1)
-        fold = folds(len(self.visible.residual))
-        dof = self.visible.degrees_of_freedom
-        one = held_out_rms(self.visible.residual, before, fold, dof, 1.0)
-        two = held_out_rms(self.visible.residual, after, fold, dof, 1.0)
-        return one is None or two is None or two < one
+        count, selected = len(self.scene.residual), [other.effect for other in others]
+        polynomials = [CurveEffect(effect.column, f"poly{power}") for power in POWERS[1:]]
+        criteria = []
+        for last in (effect, *polynomials):
+            squares, rank = self._remainder([*selected, last])
+            price = (rank + (last is effect)) * np.log(count)
+            criteria.append(count * np.log(max(squares, 1e-300)) + price)
+        return bool(min(criteria[1:]) <= criteria[0])
+
+    def _lowers_bic(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> bool:
+        """Whether Schwarz's criterion of ordinary least squares falls: an effect that only shows in whitened rows
+        takes next to nothing of the error away."""
+        count, selected = len(self.scene.residual), [other.effect for other in others]
+        before, rank_before = self._remainder(selected)
+        after, rank_after = self._remainder([*selected, candidate.effect])
+        price = (rank_after - rank_before + candidate.effect.free) * np.log(count)
+        return bool(count * np.log(before / max(after, 1e-300)) > price)
 
 
-def _key(
-    others: Sequence[Candidate], together: Sequence[Candidate]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    return tuple(sorted(one.family for one in others)), tuple(sorted(one.family for one in together))
+def _is_cycle(candidate: CurveCandidate, column: str) -> bool:
+    return candidate.effect.column == column and candidate.effect.shape == "sin"
 
 
-def _left(y: Array, columns: Array) -> tuple[float, int]:
+def _remainder(y: Array, columns: Array) -> tuple[float, int]:
     """Sum of squares that columns leave of y, and their rank."""
     basis = orthonormal_to_full_precision(columns)
     return float(np.sum(without(basis, y[:, None]) ** 2)), basis.shape[1]

@@ -44,28 +44,28 @@ class CurveComparison(Comparison):
     noise: Assessed
 
 
-def places_of(fit: CurveFit) -> npt.NDArray[np.int64]:
-    """The place (n,) of every row: the same number for rows that agree in every column that the model uses."""
+def cells_of(fit: CurveFit) -> npt.NDArray[np.int64]:
+    """The cell (n,) of every row: the same number for rows that agree in every column that the model uses."""
     inputs = fit.problem.inputs
     used = {effect.column for effect in fit.effects}
     if any(effect.shape == "formula" for effect in fit.effects):
         used |= {name for name in inputs.numbers if name != SEQUENCE}
-    place = np.zeros(inputs.count, dtype=np.int64)
+    cell = np.zeros(inputs.count, dtype=np.int64)
     for name in sorted(used):
         values = inputs.numbers.get(name, inputs.groups.get(name))
         if values is not None:
-            own = np.unique(values, return_inverse=True)[1]
-            place = np.unique(place * (own.max() + 1) + own, return_inverse=True)[1]
-    return np.asarray(place, dtype=np.int64)
+            level = np.unique(values, return_inverse=True)[1]
+            cell = np.unique(cell * (level.max() + 1) + level, return_inverse=True)[1]
+    return np.asarray(cell, dtype=np.int64)
 
 
 def lack_of_fit(fit: CurveFit) -> tuple[LackOfFit | None, float | None]:
     """F of lack of fit over pure error, and the repeatability; None where no row was repeated, or the model has no
     input that could be equal, or the repeats lie at different times and drift between them."""
-    kept = ~fit.problem.left_out
+    weighted = ~fit.problem.left_out
     if not fit.effects or fit.exact or _repeats_drift(fit):
         return None, None
-    scatter, lack, repeated = split(fit.residual[kept, None], places_of(fit)[kept])
+    scatter, lack, repeated = split(fit.residual[weighted, None], cells_of(fit)[weighted])
     if repeated < 1:
         return None, None
     test = lack_of_fit_test(lack, fit.degrees_of_freedom - repeated, scatter, repeated)
@@ -77,33 +77,33 @@ def _repeats_drift(fit: CurveFit) -> bool:
     clock, rows = fit.problem.curve.time, fit.problem.order
     if clock is None or any(effect.column == clock for effect in fit.effects):
         return False
-    _, place, count = np.unique(places_of(fit)[rows], return_inverse=True, return_counts=True)
+    _, cell, count = np.unique(cells_of(fit)[rows], return_inverse=True, return_counts=True)
     residual = fit.residual[rows]
-    deviation = residual - (np.bincount(place, weights=residual) / count)[place]
-    deviation = deviation[count[place] > 1]
-    found = assess(deviation, np.ones((len(deviation), 1)))
-    return found.noticed and found.noise.lag_one > 0.0
+    deviation = residual - (np.bincount(cell, weights=residual) / count)[cell]
+    deviation = deviation[count[cell] > 1]
+    assessed = assess(deviation, np.ones((len(deviation), 1)))
+    return assessed.noticed and assessed.noise.lag_one > 0.0
 
 
 def _breakdown(fit: CurveFit) -> dict[str, dict[str, Part]]:
-    kept, inputs = ~fit.problem.left_out, fit.problem.inputs
-    found: dict[str, dict[str, Part]] = {}
+    weighted, inputs = ~fit.problem.left_out, fit.problem.inputs
+    breakdown: dict[str, dict[str, Part]] = {}
     for name, values in inputs.numbers.items():
-        edges = np.unique(np.quantile(values[kept], np.linspace(0.0, 1.0, PARTS + 1)))
+        edges = np.unique(np.quantile(values[weighted], np.linspace(0.0, 1.0, PARTS + 1)))
         parts = {}
         for number, (low, high) in enumerate(pairwise(edges)):
             last = number == len(edges) - 2
-            inside = kept & (values >= low) & ((values <= high) if last else (values < high))
+            inside = weighted & (values >= low) & ((values <= high) if last else (values < high))
             if inside.any():
                 parts[f"{low:.6g} to {high:.6g}"] = part_of(fit.residual[inside])
         if len(parts) > 1:
-            found[name] = parts
+            breakdown[name] = parts
     for name, labels in inputs.groups.items():
-        found[name] = {
-            str(label): part_of(fit.residual[kept & (labels == label)])
-            for label in dict.fromkeys(labels[kept].tolist())
+        breakdown[name] = {
+            str(label): part_of(fit.residual[weighted & (labels == label)])
+            for label in dict.fromkeys(labels[weighted].tolist())
         }
-    return found
+    return breakdown
 
 
 def compare_curve(fit: CurveFit, *, rate: float = 0.01, lacks: bool | None = None) -> CurveComparison:

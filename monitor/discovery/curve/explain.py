@@ -1,32 +1,31 @@
-"""Which effect a curve lacks: the same scan as for a machine, over plain columns.
+"""The effects that a curve lacks: the same scan as for a machine, over plain columns.
 
-Fit, scan, take what was found into the fit, name the outliers, look whether neighbouring rows resemble each
-other, and begin again under that until nothing changes. A finding has to stand three things: the false
-discovery rate of the scan, a test that allows for correlated noise (what neighbours share is not sold as an
-effect), and the error on rows that took no part in its fit.
+Fit, scan, add the findings to the model, name the outliers, look whether neighbouring rows resemble each other, and
+begin again under that until nothing changes. A finding has to stand three things: the false discovery rate of the
+scan, a test that allows for correlated noise (what neighbours share is no effect), and the error on rows that took no
+part in its fit.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from monitor.discovery.curve.missing import CurveMissing, tell
+from monitor.discovery.curve.missing import CurveMissing, missing_effects
 from monitor.discovery.curve.outliers import Outlier
 from monitor.discovery.curve.quality import noise_of
-from monitor.discovery.curve.search import Views, exhausted
-from monitor.discovery.machine.visible import SMALLEST_SHARE
+from monitor.discovery.curve.search import CurveSearch
 from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.statistics.noise import WHITE, Assessed
 
-#: Tides have a dozen lines; more than these are beyond what one scan should tell.
+#: Tides have a dozen lines; more than these are beyond what one scan should report.
 MOST_EFFECTS = 12
 
 
 @dataclass(frozen=True)
 class CurveExplanation:
-    """The answer: the model as given (``first``), what it lacks, the readings that were left out, the noise that is
-    left, and what the rows say nothing of."""
+    """The answer: the model as given (``first``), what it lacks, the readings that were left out, the noise that
+    remains, and the effects to which the rows are blind."""
 
     first: CurveFit
     final: CurveFit
@@ -38,42 +37,38 @@ class CurveExplanation:
 
 
 def explain_curve(problem: CurveProblem, *, rate: float = 0.01, most: int = MOST_EFFECTS) -> CurveExplanation:
-    """What a curve's model lacks. ``rate`` is the false discovery rate of each scan.
+    """Explain what a curve's model lacks. ``rate`` is the false discovery rate of each scan.
 
     Raises DataError where the model cannot be fitted.
     """
     first = fit(problem)
     if first.exact:
         return CurveExplanation(first, first, (), (), noise_of(first), (), ())
-    suspect: tuple[Outlier, ...] = ()
-    now, suspect = exhausted(Views(problem, rate, WHITE), suspect, most)
-    noise = noise_of(now.under)
+    latest, suspect = CurveSearch(problem, rate, WHITE).exhausted((), most)
+    noise = noise_of(latest.under)
     if noise.noticed:
-        # Some cycles were taken for the sake of company that did not come: each has to stand alone now.
-        now = now.alone()
-        noise = noise_of(now.under)
-    rounds = [now]
+        # Some cycles were accepted only jointly with others that were rejected; test each alone.
+        latest = latest.alone()
+        noise = noise_of(latest.under)
+    rounds = [latest]
     if noise.noticed:
-        # What independent rows would show was found; now what stands out once the resemblance is filtered out.
-        more = replace(now.under.settled, left_out=problem.left_out)
-        now, suspect = exhausted(Views(more, rate, noise.noise), suspect, most - len(now.result.findings))
-        noise = noise_of(now.under)
-        rounds.append(now)
-    out = now.under.problem.left_out
-    missing = tell(rounds, noise)
-    named = {one.fitted.family for one in missing}
+        # What independent rows would show was found; search what stands out once the resemblance is filtered out.
+        more = replace(latest.under.settled, left_out=problem.left_out)
+        search = CurveSearch(more, rate, noise.noise)
+        latest, suspect = search.exhausted(suspect, most - len(latest.result.findings))
+        noise = noise_of(latest.under)
+        rounds.append(latest)
+    left_out = latest.under.problem.left_out
+    missing = missing_effects(rounds, noise)
+    families = {effect.fitted.family for effect in missing}
+    scene = rounds[0].scene
+    blind = [candidate.family for candidate in scene.candidates if not candidate.visible]
     return CurveExplanation(
         first=first,
-        final=now.under,
+        final=latest.under,
         missing=missing,
-        suspect=tuple(one for one in suspect if out[one.row]),
+        suspect=tuple(outlier for outlier in suspect if left_out[outlier.row]),
         noise=noise,
-        blind=tuple(
-            dict.fromkeys(
-                one.family
-                for one in rounds[0].visible.candidates
-                if one.share <= SMALLEST_SHARE and one.family not in named
-            )
-        ),
-        refused=rounds[0].visible.refused,
+        blind=tuple(dict.fromkeys(family for family in blind if family not in families)),
+        refused=scene.refused,
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy import linalg, special
 
 from monitor.methods.curve.fit import CurveFit
@@ -20,7 +21,7 @@ FALSE_ALARM = 0.01
 #: More than a tenth of the readings are no outliers but another kind of noise.
 LARGEST_SHARE = 0.1
 MOST_OUTLIERS = 40
-FEWEST_LEFT = 8
+FEWEST_DEGREES = 8
 
 
 @dataclass(frozen=True)
@@ -34,39 +35,47 @@ class Outlier:
 
 def outliers(fit: CurveFit) -> tuple[Outlier, ...]:
     """All readings that contradict a model, in the order of the rows. Those that the fit left out are judged anew."""
-    problem = fit.problem
-    y, x = problem.curve.measured, fit.design
+    y, x = fit.problem.curve.measured, fit.design
     scale = np.linalg.norm(x, axis=0)
     x = x / np.where(scale == 0, 1.0, scale)
     rows = np.arange(len(y))
-    most = min(int(LARGEST_SHARE * len(y)), MOST_OUTLIERS)
-    found: list[Outlier] = []
-    last = 0
+    worst: list[Outlier] = []
+    count = 0
     # Around the model as it is: for a searched period the design holds what a small change of it does.
     modelled = y - fit.residual
-    for number in range(most):
-        left, spread, freedom, checked = _residual(y[rows] - modelled[rows], x[rows])
-        if freedom < FEWEST_LEFT or spread <= 0.0:
+    for number in range(min(int(LARGEST_SHARE * len(y)), MOST_OUTLIERS)):
+        outlier = _worst(rows, y[rows] - modelled[rows], x[rows])
+        if outlier is None:
             break
-        studentised = (
-            np.where(checked > 1e-6, np.abs(left) / np.sqrt(np.maximum(checked, 1e-6)), 0.0) / spread
-        )
-        worst = int(studentised.argmax())
-        r = float(studentised[worst])
-        # The externally studentised residual is Student's t with one degree of freedom less.
-        t = r * np.sqrt((freedom - 1) / max(freedom - r**2, 1e-12))
-        p = min(1.0, 2.0 * float(special.stdtr(freedom - 1, -t)) * len(rows))
-        found.append(Outlier(int(rows[worst]), float(left[worst] / checked[worst]), p))
-        if p <= FALSE_ALARM:
-            last = number + 1
-        rows = np.delete(rows, worst)
-    return tuple(sorted(found[:last], key=lambda one: one.row))
+        worst.append(outlier)
+        if outlier.p_value <= FALSE_ALARM:
+            count = number + 1
+        rows = rows[rows != outlier.row]
+    return tuple(sorted(worst[:count], key=lambda outlier: outlier.row))
+
+
+def _worst(rows: npt.NDArray[np.int64], y: Array, x: Array) -> Outlier | None:
+    """The row with the largest studentised residual; None where too few degrees of freedom or no scatter remain."""
+    residual, spread, freedom, one_less_leverage = _residual(y, x)
+    if freedom < FEWEST_DEGREES or spread <= 0.0:
+        return None
+    scaled = np.where(
+        one_less_leverage > 1e-6, np.abs(residual) / np.sqrt(np.maximum(one_less_leverage, 1e-6)), 0.0
+    )
+    studentised = scaled / spread
+    worst = int(studentised.argmax())
+    r = float(studentised[worst])
+    # The externally studentised residual is Student's t with one degree of freedom less.
+    t = r * np.sqrt((freedom - 1) / max(freedom - r**2, 1e-12))
+    p_value = min(1.0, 2.0 * float(special.stdtr(freedom - 1, -t)) * len(rows))
+    return Outlier(int(rows[worst]), float(residual[worst] / one_less_leverage[worst]), p_value)
 
 
 def _residual(y: Array, x: Array) -> tuple[Array, float, int, Array]:
     """Residual (n,), its standard deviation, degrees of freedom, and one less the leverage (n,)."""
     u, values, _ = linalg.svd(x, full_matrices=False)
     basis = u[:, values > 1e-10 * max(values.max(initial=0.0), 1e-300)]
-    left = y - basis @ (basis.T @ y)
+    residual = y - basis @ (basis.T @ y)
     freedom = len(y) - basis.shape[1]
-    return left, float(np.sqrt(left @ left / max(freedom, 1))), freedom, 1.0 - np.sum(basis**2, axis=1)
+    spread = float(np.sqrt(residual @ residual / max(freedom, 1)))
+    return residual, spread, freedom, 1.0 - np.sum(basis**2, axis=1)

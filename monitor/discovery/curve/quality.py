@@ -1,4 +1,4 @@
-"""How good a fitted curve is: Schwarz's criterion, the error on rows left out, the noise that is left, and
+"""The quality of a fitted curve: Schwarz's criterion, the error on rows left out, the noise that remains, and
 uncertainties that allow for that noise.
 """
 
@@ -7,25 +7,15 @@ from __future__ import annotations
 import numpy as np
 from scipy import linalg
 
-from monitor.discovery.machine.held_out import held_out_rms
+from monitor.discovery.search.held_out import folds_of, held_out_rms
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.solver import inverse_normal
 from monitor.records import Array
 from monitor.statistics.noise import WHITE, Assessed, assess
 
-#: Rows are dealt into ten folds at random, always the same way.
-FOLDS, DEAL = 10, 20261121
-
-
-def folds(count: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """The fold (n,) of every row; below twenty rows each is its own."""
-    if count < 2 * FOLDS:
-        return np.arange(count)
-    return np.random.default_rng(DEAL).permutation(count) % FOLDS
-
 
 def noise_of(fitted: CurveFit) -> Assessed:
-    """The noise that a model leaves; none where it fits exactly."""
+    """Assess the noise that a model leaves; there is none where it fits exactly."""
     if fitted.exact:
         return Assessed(WHITE, 1.0)
     rows = fitted.problem.order
@@ -43,10 +33,11 @@ def bic(fitted: CurveFit) -> float:
 
 def held_out(fitted: CurveFit) -> float | None:
     """Held-out root mean square per degree of freedom of the base: folds of rows left out in turn."""
-    kept = ~fitted.problem.left_out
-    count = int(kept.sum())
-    columns = np.linalg.qr(fitted.design / np.maximum(np.linalg.norm(fitted.design, axis=0), 1e-300))[0][kept]
-    return held_out_rms(-fitted.residual[kept], columns, folds(count), count, 1.0)
+    weighted = ~fitted.problem.left_out
+    count = int(weighted.sum())
+    scale = np.maximum(np.linalg.norm(fitted.design, axis=0), 1e-300)
+    columns = np.linalg.qr(fitted.design / scale)[0][weighted]
+    return held_out_rms(-fitted.residual[weighted], columns, folds_of(count), count, 1.0)
 
 
 def allowed_for(fitted: CurveFit, noise: Assessed) -> Array:
@@ -54,12 +45,13 @@ def allowed_for(fitted: CurveFit, noise: Assessed) -> Array:
     return _covariance(fitted, noise)[: len(fitted.names), : len(fitted.names)]
 
 
-def inflation(fitted: CurveFit, noise: Assessed, at: int) -> float:
-    """Factor by which correlated noise widens the standard uncertainty of the searched value of effect ``at``."""
-    free = [n for n, one in enumerate(fitted.effects) if one.free and one.shape != "step"]
-    place = len(fitted.names) + free.index(at)
-    plain = _covariance(fitted, Assessed(WHITE, 1.0))[place, place]
-    return float(np.sqrt(_covariance(fitted, noise)[place, place] / plain))
+def inflation(fitted: CurveFit, noise: Assessed, index: int) -> float:
+    """Factor by which correlated noise widens the standard uncertainty of the searched value of the effect at an
+    index."""
+    free = [at for at, effect in enumerate(fitted.effects) if effect.free and effect.shape != "step"]
+    column = len(fitted.names) + free.index(index)
+    plain = _covariance(fitted, Assessed(WHITE, 1.0))[column, column]
+    return float(np.sqrt(_covariance(fitted, noise)[column, column] / plain))
 
 
 def _covariance(fitted: CurveFit, noise: Assessed) -> Array:
@@ -70,7 +62,7 @@ def _covariance(fitted: CurveFit, noise: Assessed) -> Array:
         return np.asarray(variance * inverse)
     middle = x.T @ linalg.matmul_toeplitz(noise.noise.correlations(len(x)), x)
     # What the fit takes out of correlated noise is missing from the residual; the trace puts it back.
-    taken = float(np.trace(inverse @ middle))
+    absorbed = float(np.trace(inverse @ middle))
     count = len(x)
-    variance = fitted.sum_of_squares / max(count - taken, 1.0)
+    variance = fitted.sum_of_squares / max(count - absorbed, 1.0)
     return np.asarray(variance * inverse @ middle @ inverse)

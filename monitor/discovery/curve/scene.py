@@ -1,122 +1,117 @@
 """A fitted curve as the scan sees it: whitened rows, and effects as columns with the model taken out.
 
 A polynomial is the part of its power that the lower ones cannot do (orthogonal over the measured rows), so that
-neither origin nor unit of the input matters and a line is not taken for a parabola.
+neither origin nor unit of the input matters and a line is not mistaken for a parabola.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import TypeAlias
 
 import numpy as np
 
-from monitor.discovery.machine.evidence import without
-from monitor.discovery.machine.visible import SMALLEST_SHARE, Candidate, Variant
-from monitor.effects import ChainEffect
+from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
+from monitor.discovery.search.held_out import folds_of, held_out_rms
+from monitor.discovery.search.projection import orthonormal_to_full_precision, without
 from monitor.effects.curve import CurveEffect, curve_columns
 from monitor.methods.curve.fit import CurveFit
+from monitor.methods.curve.problem import CurveProblem
 from monitor.records import Array
 from monitor.statistics.noise import Noise
 
-
-@dataclass(frozen=True)
-class CurveVariant(Variant):
-    """A variant of an effect of a curve. The scan itself reads family, tries and odds only."""
-
-    @property
-    def curve(self) -> CurveEffect:
-        """The effect."""
-        return cast(CurveEffect, self.effect)
+CurveCandidate: TypeAlias = Candidate[CurveEffect]
 
 
-def variant(effect: CurveEffect, tries: int = 1, family: str | None = None) -> CurveVariant:
-    """An effect as the scan takes it."""
-    return CurveVariant(family or effect.family, cast(ChainEffect, effect), tries)
-
-
-def effect_of(candidate: Candidate) -> CurveEffect:
-    """The effect of a candidate of a curve."""
-    assert isinstance(candidate.variant, CurveVariant)
-    return candidate.variant.curve
+def variant_of(effect: CurveEffect, tries: int = 1) -> Variant[CurveEffect]:
+    """An effect as the scan looks at it."""
+    return Variant(effect.family, effect, tries)
 
 
 @dataclass(frozen=True)
-class Scene:
-    """A fitted curve as the scan sees it: rows with weight in the order of time, whitened by ``noise``.
+class WhitenedCurve:
+    """A fitted curve: rows with weight in the order of time, whitened by ``noise``.
 
-    ``design`` (m, c) are the whitened columns of the model and ``basis`` spans them; ``measured`` (m,) is the
-    whitened response.
+    ``basis`` (m, r) spans the whitened columns of the model; ``measured`` (m,) is the whitened response.
     """
 
     fit: CurveFit
     noise: Noise
     measured: Array
-    design: Array
     basis: Array
 
+    @property
+    def problem(self) -> CurveProblem:
+        """The problem that was fitted."""
+        return self.fit.problem
+
     def whitened(self, columns: Array) -> Array:
-        """Columns (n, k) of all rows as the scan sees them, the model not yet taken out."""
-        return self.noise.whiten(columns[self.fit.problem.order])[0]
+        """Whiten columns (n, k) of all rows; the model is not yet taken out."""
+        return self.noise.whiten(columns[self.problem.order])[0]
 
-    def candidate(self, effect: CurveEffect, tries: int = 1, family: str | None = None) -> Candidate:
-        """One candidate, the model taken out of its columns."""
-        return self.candidates([effect], [tries], [family])[0]
-
-    def candidates(
-        self,
-        effects: Sequence[CurveEffect],
-        tries: Sequence[int],
-        families: Sequence[str | None] | None = None,
-    ) -> list[Candidate]:
-        """Several candidates at once, the model taken out of their columns."""
-        raw = [self.columns(effect) for effect in effects]
+    def candidates(self, variants: Sequence[Variant[CurveEffect]]) -> list[CurveCandidate]:
+        """Take the model out of the columns of effects."""
+        raw = [self.columns(variant.effect) for variant in variants]
         if not raw:
             return []
         white = self.whitened(np.concatenate(raw, axis=1))
-        left = without(self.basis, white)
-        before, after = np.linalg.norm(white, axis=0), np.linalg.norm(left, axis=0)
+        remainder = without(self.basis, white)
+        before, after = np.linalg.norm(white, axis=0), np.linalg.norm(remainder, axis=0)
         share = after / np.where(before == 0, 1.0, before)
-        left[:, share <= SMALLEST_SHARE] = 0.0
-        made, place = [], 0
-        for number, effect in enumerate(effects):
-            own = slice(place, place + raw[number].shape[1])
-            place = own.stop
-            family = None if families is None else families[number]
-            made.append(
-                Candidate(
-                    variant(effect, tries[number], family),
-                    left[:, own],
-                    np.zeros((0, 3, own.stop - own.start)),
-                    float(share[own].max(initial=0.0)),
-                    np.inf,
-                )
-            )
-        return made
+        remainder[:, share <= SMALLEST_SHARE] = 0.0
+        ends = np.cumsum([columns.shape[1] for columns in raw])
+        parts = [slice(end - columns.shape[1], end) for columns, end in zip(raw, ends, strict=True)]
+        return [
+            Candidate(variant, remainder[:, part], float(share[part].max(initial=0.0)), np.inf)
+            for variant, part in zip(variants, parts, strict=True)
+        ]
 
-    def columns(self, effect: CurveEffect, value: float | None = None) -> Array:
+    def candidate(self, variant: Variant[CurveEffect]) -> CurveCandidate:
+        """Take the model out of the columns of one effect."""
+        return self.candidates([variant])[0]
+
+    def columns(self, effect: CurveEffect) -> Array:
         """Columns (n, k) of an effect; of a polynomial the part that the lower powers cannot do."""
         if not effect.order:
-            return curve_columns(effect, self.fit.problem.inputs, value)
-        x = self.fit.problem.inputs.numbers[effect.column]
-        kept = x[self.fit.problem.order]
-        middle, half = (kept.max() + kept.min()) / 2.0, (kept.max() - kept.min()) / 2.0 or 1.0
+            return curve_columns(effect, self.problem.inputs)
+        rows = self.problem.order
+        x = self.problem.inputs.numbers[effect.column]
+        low, high = x[rows].min(), x[rows].max()
+        middle, half = (high + low) / 2.0, (high - low) / 2.0 or 1.0
         powers = ((x - middle) / half)[:, None] ** np.arange(effect.order + 1)
-        lower, own = powers[:, :-1], powers[:, -1:]
-        rows = self.fit.problem.order
-        return np.asarray(own - lower @ np.linalg.lstsq(lower[rows], own[rows], rcond=1e-12)[0])
+        lower, highest = powers[:, :-1], powers[:, -1:]
+        return np.asarray(highest - lower @ np.linalg.lstsq(lower[rows], highest[rows], rcond=1e-12)[0])
 
 
-def scene_of(fit: CurveFit, noise: Noise) -> Scene:
-    """A fit as the scan sees it."""
+@dataclass(frozen=True)
+class CurveScene:
+    """The residual (m,) of a whitened curve and the effects that may explain it."""
+
+    curve: WhitenedCurve
+    residual: Array
+    candidates: tuple[CurveCandidate, ...]
+    refused: tuple[tuple[str, str], ...]
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Those of the residual."""
+        return len(self.residual) - int(self.curve.basis.shape[1])
+
+    def columns(self, candidates: Sequence[Candidate[object]]) -> Array:
+        """The columns (m, c) of candidates; those of the model are taken out of everything."""
+        none = np.empty((len(self.residual), 0))
+        return np.concatenate([none, *(candidate.columns for candidate in candidates)], axis=1)
+
+    def held_out_error(self, columns: Array) -> float | None:
+        """Root mean square error on folds of rows left out in turn."""
+        return held_out_rms(
+            self.residual, columns, folds_of(len(self.residual)), self.degrees_of_freedom, 1.0
+        )
+
+
+def whitened_curve(fit: CurveFit, noise: Noise) -> WhitenedCurve:
+    """Whiten a fitted curve by a noise."""
     rows = fit.problem.order
     white = noise.whiten(np.column_stack([fit.problem.curve.measured, fit.design])[rows])[0]
-    return Scene(fit, noise, white[:, 0], white[:, 1:], orthonormal_to_full_precision(white[:, 1:]))
-
-
-def orthonormal_to_full_precision(columns: Array) -> Array:
-    """An orthonormal basis (m, r) of columns, to full precision: calendar years to the third power."""
-    scale = np.linalg.norm(columns, axis=0)
-    u, values, _ = np.linalg.svd(columns / np.where(scale == 0, 1.0, scale), full_matrices=False)
-    return np.asarray(u[:, values > 1e-12 * max(values.max(initial=0.0), 1e-300)])
+    return WhitenedCurve(fit, noise, white[:, 0], orthonormal_to_full_precision(white[:, 1:]))

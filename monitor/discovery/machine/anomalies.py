@@ -1,6 +1,6 @@
-"""Bad single points and balls that came loose: told as what they are, not as a law of physics.
+"""Bad single points and balls that came loose: reported as what they are, not as a law of physics.
 
-Both are seen as a deviation of one run from the others at the same place of the plan, so an effect that the
+Both are seen as a deviation of one run from the others at the same row of the plan, so an effect that the
 model lacks in every run does not raise an alarm. A point is bad where the vector of its own deviation is too
 long; a ball has moved where all its later touches in that run are shifted by the same vector.
 """
@@ -55,21 +55,21 @@ class BallMove:
         return float(np.linalg.norm(self.shift))
 
 
-def plan_places(fit: Fit) -> npt.NDArray[np.int64]:
-    """Place in the plan (n,): the same number for the same target at the same pose, touch by touch."""
+def plan_cells(fit: Fit) -> npt.NDArray[np.int64]:
+    """The cell (n,) of the plan: the same number for the same target at the same pose, touch by touch."""
     context = fit.problem.context
     measured = fit.problem.measured_joints
-    posed = [place for place in range(len(context.chain.joints)) if place not in measured]
+    posed = [joint for joint in range(len(context.chain.joints)) if joint not in measured]
     angles = np.round(context.positions[:, posed], 6) + 0.0
-    seen: dict[tuple[object, ...], int] = {}
+    occurrences: dict[tuple[object, ...], int] = {}
     numbers: dict[tuple[object, ...], int] = {}
-    found = np.empty(len(context), dtype=np.int64)
+    cells = np.empty(len(context), dtype=np.int64)
     for row in range(len(context)):
         key = (str(context.target[row]), *angles[row])
-        once = (int(context.run[row]), *key)
-        occurrence = seen[once] = seen.get(once, -1) + 1
-        found[row] = numbers.setdefault((*key, occurrence), len(numbers))
-    return found
+        in_run = (int(context.run[row]), *key)
+        occurrence = occurrences[in_run] = occurrences.get(in_run, -1) + 1
+        cells[row] = numbers.setdefault((*key, occurrence), len(numbers))
+    return cells
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class _Deviations:
     scale: Array  # (n,): standard deviation of a coordinate in standard uncertainties
 
     def of_run(self, run: int) -> Array:
-        """What the own unknowns of a run span, row by row (m, d, p)."""
+        """The span of the unknowns of a run, row by row (m, d, p)."""
         rows, numbers = len(self.rows[run]), self.vectors.shape[1]
         return self.bases[run, : numbers * rows].reshape(rows, numbers, -1)
 
@@ -91,13 +91,13 @@ class _Deviations:
 def _deviations(fit: Fit) -> _Deviations:
     problem = fit.problem
     white = np.where(fit.left_out[:, None], 0.0, fit.vectors / fit.problem.sigma)
-    places = plan_places(fit)
-    kept = ~fit.left_out
-    count = np.bincount(places, weights=kept)
-    total = np.stack([np.bincount(places, weights=white[:, axis]) for axis in range(white.shape[1])], axis=1)
-    others = count[places] - 1
-    enough = kept & (others >= 2)
-    mean = (total[places] - white) / np.where(enough, others, 1)[:, None]
+    cells = plan_cells(fit)
+    weighted = ~fit.left_out
+    count = np.bincount(cells, weights=weighted)
+    total = np.stack([np.bincount(cells, weights=white[:, axis]) for axis in range(white.shape[1])], axis=1)
+    others = count[cells] - 1
+    enough = weighted & (others >= 2)
+    mean = (total[cells] - white) / np.where(enough, others, 1)[:, None]
     vectors = np.where(enough[:, None], white - mean, white)
     inflation = np.where(enough, 1.0 + 1.0 / np.where(enough, others, 1), 1.0)
     rows = tuple(np.flatnonzero(problem.context.run == run) for run in problem.runs)
@@ -107,10 +107,11 @@ def _deviations(fit: Fit) -> _Deviations:
     squares = np.sum(vectors**2, axis=1) / inflation
     share = fit.degrees_of_freedom / (fit.readings + 1e-300)
     usual = scipy.stats.chi2.median(white.shape[1]) * max(share, 1e-6)
-    scale = np.full(len(kept), np.median(squares[kept]) / usual)
-    for own in rows:
-        if kept[own].any():
-            scale[own] = np.maximum(scale[own], np.median(squares[own][kept[own]]) / usual)
+    scale = np.full(len(weighted), np.median(squares[weighted]) / usual)
+    for members in rows:
+        if weighted[members].any():
+            of_run = np.median(squares[members][weighted[members]]) / usual
+            scale[members] = np.maximum(scale[members], of_run)
     scale = np.sqrt(scale)
     return _Deviations(vectors, inflation, rows, bases, scale)
 
@@ -137,7 +138,7 @@ def _as_reading(fit: Fit, row: int, vector: Array) -> tuple[str, float]:
         most = int(np.abs(vector).argmax())
         return fit.problem.components[most], float(vector[most])
     directions = np.array(
-        [np.array(chain.joints[place].direction) * chain.joints[place].sign for place in linear]
+        [np.array(chain.joints[joint].direction) * chain.joints[joint].sign for joint in linear]
     )
     shifts = np.einsum("nrac,ac->nra", fit.by_error[:, :, linear, MOTION, :3], directions)
     off = np.linalg.pinv(fit.problem.observe(shifts)[row]) @ vector
@@ -150,7 +151,7 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     deviations = _deviations(fit)
     context = fit.problem.context
     tests = int((~fit.left_out).sum())
-    found = []
+    points = []
     for run, rows in enumerate(deviations.rows):
         basis = deviations.of_run(run)
         gram = np.eye(basis.shape[1]) - basis @ np.swapaxes(basis, 1, 2)
@@ -162,12 +163,12 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
         chi_square = np.where(
             checked, square / deviations.inflation[rows] / deviations.scale[rows] ** 2, -1.0
         )
-        place = int(chi_square.argmax())
-        p = float(scipy.special.chdtrc(rank[place], chi_square[place]))
-        row, size = int(rows[place]), sizes[place]
+        worst = int(chi_square.argmax())
+        p = float(scipy.special.chdtrc(rank[worst], chi_square[worst]))
+        row, size = int(rows[worst]), sizes[worst]
         if p * tests <= alpha:
             axis, off = _as_reading(fit, row, size * fit.problem.sigma[row])
-            found.append(
+            points.append(
                 BadPoint(
                     row=row,
                     run=int(context.run[row]),
@@ -176,53 +177,62 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
                     axis=axis,
                     size=off,
                     p_value=min(1.0, p * tests),
-                    chi_square=float(chi_square[place]),
+                    chi_square=float(chi_square[worst]),
                 )
             )
-    return found
+    return points
 
 
 def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
     """For every run the ball that moved in it, if any, at a false-alarm probability ``alpha`` a campaign."""
     deviations = _deviations(fit)
     context = fit.problem.context
-    found = []
+    moves = []
     tests = 0
     for run, rows in enumerate(deviations.rows):
-        basis = deviations.of_run(run)
         best: BallMove | None = None
         for target in np.intersect1d(context.target[rows], fit.problem.movable):
-            own = np.flatnonzero((context.target[rows] == target) & ~fit.left_out[rows])
-            first = np.arange(TOUCHES_EACH_SIDE, len(own) - TOUCHES_EACH_SIDE + 1)
-            if len(first) == 0:
-                continue
-            tests += len(first)
-            # Sums over all touches from each one on.
-            shared = np.cumsum(basis[own][::-1], axis=0)[::-1][first]
-            onto = np.cumsum(deviations.vectors[rows[own]][::-1], axis=0)[::-1][first]
-            touches = len(own) - first
-            gram = touches[:, None, None] * np.eye(3) - shared @ np.swapaxes(shared, 1, 2)
-            inflation = np.cumsum(deviations.inflation[rows[own]][::-1])[::-1][first] / touches
-            square, rank, shifts = _statistic(onto, gram)
-            chi_square = np.where(rank > 0, square / inflation / deviations.scale[rows[0]] ** 2, -1.0)
-            place = int(chi_square.argmax())
-            if chi_square[place] <= 0 or (best is not None and chi_square[place] <= best.chi_square):
-                continue
-            row = int(rows[own[first[place]]])
-            # The tip followed the ball, so the vector from where the ball was to the tip is its shift.
-            x, y, z = (float(part) for part in shifts[place] * fit.problem.sigma[row])
-            best = BallMove(
-                target=str(target),
-                run=int(context.run[row]),
-                sequence=int(context.sequence[row]),
-                shift=(x, y, z),
-                p_value=float(scipy.special.chdtrc(rank[place], chi_square[place])),
-                chi_square=float(chi_square[place]),
-            )
+            touches = np.flatnonzero((context.target[rows] == target) & ~fit.left_out[rows])
+            tests += max(len(touches) - 2 * TOUCHES_EACH_SIDE + 1, 0)
+            move = _ball_move(fit, deviations, run, touches)
+            if move is not None and (best is None or move.chi_square > best.chi_square):
+                best = move
         if best is not None:
-            found.append(best)
+            moves.append(best)
     return [
         replace(move, p_value=min(1.0, move.p_value * tests))
-        for move in found
+        for move in moves
         if move.p_value * tests <= alpha
     ]
+
+
+def _ball_move(
+    fit: Fit, deviations: _Deviations, run: int, touches: npt.NDArray[np.int64]
+) -> BallMove | None:
+    """The likeliest move of the ball that is touched in these rows of a run; its p-value is that of one test."""
+    context, rows, basis = fit.problem.context, deviations.rows[run], deviations.of_run(run)
+    first = np.arange(TOUCHES_EACH_SIDE, len(touches) - TOUCHES_EACH_SIDE + 1)
+    if len(first) == 0:
+        return None
+    # Sums over all touches from each one on.
+    shared = np.cumsum(basis[touches][::-1], axis=0)[::-1][first]
+    onto = np.cumsum(deviations.vectors[rows[touches]][::-1], axis=0)[::-1][first]
+    count = len(touches) - first
+    gram = count[:, None, None] * np.eye(3) - shared @ np.swapaxes(shared, 1, 2)
+    inflation = np.cumsum(deviations.inflation[rows[touches]][::-1])[::-1][first] / count
+    square, rank, shifts = _statistic(onto, gram)
+    chi_square = np.where(rank > 0, square / inflation / deviations.scale[rows[0]] ** 2, -1.0)
+    best = int(chi_square.argmax())
+    if chi_square[best] <= 0:
+        return None
+    row = int(rows[touches[first[best]]])
+    # The tip followed the ball, so the vector from where the ball was to the tip is its shift.
+    x, y, z = (float(part) for part in shifts[best] * fit.problem.sigma[row])
+    return BallMove(
+        target=str(context.target[row]),
+        run=int(context.run[row]),
+        sequence=int(context.sequence[row]),
+        shift=(x, y, z),
+        p_value=float(scipy.special.chdtrc(rank[best], chi_square[best])),
+        chi_square=float(chi_square[best]),
+    )

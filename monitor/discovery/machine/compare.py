@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.machine.anomalies import plan_places
+from monitor.discovery.machine.anomalies import plan_cells
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.search.comparison import (
     Comparison,
@@ -27,7 +27,7 @@ from monitor.discovery.search.comparison import (
 )
 from monitor.records import Array
 
-# Poses beyond this number are no indexations that somebody would read one by one.
+# Poses beyond this number are too many indexations to be read one by one.
 MOST_INDEXATIONS = 200
 
 
@@ -49,9 +49,9 @@ class ChainComparison(Comparison):
 
 def pure_error(fit: Fit) -> tuple[float, float, float]:
     """Sum of squares and degrees of freedom of the whitened residual over the runs, and the lack-of-fit sum."""
-    kept = ~fit.left_out
-    white = fit.vectors[kept] / fit.problem.sigma[kept]
-    error, lack, repeated = split(white, plan_places(fit)[kept])
+    weighted = ~fit.left_out
+    white = fit.vectors[weighted] / fit.problem.sigma[weighted]
+    error, lack, repeated = split(white, plan_cells(fit)[weighted])
     # The runs' own unknowns take their part of the scatter in proportion to the rows.
     return error, repeated / len(white) * fit.degrees_of_freedom, lack
 
@@ -64,31 +64,33 @@ def lack_of_fit(fit: Fit) -> tuple[LackOfFit | None, float | None]:
 
 
 def _breakdown(fit: Fit) -> dict[str, dict[str, Part]]:
-    context, kept = fit.problem.context, ~fit.left_out
+    context, weighted = fit.problem.context, ~fit.left_out
     vectors = fit.vectors
 
     def by(labels: npt.NDArray[np.str_]) -> dict[str, Part]:
         # In the order in which they first occur.
-        names = dict.fromkeys(str(label) for label in labels[kept])
-        return {name: part_of(vectors[kept & (labels == name)]) for name in names}
+        names = dict.fromkeys(str(label) for label in labels[weighted])
+        return {name: part_of(vectors[weighted & (labels == name)]) for name in names}
 
-    turning = [place for place, joint in enumerate(context.chain.joints) if joint.turns]
-    signs = np.array([context.chain.joints[place].sign for place in turning])
+    turning = [index for index, joint in enumerate(context.chain.joints) if joint.turns]
+    signs = np.array([context.chain.joints[index].sign for index in turning])
     degrees = np.round(np.rad2deg(context.positions[:, turning] * signs), 4) + 0.0
-    names = [context.chain.joints[place].name for place in turning]
+    names = [context.chain.joints[index].name for index in turning]
     angles = np.array(
         [" ".join(f"{name}={value:g}" for name, value in zip(names, row, strict=True)) for row in degrees]
     )
     halves = np.where(context.run_time < 0.5, "first half", "second half")
-    found = {
+    breakdown = {
         "target": by(context.target),
-        "axis": {name: part_of(vectors[kept][:, [axis]]) for axis, name in enumerate(fit.problem.components)},
+        "axis": {
+            name: part_of(vectors[weighted][:, [axis]]) for axis, name in enumerate(fit.problem.components)
+        },
         "run": by(context.run.astype(str)),
         "time_in_run": by(halves),
     }
     if turning and len(np.unique(angles)) <= MOST_INDEXATIONS:
-        found["indexation"] = by(angles)
-    return found
+        breakdown["indexation"] = by(angles)
+    return breakdown
 
 
 def compare(fit: Fit, campaign: str, model: str) -> ChainComparison:

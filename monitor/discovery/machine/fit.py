@@ -15,8 +15,8 @@ from monitor.records import Array
 
 
 @dataclass(frozen=True)
-class Own:
-    """What belongs to single runs, and what several runs share.
+class Nuisance:
+    """The unknowns that belong to single runs, and the coefficients that several runs share.
 
     ``basis`` (R, N, p) is orthonormal and spans what every run's own unknowns can do; ``shared`` (M, c) are the
     whitened columns of the coefficients that several runs share, M rows of all runs, with that taken out.
@@ -42,10 +42,10 @@ class Fit:
 
     @cached_property
     def by_error(self) -> Array:
-        """Derivatives (n, 3, J, 2, 6) by every error of the chain of the vector that the rows tell (a part of)."""
-        seen = self.problem.evaluated(self.solution.local, self.solution.common, jacobian=True)
-        assert seen.by_error is not None
-        return seen.by_error
+        """Derivatives (n, 3, J, 2, 6) by every error of the chain of the vector that the rows report (a part of)."""
+        pose = self.problem.evaluated(self.solution.local, self.solution.common, jacobian=True)
+        assert pose.by_error is not None
+        return pose.by_error
 
     def moved_by(self, basis: Basis) -> Array:
         """Change (n, d, k) of the residuals for each coefficient of an effect."""
@@ -53,13 +53,16 @@ class Fit:
 
     @property
     def readings(self) -> int:
-        """How many numbers have weight, calibrated quantities aside."""
+        """The count of numbers that have weight, calibrated quantities aside."""
         return int(self.vectors.shape[1]) * int((~self.left_out).sum())
 
     @cached_property
-    def own(self) -> Own:
-        """A coefficient that acts in one run only (a ball that moved in it, an effect with another size in every
-        run) is that run's own: no other run predicts it."""
+    def nuisance(self) -> Nuisance:
+        """The unknowns of single runs.
+
+        A coefficient that acts in one run only (a ball that moved in it, an effect with another size in every run) is
+        an unknown of that run: no other run predicts it.
+        """
         local, common = self.solution.last.local, self.solution.last.common
         acts = np.any(common != 0.0, axis=1)
         single = acts.sum(axis=0) == 1
@@ -74,7 +77,7 @@ class Fit:
         )
         scale = np.linalg.norm(shared, axis=0)
         rank = int(np.linalg.matrix_rank(shared / np.where(scale == 0, 1.0, scale))) if shared.size else 0
-        return Own(basis, shared, rank)
+        return Nuisance(basis, shared, rank)
 
     @cached_property
     def degrees_of_freedom(self) -> int:
@@ -90,8 +93,7 @@ class Fit:
     @property
     def rms(self) -> float:
         """Root mean square in mm of the residuals that have weight."""
-        kept = self.vectors[~self.left_out]
-        return float(np.sqrt(np.mean(kept**2)))
+        return float(np.sqrt(np.mean(self.vectors[~self.left_out] ** 2)))
 
     @property
     def sigma(self) -> float:
@@ -116,7 +118,7 @@ def fit(
     if start is None:
         return Fit(weighted, solve_problem(weighted), out)
     common = weighted.common_start.copy()
-    known = start.problem.added_names
-    if known == weighted.added_names[: len(known)]:
-        common[: len(known)] = start.solution.common
+    names = start.problem.added_names
+    if names == weighted.added_names[: len(names)]:
+        common[: len(names)] = start.solution.common
     return Fit(weighted, solve_problem(weighted, start.solution.local, common), out)

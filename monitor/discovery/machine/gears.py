@@ -8,17 +8,20 @@ order: joints that were not at many different positions are left out.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from monitor.discovery.machine.evidence import orthonormal, without
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.visible import Candidate, Variant, Visible
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.projection import orthonormal, without
 from monitor.effects import parse_effect
 from monitor.machine import COMPONENTS, MOTION
 from monitor.records import Array
 
 # From beyond the low harmonics of bearings and wheels to twice the ratio of a reduction gear of robots (50 to 160
-# mostly). Over a travel of half a turn orders closer than one cannot be told apart; the grid is twice as fine.
+# mostly). Over a travel of half a turn orders closer than one cannot be separated; the grid is twice as fine.
 LOWEST, HIGHEST, STEP = 4.0, 330.0, 0.5
 # Fewer different positions than this do not fix an order.
 FEWEST_POSITIONS = 100
@@ -27,48 +30,48 @@ MOST_PEAKS = 3
 
 
 def _rows(fit: Fit, padded: Array) -> Array:
-    """Rows (n, d) of what stands run by run (M,)."""
+    """Rows (n, d) of numbers that stand run by run (M,)."""
     problem = fit.problem
     count, numbers = problem.sigma.shape
-    places = problem.padded(np.arange(1.0, count * numbers + 1.0).reshape(count, numbers))
-    runs = padded.reshape(len(problem.runs), -1)[:, : places.shape[1]]
-    found = np.zeros(count * numbers)
-    filled = places > 0
-    found[places[filled].astype(np.int64) - 1] = runs[filled]
-    return found.reshape(count, numbers)
+    targets = problem.padded(np.arange(1.0, count * numbers + 1.0).reshape(count, numbers))
+    runs = padded.reshape(len(problem.runs), -1)[:, : targets.shape[1]]
+    rows = np.zeros(count * numbers)
+    filled = targets > 0
+    rows[targets[filled].astype(np.int64) - 1] = runs[filled]
+    return rows.reshape(count, numbers)
 
 
-def gear_variants(fit: Fit, visible: Visible, chosen: list[Candidate], rate: float) -> list[Variant]:
-    """Harmonics of rotary joints that stand out of what the chosen effects leave, at a false-alarm ``rate``."""
-    problem = fit.problem
+def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: float) -> list[ChainVariant]:
+    """Harmonics of rotary joints that stand out of what the selected effects leave, at a false-alarm ``rate``."""
+    fit, problem = scene.fit, scene.fit.problem
     chain, positions = problem.context.chain, problem.context.positions
     joints = [
-        place
-        for place, joint in enumerate(chain.joints)
-        if joint.kind == "rotary" and len(np.unique(np.round(positions[:, place], 6))) >= FEWEST_POSITIONS
+        index
+        for index, joint in enumerate(chain.joints)
+        if joint.kind == "rotary" and len(np.unique(np.round(positions[:, index], 6))) >= FEWEST_POSITIONS
     ]
     if not joints:
         return []
-    basis = orthonormal(np.concatenate([visible.added, *(one.columns for one in chosen)], axis=1))
-    left = without(basis, visible.residual[:, None])[:, 0]
-    variance = float(left @ left) / max(visible.degrees_of_freedom - basis.shape[1], 1)
-    rows = _rows(fit, left)
+    basis = orthonormal(scene.columns(selected))
+    residual = without(basis, scene.residual[:, None])[:, 0]
+    variance = float(residual @ residual) / max(scene.degrees_of_freedom - basis.shape[1], 1)
+    rows = _rows(fit, residual)
     orders = np.arange(LOWEST, HIGHEST + STEP / 2.0, STEP)
     limit = -2.0 * np.log(rate / (len(orders) * len(joints)))
-    found = []
-    for place in joints:
-        joint = chain.joints[place]
-        way = problem.observe(fit.by_error[:, :, place, MOTION, 3 + joint.main]) / problem.sigma
-        told = np.sum(way * rows, axis=1)
+    variants = []
+    for index in joints:
+        joint = chain.joints[index]
+        way = problem.observe(fit.by_error[:, :, index, MOTION, 3 + joint.main]) / problem.sigma
+        turn = np.sum(way * rows, axis=1)
         weight = np.sum(way * way, axis=1)
-        phase = np.outer(orders, positions[:, place])
+        phase = np.outer(orders, positions[:, index])
         cosine, sine = np.cos(phase), np.sin(phase)
         # The two columns are all but orthogonal and of the same length over many positions.
-        square = (cosine @ told) ** 2 + (sine @ told) ** 2
+        square = (cosine @ turn) ** 2 + (sine @ turn) ** 2
         power = 2.0 * square / max(float(weight.sum()), 1e-300) / variance
         peaks = np.flatnonzero((power > limit) & (power >= np.roll(power, 1)) & (power >= np.roll(power, -1)))
         term = f"E{COMPONENTS[3 + joint.main]}{joint.name}"
         for peak in peaks[np.argsort(-power[peaks])][:MOST_PEAKS]:
             text = f"{term}:harmonic{orders[peak]:.6g}"
-            found.append(Variant(f"{term}:harmonic", parse_effect(text, chain), len(orders)))
-    return found
+            variants.append(Variant(f"{term}:harmonic", parse_effect(text, chain), len(orders)))
+    return variants

@@ -1,4 +1,4 @@
-"""What lack of fit may do to the parameters: a systematic deviation is no noise, and pulls where noise would not.
+"""The uncertainty by lack of fit: a systematic deviation is no noise, and pulls parameters where noise would not.
 
 A deviation that is the same in every run leaves part of itself in the residual and hides the other part in the
 parameters. Taken as more noise of the same size, the hidden part comes out several times too small, because
@@ -19,7 +19,7 @@ import scipy
 
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.visible import Candidate, Variant, see
+from monitor.discovery.machine.scene import ChainCandidate, ChainVariant, scene_of
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
 
@@ -41,42 +41,62 @@ class ModelUncertainty:
     effects: tuple[tuple[str, float], ...]
 
 
-def model_uncertainty(fit: Fit, place: int, variants: Sequence[Variant]) -> ModelUncertainty | None:
-    """What lack of fit adds to the covariance of the unknowns of the run at ``place``; None where there is none.
+def model_uncertainty(fit: Fit, run: int, variants: Sequence[ChainVariant]) -> ModelUncertainty | None:
+    """Evaluate what lack of fit adds to the covariance of the unknowns of a run, counted from 0; None where there is
+    none.
 
     ``variants`` are the effects that may have caused it.
     """
-    found_lack = _lack(fit)
-    if found_lack is None:
+    lack = _lack(fit)
+    if lack is None:
         return None
-    lack, freedom, pure, runs = found_lack
-    seen = see(fit, variants)
-    pulls, explained, sizes, names = [], [], [], []
-    for one in seen.candidates:
-        if not one.detectable:
-            continue
-        found = _pull(fit, place, one, seen.residual)
-        if found is None:
-            continue
-        pulls.append(found[0])
-        explained.append(min(found[1], 0.999 * lack))
-        sizes.append(one.columns.shape[1])
-        names.append(one.family)
-    local = fit.solution.local_covariance[place]
+    scene = scene_of(fit, variants)
+    pulls = [
+        pull
+        for candidate in scene.candidates
+        if candidate.detectable and (pull := _pull(fit, run, candidate, scene.residual)) is not None
+    ]
+    local = fit.solution.local_covariance[run]
     if not pulls:
-        return ModelUncertainty((lack / freedom - pure) / runs * local, freedom, ())
-    weights = _probabilities(np.array(explained), np.array(sizes), lack, freedom)
-    # What is left, as noise of one run: its expectation without lack of fit is one pure error a degree of freedom.
-    left = max(0.0, (lack - float(weights @ explained)) / freedom - pure) / runs
-    spread = np.einsum("e,ei,ej->ij", weights, np.array(pulls), np.array(pulls))
+        added = (lack.squares / lack.degrees_of_freedom - lack.pure) / lack.runs
+        return ModelUncertainty(added * local, lack.degrees_of_freedom, ())
+    explained = [min(pull.explained, 0.999 * lack.squares) for pull in pulls]
+    sizes = np.array([pull.size for pull in pulls])
+    weights = _probabilities(np.array(explained), sizes, lack)
+    # What remains, as noise of one run: its expectation without lack of fit is one pure error a degree of freedom.
+    unexplained = (lack.squares - float(weights @ explained)) / lack.degrees_of_freedom
+    remainder = max(0.0, unexplained - lack.pure) / lack.runs
+    shifts = np.array([pull.shift for pull in pulls])
+    spread = np.einsum("e,ei,ej->ij", weights, shifts, shifts)
     order = [int(i) for i in np.argsort(-weights, kind="stable") if weights[i] > LEAST_PROBABLE]
-    return ModelUncertainty(
-        spread + left * local, freedom, tuple((names[i], float(weights[i])) for i in order)
-    )
+    effects = tuple((pulls[i].effect, float(weights[i])) for i in order)
+    return ModelUncertainty(spread + remainder * local, lack.degrees_of_freedom, effects)
 
 
-def _lack(fit: Fit) -> tuple[float, float, float, int] | None:
-    """Sum of squares of lack of fit, its degrees of freedom, the mean square of noise, and how many runs share it.
+@dataclass(frozen=True)
+class _Lack:
+    """Sum of ``squares`` of lack of fit, its degrees of freedom, the mean square of noise, and how many runs share
+    it."""
+
+    squares: float
+    degrees_of_freedom: float
+    pure: float
+    runs: int
+
+
+@dataclass(frozen=True)
+class _Pull:
+    """An effect with ``size`` coefficients at its best size: how it moves the unknowns of a run (p,), and the sum of
+    squares that it explains."""
+
+    effect: str
+    size: int
+    shift: Array
+    explained: float
+
+
+def _lack(fit: Fit) -> _Lack | None:
+    """Lack of fit where it is significant.
 
     Without repeated runs the probe's stated uncertainty is the only yardstick: all of the residual counts then.
     """
@@ -85,32 +105,34 @@ def _lack(fit: Fit) -> tuple[float, float, float, int] | None:
         if test.f <= 1.0 or test.p_value > LEVEL:
             return None
         pure = fit.sum_of_squares / (test.f * test.degrees_of_freedom + test.pure_error_degrees_of_freedom)
-        return pure * test.f * test.degrees_of_freedom, test.degrees_of_freedom, pure, len(fit.problem.runs)
+        squares = pure * test.f * test.degrees_of_freedom
+        return _Lack(squares, test.degrees_of_freedom, pure, len(fit.problem.runs))
     freedom = fit.degrees_of_freedom
     if fit.scale <= 1.0 or float(scipy.special.chdtrc(freedom, fit.sum_of_squares)) > LEVEL:
         return None
-    return fit.sum_of_squares, float(freedom), 1.0, 1
+    return _Lack(fit.sum_of_squares, float(freedom), 1.0, 1)
 
 
-def _probabilities(explained: Array, sizes: Array, lack: float, freedom: float) -> Array:
+def _probabilities(explained: Array, sizes: Array, lack: _Lack) -> Array:
     """Posterior probabilities (e,) for residuals of unknown variance, from BIC."""
-    score = -0.5 * freedom * np.log1p(-explained / lack) - 0.5 * sizes * np.log(freedom)
+    freedom = lack.degrees_of_freedom
+    score = -0.5 * freedom * np.log1p(-explained / lack.squares) - 0.5 * sizes * np.log(freedom)
     weights = np.exp(score - score.max())
     return np.asarray(weights / weights.sum())
 
 
-def _pull(fit: Fit, place: int, one: Candidate, residual: Array) -> tuple[Array, float] | None:
-    """How the effect at its best size moves the unknowns of a run (p,), and the sum of squares that it explains."""
-    scale = np.linalg.norm(one.columns, axis=0)
+def _pull(fit: Fit, run: int, candidate: ChainCandidate, residual: Array) -> _Pull | None:
+    """The pull of an effect at its best size on the unknowns of a run; None where it has no size."""
+    scale = np.linalg.norm(candidate.columns, axis=0)
     if not np.all(scale > 0.0):
         return None
-    size, _, rank, _ = np.linalg.lstsq(one.columns / scale, residual, rcond=1e-6)
+    size, _, rank, _ = np.linalg.lstsq(candidate.columns / scale, residual, rcond=1e-6)
     if rank < len(scale):
         return None
     size = size / scale
-    explained = float(np.sum((one.columns @ size) ** 2))
+    explained = float(np.sum((candidate.columns @ size) ** 2))
     problem = fit.problem
-    rows = problem.padded(one.raw / problem.sigma[..., None])[place] @ size
-    space = eliminate(fit.solution.last.local[[place]])
+    rows = problem.padded(candidate.raw / problem.sigma[..., None])[run] @ size
+    space = eliminate(fit.solution.last.local[[run]])
     basis = space.basis[0][: len(rows)]
-    return space.inverse[0] @ (basis.T @ rows), explained
+    return _Pull(candidate.family, len(scale), space.inverse[0] @ (basis.T @ rows), explained)

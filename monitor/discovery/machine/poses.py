@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
-from monitor.discovery.machine.evidence import orthonormal, without
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.visible import Candidate, Visible
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene
+from monitor.discovery.search.projection import orthonormal, without
 from monitor.records import Array
 
 # The variance of fewer poses than this is too uncertain to be a yardstick.
@@ -37,47 +37,50 @@ def poses_of_rows(fit: Fit) -> npt.NDArray[np.int64] | None:
 
 
 def p_value_by_poses(
-    found: Candidate, visible: Visible, others: Sequence[Candidate], pose: npt.NDArray[np.int64]
+    candidate: ChainCandidate,
+    scene: ChainScene,
+    others: Sequence[ChainCandidate],
+    pose: npt.NDArray[np.int64],
 ) -> float:
     """p-value of an effect beside others with every pose as one observation, what was searched paid for."""
-    basis = orthonormal(np.concatenate([visible.added, *(one.columns for one in others)], axis=1))
-    residual = without(basis, visible.residual[:, None])[:, 0]
-    own = orthonormal(without(basis, found.columns))
-    size = own.shape[1]
+    basis = orthonormal(scene.columns(others))
+    residual = without(basis, scene.residual[:, None])[:, 0]
+    columns = orthonormal(without(basis, candidate.columns))
+    size = columns.shape[1]
     inside = pose >= 0
     poses = len(np.unique(pose[inside]))
-    dof = visible.degrees_of_freedom - basis.shape[1] - size
+    dof = scene.degrees_of_freedom - basis.shape[1] - size
     if size == 0 or dof < 1 or poses <= size:
         return 1.0
-    onto = own.T @ residual
-    left = residual - own @ onto
-    scores = _sums(own[inside] * left[inside, None], pose[inside])
+    onto = columns.T @ residual
+    remainder = residual - columns @ onto
+    scores = _sums(columns[inside] * remainder[inside, None], pose[inside])
     # What the fit took out of the residual is missing from the sums.
     meat = scores.T @ scores * (int(inside.sum()) / dof)
     statistic = float(onto @ np.linalg.pinv(meat, hermitian=True) @ onto) / size
-    return float(min(1.0, special.fdtrc(size, poses - size, statistic) * found.variant.tries))
+    return float(min(1.0, special.fdtrc(size, poses - size, statistic) * candidate.variant.tries))
 
 
-def widening(visible: Visible, chosen: Sequence[Candidate], pose: npt.NDArray[np.int64]) -> Array:
-    """Factors (k,), 1 at least, by which what poses share widens the standard uncertainties of the chosen effects'
+def widening(scene: ChainScene, selected: Sequence[ChainCandidate], pose: npt.NDArray[np.int64]) -> Array:
+    """Factors (k,), 1 at least, by which what poses share widens the standard uncertainties of the selected effects'
     coefficients over those of independent readings."""
-    basis = orthonormal(visible.added)
-    residual = without(basis, visible.residual[:, None])[:, 0]
-    columns = without(basis, np.concatenate([one.columns for one in chosen], axis=1))
+    basis = orthonormal(scene.shared)
+    residual = without(basis, scene.residual[:, None])[:, 0]
+    columns = without(basis, np.concatenate([candidate.columns for candidate in selected], axis=1))
     scale = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(scale == 0, 1.0, scale)
     inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-10, hermitian=True)
-    left = residual - columns @ (inverse @ (columns.T @ residual))
-    dof = max(visible.degrees_of_freedom - basis.shape[1] - columns.shape[1], 1)
+    remainder = residual - columns @ (inverse @ (columns.T @ residual))
+    dof = max(scene.degrees_of_freedom - basis.shape[1] - columns.shape[1], 1)
     inside = pose >= 0
-    scores = _sums(columns[inside] * left[inside, None], pose[inside])
+    scores = _sums(columns[inside] * remainder[inside, None], pose[inside])
     shared = inverse @ (scores.T @ scores) @ inverse * (int(inside.sum()) / dof)
-    plain = inverse * float(left @ left) / dof
+    plain = inverse * float(remainder @ remainder) / dof
     ratio = np.diag(shared) / np.maximum(np.diag(plain), 1e-300)
     return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
 
 
 def _sums(rows: Array, pose: npt.NDArray[np.int64]) -> Array:
     """Sums (P, k) of rows (m, k) over each pose."""
-    _, place = np.unique(pose, return_inverse=True)
-    return np.column_stack([np.bincount(place, weights=column) for column in rows.T])
+    _, index = np.unique(pose, return_inverse=True)
+    return np.column_stack([np.bincount(index, weights=column) for column in rows.T])

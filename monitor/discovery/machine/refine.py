@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from monitor.discovery.machine.evidence import orthonormal, weigh, without
-from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.gears import STEP as ORDER_STEP
-from monitor.discovery.machine.scan import ScanResult, amplitudes
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.variants import TIME_CONSTANTS_S
-from monitor.discovery.machine.visible import Candidate, Variant, Visible, see
+from monitor.discovery.search.amplitudes import amplitudes
+from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.missing import Searched
+from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, with_time_constant
 from monitor.effects.catalogue import SCREW_LEADS_MM
 from monitor.effects.drivers import WarmUp
@@ -32,41 +33,63 @@ STEP = 1e-3
 class Refined:
     """A candidate at its best value; ``slope`` (M, 0 or 1) is how its part of the residual moves with it."""
 
-    candidate: Candidate
+    candidate: ChainCandidate
     searched: Searched | None
     slope: Array
 
 
-def _maker(candidate: Candidate) -> tuple[str, str, float, Callable[[float], Variant]] | None:
-    """Name, unit and present value of what was searched, and the variant for any other value."""
-    effect, family = candidate.variant.effect, candidate.family
-    if candidate.variant.tries == 1:
+@dataclass(frozen=True)
+class _Range:
+    """A value that is searched: its name, unit and start, the half ``width`` of its range in the logarithm and the
+    tolerance there, the variant for any other value, and the nearest value that is likelier beforehand."""
+
+    name: str
+    unit: str
+    start: float
+    width: float
+    tolerance: float
+    variant: Callable[[float], ChainVariant]
+    likely: Callable[[float], float | None]
+
+
+def _range_of(candidate: ChainCandidate) -> _Range | None:
+    """The value that is searched of a candidate; None where there is none."""
+    effect, family, variant = candidate.effect, candidate.family, candidate.variant
+    if variant.tries == 1:
         return None
-    driver = effect.driver
-    if isinstance(driver, WarmUp) and driver.time_constant_s is not None:
-        return (
+    if isinstance(effect.driver, WarmUp) and effect.driver.time_constant_s is not None:
+        return _Range(
             "time constant",
             "min",
-            driver.time_constant_s / 60.0,
-            lambda minutes: replace(candidate.variant, effect=with_time_constant(effect, 60.0 * minutes)),
+            effect.driver.time_constant_s / 60.0,
+            float(np.log(GRID_FACTOR)),
+            1e-3,
+            lambda minutes: replace(variant, effect=with_time_constant(effect, 60.0 * minutes)),
+            lambda minutes: None,
         )
-    if isinstance(effect, ChainEffect) and isinstance(effect.shape, Cyclic) and family.endswith(":cyclic"):
-        return (
+    if not isinstance(effect, ChainEffect):
+        return None
+    if isinstance(effect.shape, Cyclic) and family.endswith(":cyclic"):
+        pitch = effect.shape.pitch
+        return _Range(
             "pitch",
             "mm",
-            effect.shape.pitch,
-            lambda pitch: replace(candidate.variant, effect=_with_pitch(effect, pitch)),
+            pitch,
+            0.5 * pitch / 400.0,
+            1e-5,
+            lambda pitch: replace(variant, effect=_with_pitch(effect, pitch)),
+            lambda pitch: min(SCREW_LEADS_MM, key=lambda lead: abs(lead - pitch)),
         )
-    if (
-        isinstance(effect, ChainEffect)
-        and isinstance(effect.shape, Harmonic)
-        and family.endswith(":harmonic")
-    ):
-        return (
+    if isinstance(effect.shape, Harmonic) and family.endswith(":harmonic"):
+        order = float(effect.shape.order)
+        return _Range(
             "periods a turn",
             "1",
-            float(effect.shape.order),
-            lambda order: replace(candidate.variant, effect=_with_order(effect, order)),
+            order,
+            ORDER_STEP / order,
+            1e-5,
+            lambda order: replace(variant, effect=_with_order(effect, order)),
+            lambda order: float(round(order)),
         )
     return None
 
@@ -79,67 +102,57 @@ def _with_pitch(effect: ChainEffect, pitch: float) -> ChainEffect:
     return replace(effect, shape=Cyclic(pitch), shape_text=f"cyclic{pitch:.6g}mm")
 
 
-def refine_all(fit: Fit, visible: Visible, result: ScanResult) -> list[Refined]:
-    """All findings of a scan at their best values, the most convincing first."""
-    chosen = [finding.candidate for finding in result.findings]
+def refine_all(scene: ChainScene, candidates: Sequence[ChainCandidate]) -> list[Refined]:
+    """Refine all findings of a scan, the most convincing first."""
+    selected = list(candidates)
     refined: list[Refined] = []
-    for place in range(len(chosen)):
-        refined.append(refine(fit, visible, chosen, place))
-        chosen[place] = refined[-1].candidate
+    for index in range(len(selected)):
+        refined.append(refine(scene, selected, index))
+        selected[index] = refined[-1].candidate
     return refined
 
 
-def refine(fit: Fit, visible: Visible, chosen: Sequence[Candidate], place: int) -> Refined:
-    """The candidate at ``place`` with its searched value refined, the other chosen ones fitted along."""
-    candidate = chosen[place]
-    made = _maker(candidate)
-    none = np.zeros((len(visible.residual), 0))
-    if made is None:
-        return Refined(candidate, None, none)
-    name, unit, start, variant = made
-    others = np.concatenate(
-        [visible.added, *(one.columns for other, one in enumerate(chosen) if other != place)], axis=1
-    )
+def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) -> Refined:
+    """Refine the searched value of the candidate at an index, the other selected ones fitted along."""
+    candidate = selected[index]
+    searched = _range_of(candidate)
+    if searched is None:
+        return Refined(candidate, None, np.zeros((len(scene.residual), 0)))
+    variant = searched.variant
+    others = scene.columns(except_for(selected, index))
 
-    def at(value: float) -> Candidate:
-        return see(fit, [variant(value)]).candidates[0]
+    def at(value: float) -> ChainCandidate:
+        return scene_of(scene.fit, [variant(value)]).candidates[0]
 
     def badness(logarithm: float) -> float:
-        found = weigh([at(float(np.exp(logarithm)))], visible.residual, others, visible.degrees_of_freedom)
-        return -found[0].explained
+        trial = at(float(np.exp(logarithm)))
+        (evidence,) = weigh([trial], scene.residual, others, scene.degrees_of_freedom)
+        return -evidence.explained
 
-    width = 0.5 * start / 400.0
-    if name == "time constant":
-        width = np.log(GRID_FACTOR)
-    elif name == "periods a turn":
-        width = ORDER_STEP / start
+    start = np.log(searched.start)
     best = scipy.optimize.minimize_scalar(
         badness,
-        bounds=(np.log(start) - width, np.log(start) + width),
+        bounds=(start - searched.width, start + searched.width),
         method="bounded",
-        options={"xatol": 1e-3 if name == "time constant" else 1e-5, "maxiter": 30},
+        options={"xatol": searched.tolerance, "maxiter": 30},
     )
     value = float(np.exp(best.x))
-    now = at(value)
-    estimate = amplitudes(visible, [now]).estimate
+    refined = at(value)
+    estimate = amplitudes(scene, [refined]).estimate
     high, low = at(value * (1.0 + STEP)), at(value * (1.0 - STEP))
     slope = ((high.columns - low.columns) @ estimate / (2.0 * STEP * value))[:, None]
-    u = _uncertainty(visible, now, slope, others)
-    if name == "periods a turn" and abs(round(value) - value) < 2.0 * u:
-        value = float(round(value))
-        now = at(value)
-    if name == "pitch":
-        near = [lead for lead in SCREW_LEADS_MM if abs(lead - value) < 2.0 * u]
-        if near:
-            value = min(near, key=lambda lead: abs(lead - value))
-            now = at(value)
-    return Refined(now, Searched(name, value, u if np.isfinite(u) else None, unit), slope)
+    u = _uncertainty(scene, refined, slope, others)
+    likely = searched.likely(value)
+    if likely is not None and abs(likely - value) < 2.0 * u:
+        value, refined = likely, at(likely)
+    result = Searched(searched.name, value, u if np.isfinite(u) else None, searched.unit)
+    return Refined(refined, result, slope)
 
 
-def _uncertainty(visible: Visible, candidate: Candidate, slope: Array, others: Array) -> float:
+def _uncertainty(scene: ChainScene, candidate: ChainCandidate, slope: Array, others: Array) -> float:
     basis = orthonormal(np.concatenate([others, candidate.columns], axis=1))
-    left = without(basis, slope)
-    residual = without(basis, visible.residual[:, None])
-    length = float(np.linalg.norm(left))
-    variance = float(np.sum(residual**2)) / visible.degrees_of_freedom
+    remainder = without(basis, slope)
+    residual = without(basis, scene.residual[:, None])
+    length = float(np.linalg.norm(remainder))
+    variance = float(np.sum(residual**2)) / scene.degrees_of_freedom
     return float(np.sqrt(variance)) / length if length > 0 else float("inf")

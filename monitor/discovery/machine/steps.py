@@ -1,6 +1,6 @@
 """Steps between runs: a parameter that jumped, a ball that stands elsewhere since some run.
 
-Told as what they are, with a stated false-alarm probability; the search itself is in ``statistics.changes``.
+Reported as what they are, with a stated false-alarm probability; the search itself is in ``statistics.changes``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from monitor.statistics import find_changes
 # One false alarm in a hundred campaigns, half of it for the parameters and half for the balls.
 FALSE_ALARM = 0.01
 FEWEST_RUNS = 6
-# Where the runs happen to scatter less than their known uncertainty, that uncertainty counts: a step is told
+# Where the runs happen to scatter less than their known uncertainty, that uncertainty counts: a step is reported
 # from four standard deviations on, one in 16 000 by chance.
 STANDARD_DEVIATIONS = 4.0
 
@@ -34,11 +34,10 @@ class Step:
 
 
 def _series(fit: Fit) -> dict[str, Array]:
-    count = len(fit.problem.base_names)
     return {
-        name: fit.solution.local[:, place]
-        for place, name in enumerate(fit.problem.base_names[:count])
-        if fit.solution.local_free[:, place].all()
+        name: fit.solution.local[:, index]
+        for index, name in enumerate(fit.problem.base_names)
+        if fit.solution.local_free[:, index].all()
     }
 
 
@@ -51,29 +50,29 @@ def _balls(fit: Fit, left_out: frozenset[str], moved: frozenset[str]) -> dict[st
     touched = [int(np.sum(fit.problem.context.target == target)) for target in movable]
     # A ball touched once a run has nothing to check it, and moves with the readings.
     often = [
-        place
-        for place, times in enumerate(touched)
-        if times >= 3 * len(fit.problem.runs) and movable[place] not in moved
+        ball
+        for ball, times in enumerate(touched)
+        if times >= 3 * len(fit.problem.runs) and movable[ball] not in moved
     ]
     if len(often) < 3:
         return {}
     coordinates = np.array(
         [[fit.problem.local_names.index(f"ball {name} {axis}") for axis in "xyz"] for name in movable]
     )
-    places = fit.solution.local[:, coordinates[often]]
-    middle = np.median(places - places[:1], axis=1, keepdims=True)
-    relative = places - places[:1] - middle
+    centres = fit.solution.local[:, coordinates[often]]
+    middle = np.median(centres - centres[:1], axis=1, keepdims=True)
+    relative = centres - centres[:1] - middle
     return {
-        f"{movable[ball]}|{'xyz'[axis]}": relative[:, place, axis]
-        for place, ball in enumerate(often)
+        f"{movable[ball]}|{'xyz'[axis]}": relative[:, index, axis]
+        for index, ball in enumerate(often)
         for axis in range(3)
         if movable[ball] not in left_out
     }
 
 
-def _known(fit: Fit, place: int, index: int) -> float:
+def _u_of_step(fit: Fit, unknown: int, index: int) -> float:
     """Standard uncertainty of the difference of the means before and after, from each run's own covariance."""
-    variance = fit.solution.local_covariance[:, place, place]
+    variance = fit.solution.local_covariance[:, unknown, unknown]
     before, after = variance[:index], variance[index:]
     return float(np.sqrt(before.mean() / len(before) + after.mean() / len(after)))
 
@@ -83,18 +82,18 @@ def find_steps(
 ) -> list[Step]:
     """Steps of parameters and balls over the runs, which began at ``started`` (R,), in days, rising.
 
-    Balls that were seen to move inside a run (``moved_within``) are not told twice.
+    Balls that were seen to move inside a run (``moved_within``) are not reported twice.
     """
     if len(fit.problem.runs) < FEWEST_RUNS:
         return []
-    found = _search(fit, _series(fit), started, rng)
+    stepped = _search(fit, _series(fit), started, rng)
     # A ball that moved shifts the middle a little; the others are looked at again without it.
     moved: list[Step] = []
     while True:
         without = frozenset(str(step.target) for step in moved)
         steps = _search(fit, _balls(fit, moved_within, without), started, rng)
         if not steps:
-            return found + moved
+            return stepped + moved
         largest = max(steps, key=lambda step: abs(step.size) / step.u)
         moved += [step for step in steps if step.target == largest.target]
 
@@ -107,19 +106,19 @@ def _search(fit: Fit, series: dict[str, Array], started: Array, rng: np.random.G
     level = FALSE_ALARM / 2.0
     trials = int(2 * len(series) / level)
     history = find_changes(series, started, rng=rng, false_alarm=level, trials=trials)
-    found: dict[tuple[str, int], Step] = {}
+    largest: dict[tuple[str, int], Step] = {}
     for change in history.changes:
         if change.kind != "step":
             continue
         run = int(fit.problem.runs[change.index])
         name, _, axis = change.parameter.partition("|")
-        place = fit.problem.local_names.index(f"ball {name} {axis}" if axis else name)
-        if abs(change.size) < STANDARD_DEVIATIONS * _known(fit, place, change.index):
+        unknown = fit.problem.local_names.index(f"ball {name} {axis}" if axis else name)
+        if abs(change.size) < STANDARD_DEVIATIONS * _u_of_step(fit, unknown, change.index):
             continue
         # The level is that of the whole search.
         p_value = min(1.0, change.p_value * len(series))
         step = Step(None if axis else name, name if axis else None, run, change.size, change.u, p_value)
-        before = found.get((name, run))
+        before = largest.get((name, run))
         if before is None or abs(step.size) > abs(before.size):
-            found[(name, run)] = step
-    return list(found.values())
+            largest[(name, run)] = step
+    return list(largest.values())

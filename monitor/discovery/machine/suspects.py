@@ -1,6 +1,6 @@
-"""What belongs to single runs: bad points, balls that moved in a run, effects with another size in every run.
+"""Suspects of single runs: bad points, balls that moved in a run, effects with another size in every run.
 
-Each of them can be taken for another: an effect that varies makes probings deviate from the other runs', a bad
+Each of them can be mistaken for another: an effect that varies makes probings deviate from the other runs', a bad
 point makes sizes scatter. So whatever explains most is taken first, and the rest is judged with it taken out.
 """
 
@@ -14,10 +14,10 @@ import numpy.typing as npt
 
 from monitor.discovery.machine.anomalies import BadPoint, BallMove, bad_points, ball_moves
 from monitor.discovery.machine.fit import Fit, fit
+from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect
 from monitor.discovery.machine.variants import each_run
 from monitor.discovery.machine.varying import most_varying
-from monitor.discovery.machine.visible import Variant, Visible
-from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
+from monitor.effects import parse_effect
 from monitor.methods.chain.problem import ChainProblem
 
 MOST_BAD_POINTS = 40
@@ -25,7 +25,7 @@ MOST_BAD_POINTS = 40
 MOST_VARYING = 2
 
 
-def with_effects(problem: ChainProblem, effects: Sequence[ChainEffect | ArtefactEffect]) -> ChainProblem:
+def with_effects(problem: ChainProblem, effects: Sequence[MachineEffect]) -> ChainProblem:
     """The problem with further effects in common."""
     return replace(problem, added=(*problem.added, *effects))
 
@@ -36,12 +36,32 @@ class Suspects:
 
     bad: dict[int, BadPoint] = field(default_factory=dict)
     moves: dict[tuple[str, int], BallMove] = field(default_factory=dict)
-    varying: tuple[ChainEffect | ArtefactEffect, ...] = ()
+    varying: tuple[MachineEffect, ...] = ()
 
     @property
     def any(self) -> bool:
         """Whether there is any."""
         return bool(self.bad or self.moves or self.varying)
+
+    def with_single(self, suspects: Sequence[BadPoint | BallMove]) -> Suspects:
+        """The suspects with the most certain further ones of every run and target.
+
+        What one of them does to its run and, through the mean, to its ball in the other runs is seen only once
+        it is taken out.
+        """
+        bad, moves = dict(self.bad), dict(self.moves)
+        runs: set[int] = set()
+        targets: set[str] = set()
+        for suspect in suspects:
+            if suspect.run in runs or suspect.target in targets:
+                continue
+            runs.add(suspect.run)
+            targets.add(suspect.target)
+            if isinstance(suspect, BallMove):
+                moves[(suspect.target, suspect.run)] = suspect
+            else:
+                bad[suspect.row] = suspect
+        return replace(self, bad=bad, moves=moves)
 
     def same_as(self, other: Suspects) -> bool:
         """Whether both name the same ones."""
@@ -57,7 +77,7 @@ class Suspects:
         out[list(self.bad)] = True
         return out
 
-    def move_effects(self, problem: ChainProblem) -> list[ChainEffect | ArtefactEffect]:
+    def move_effects(self, problem: ChainProblem) -> list[MachineEffect]:
         """The moves as effects."""
         return [
             parse_effect(
@@ -66,7 +86,7 @@ class Suspects:
             for move in self.moves.values()
         ]
 
-    def effects(self, problem: ChainProblem) -> list[ChainEffect | ArtefactEffect]:
+    def effects(self, problem: ChainProblem) -> list[MachineEffect]:
         """Moves and varying effects, each with coefficients of its runs."""
         varying = [variant.effect for effect in self.varying if (variant := each_run(effect)) is not None]
         return [*self.move_effects(problem), *varying]
@@ -75,41 +95,29 @@ class Suspects:
 def find_suspects(
     under: Fit,
     problem: ChainProblem,
-    chosen: Sequence[ChainEffect | ArtefactEffect],
-    known: Suspects,
-    variants: Sequence[Variant],
-    visible: Visible | None = None,
+    selected: Sequence[MachineEffect],
+    earlier: Suspects,
+    variants: Sequence[ChainVariant],
+    scene: ChainScene | None = None,
 ) -> Suspects:
-    """The suspects under a model with the ``chosen`` effects, the most certain first; ``known`` ones are kept.
+    """The suspects under a model with the ``selected`` effects, the most certain first; ``earlier`` ones remain.
 
-    ``under`` is the fit with the chosen and the known ones, ``variants`` the effects that may vary,
-    ``visible`` what ``under`` shows of them all where that is known.
+    ``under`` is the fit with the selected effects and the earlier suspects, ``variants`` the effects that may vary,
+    ``scene`` that of ``under`` with all of them where it is known.
     """
-    bad, moves, varying = dict(known.bad), dict(known.moves), known.varying
-    now = under
-    while len(bad) < MOST_BAD_POINTS:
-        new: list[BadPoint | BallMove] = [*bad_points(now), *ball_moves(now)]
-        new.sort(key=lambda one: -one.chi_square)
-        wild = most_varying(now, variants, visible) if len(varying) < MOST_VARYING else None
-        if wild is not None and (not new or wild.gain > new[0].chi_square):
-            varying = (*varying, wild.effect)
-        elif not new:
+    suspects = earlier
+    current = under
+    while len(suspects.bad) < MOST_BAD_POINTS:
+        single: list[BadPoint | BallMove] = [*bad_points(current), *ball_moves(current)]
+        single.sort(key=lambda suspect: -suspect.chi_square)
+        varying = most_varying(current, variants, scene) if len(suspects.varying) < MOST_VARYING else None
+        if varying is not None and (not single or varying.gain > single[0].chi_square):
+            suspects = replace(suspects, varying=(*suspects.varying, varying.effect))
+        elif not single:
             break
-        # What one of them does to its run and, through the mean, to its ball in the other runs is seen only once
-        # it is taken out.
         else:
-            runs: set[int] = set()
-            targets: set[str] = set()
-            for one in new:
-                if one.run in runs or one.target in targets:
-                    continue
-                runs.add(one.run)
-                targets.add(one.target)
-                if isinstance(one, BallMove):
-                    moves[(one.target, one.run)] = one
-                else:
-                    bad[one.row] = one
-        found = Suspects(bad, moves, varying)
-        now = fit(with_effects(problem, [*found.effects(problem), *chosen]), found.left_out(problem), now)
-        visible = None
-    return Suspects(bad, moves, varying)
+            suspects = suspects.with_single(single)
+        effects = [*suspects.effects(problem), *selected]
+        current = fit(with_effects(problem, effects), suspects.left_out(problem), current)
+        scene = None
+    return suspects

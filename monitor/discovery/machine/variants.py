@@ -1,4 +1,4 @@
-"""The variants of an effect that a scan looks at: time constants and pitches that nobody knows beforehand."""
+"""The variants of an effect that a scan looks at: time constants and pitches that are not known beforehand."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from monitor.discovery.machine.visible import Variant
-from monitor.effects import ArtefactEffect, ChainEffect, Context, parse_effect, with_time_constant
+from monitor.discovery.machine.scene import ChainVariant, MachineEffect
+from monitor.discovery.search.candidate import Variant
+from monitor.effects import ChainEffect, Context, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, WarmUp, parse_driver
 from monitor.effects.shapes import Compliance, Cyclic
 from monitor.effects.weight import Load
@@ -24,14 +25,14 @@ TIME_CONSTANTS_S = tuple(600.0 * 2.0**step for step in range(7))
 SHORTEST_PITCH_MM, LONGEST_PITCH_MM, FREQUENCY_STEP = 4.0, 130.0, 1.0 / 800.0
 
 # Positions closer than this are one; a cycle needs its two coefficients, the base's zero and gain, and some to spare.
-GRID_TOLERANCE_MM, FEWEST_PLACES = 0.05, 6
+GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.05, 6
 
 # A driver that hardly varies makes nearly the same columns as none; where the data cannot decide, the plain effect
-# leads and the driven one is told as its rival. 2 log 400 = 12 is what counts as decided.
+# leads and the driven one is reported as its rival. 2 log 400 = 12 is what counts as decided.
 ODDS_OF_A_DRIVER = 400.0
 
 
-def variants_of(effect: ChainEffect | ArtefactEffect) -> list[Variant]:
+def variants_of(effect: MachineEffect) -> list[ChainVariant]:
     """The effect itself, or one variant for every time constant where it has none of its own."""
     if isinstance(effect.driver, WarmUp) and effect.driver.time_constant_s is None:
         return [
@@ -47,49 +48,49 @@ def variants_of(effect: ChainEffect | ArtefactEffect) -> list[Variant]:
 
 
 @lru_cache(maxsize=16)
-def cycles_of_unknown_pitch(chain: Chain) -> tuple[Variant, ...]:
+def cycles_of_unknown_pitch(chain: Chain) -> tuple[ChainVariant, ...]:
     """Positioning errors of every linear axis with every pitch of the grid."""
     low, high = 1.0 / LONGEST_PITCH_MM, 1.0 / SHORTEST_PITCH_MM
     count = int((high - low) / FREQUENCY_STEP) + 1
     pitches = [1.0 / (low + step * FREQUENCY_STEP) for step in range(count)]
-    found = []
+    variants: list[ChainVariant] = []
     for joint in chain.of_kind("linear"):
         term = f"E{COMPONENTS[joint.main]}{joint.name}"
         for pitch in pitches:
             text = f"{term}:cyclic{pitch:.6g}mm"
-            found.append(Variant(f"{term}:cyclic", parse_effect(text, chain), count))
-    return tuple(found)
+            variants.append(Variant(f"{term}:cyclic", parse_effect(text, chain), count))
+    return tuple(variants)
 
 
-def resolvable(variants: Iterable[Variant], context: Context) -> list[Variant]:
-    """The cycles that the plan can tell from longer ones, by where it brought their axis.
+def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
+    """The cycles that the plan can separate from longer ones, by the positions of their axis.
 
     Positions that all stand on a grid (modules 50 mm apart) take every pitch below twice its step for a longer one
-    (Nyquist), and a cycle between fewer than ``FEWEST_PLACES`` places fits whatever is there. Positions that lie
+    (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
     anyhow have no such limit.
     """
     limits = {
-        joint.name: _shortest_pitch(context.positions[:, place])
-        for place, joint in enumerate(context.chain.joints)
+        joint.name: _shortest_pitch(context.positions[:, index])
+        for index, joint in enumerate(context.chain.joints)
         if joint.kind == "linear"
     }
-    kept = []
+    separable = []
     for variant in variants:
         effect = variant.effect
         assert isinstance(effect, ChainEffect)
         assert isinstance(effect.shape, Cyclic)
         if effect.shape.pitch >= limits[context.chain.joints[effect.term.joint].name]:
-            kept.append(variant)
-    return kept
+            separable.append(variant)
+    return separable
 
 
 def _shortest_pitch(positions: Array) -> float:
-    """The shortest pitch in mm that positions (n,) of an axis can tell; infinite where there are too few."""
-    places = np.unique(np.round(positions / GRID_TOLERANCE_MM)) * GRID_TOLERANCE_MM
-    steps = np.diff(places)
+    """The shortest pitch in mm that positions (n,) of an axis can show; infinite where there are too few."""
+    distinct = np.unique(np.round(positions / GRID_TOLERANCE_MM)) * GRID_TOLERANCE_MM
+    steps = np.diff(distinct)
     # Touches of one nominal place scatter by less than a step of the grid.
     real = steps[steps > SHORTEST_PITCH_MM / 2.0]
-    if len(real) + 1 < FEWEST_PLACES:
+    if len(real) + 1 < FEWEST_POSITIONS:
         return float("inf") if not len(steps) or len(real) == len(steps) else 0.0
     step = float(real.min())
     multiples = real / step
@@ -97,7 +98,7 @@ def _shortest_pitch(positions: Array) -> float:
     return 2.0 * step if on_grid else 0.0
 
 
-def with_drivers(effect: ChainEffect | ArtefactEffect, drivers: Iterable[str]) -> list[Variant]:
+def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVariant]:
     """The effect multiplied by every driver, where it has none; without its driver, where it has one.
 
     A driver must earn its place: beforehand the plain effect is the likelier one.
@@ -107,14 +108,14 @@ def with_drivers(effect: ChainEffect | ArtefactEffect, drivers: Iterable[str]) -
     if not isinstance(effect.driver, Always):
         bare = replace(effect, driver=Always(), driver_text="")
         return [Variant(bare.text, bare)]
-    found = []
+    variants: list[ChainVariant] = []
     for name in drivers:
         driven = replace(effect, driver=parse_driver(name), driver_text=name)
-        found += [replace(one, odds=ODDS_OF_A_DRIVER) for one in variants_of(driven)]
-    return found
+        variants += [replace(variant, odds=ODDS_OF_A_DRIVER) for variant in variants_of(driven)]
+    return variants
 
 
-def each_run(effect: ChainEffect | ArtefactEffect) -> Variant | None:
+def each_run(effect: MachineEffect) -> ChainVariant | None:
     """The effect with another size in every run; None where it has a driver already."""
     if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
         return None

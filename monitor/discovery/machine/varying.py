@@ -1,4 +1,4 @@
-"""What varies from run to run: effects with another size in every run, which a recorded column follows or not."""
+"""Variation from run to run: effects with another size in every run, which a recorded column follows or not."""
 
 from __future__ import annotations
 
@@ -7,14 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from monitor.discovery.machine.evidence import Evidence, weigh_in_each_run
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.missing import ChainMissing, Surroundings, tell
+from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.refine import refine_all
-from monitor.discovery.machine.scan import scan
+from monitor.discovery.machine.run_evidence import weigh_in_each_run
+from monitor.discovery.machine.scene import (
+    ChainCandidate,
+    ChainScene,
+    ChainVariant,
+    MachineEffect,
+    scene_of,
+)
+from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.machine.variants import each_run, with_drivers
-from monitor.discovery.machine.visible import Variant, Visible, see
-from monitor.effects import ArtefactEffect, ChainEffect
+from monitor.discovery.search.evidence import Evidence
+from monitor.discovery.search.scan import scan
 
 # With fewer runs, another size in every run is no pattern.
 FEWEST_RUNS = 3
@@ -30,64 +37,70 @@ class Varying:
     """An effect that varies, with what its sizes explain, less their price, in squared standard deviations of
     the residual."""
 
-    effect: ChainEffect | ArtefactEffect
+    effect: MachineEffect
     gain: float
 
 
-def _weigh(
-    fit: Fit, variants: Sequence[Variant], visible: Visible | None = None
-) -> tuple[list[Evidence], Visible]:
-    seen = see(fit, variants) if visible is None else visible
+def _weigh(scene: ChainScene, variants: Sequence[ChainVariant]) -> list[Evidence[ChainCandidate]]:
+    """Evidence for those of the variants that the plan can see, with another size in every run."""
     # By identity: equal variants are the same objects here, and comparing effects is slow.
-    own = {id(one) for one in variants}
-    found = weigh_in_each_run(
-        [one for one in seen.candidates if id(one.variant) in own and one.detectable], seen
-    )
-    return sorted(found, key=lambda one: -one.score), seen
+    wanted = {id(variant) for variant in variants}
+    candidates = [
+        candidate
+        for candidate in scene.candidates
+        if id(candidate.variant) in wanted and candidate.detectable
+    ]
+    return sorted(weigh_in_each_run(candidates, scene), key=lambda evidence: -evidence.score)
 
 
-def most_varying(fit: Fit, variants: Sequence[Variant], visible: Visible | None = None) -> Varying | None:
+def most_varying(
+    fit: Fit, variants: Sequence[ChainVariant], scene: ChainScene | None = None
+) -> Varying | None:
     """The effect that, with another size in every run, explains most of what the model leaves; None if none does.
 
-    ``visible`` is what the fit shows of all ``variants``, where that is known.
+    ``scene`` is that of the fit with all ``variants``, where it is known.
     """
     if len(fit.problem.runs) < FEWEST_RUNS:
         return None
-    known = {effect.text for effect in fit.problem.added}
+    added = {effect.text for effect in fit.problem.added}
     bare = [
-        one
-        for one in variants
-        if one.tries == 1 and (own := each_run(one.effect)) is not None and own.effect.text not in known
+        variant
+        for variant in variants
+        if variant.tries == 1
+        and (varying := each_run(variant.effect)) is not None
+        and varying.effect.text not in added
     ]
-    found, seen = _weigh(fit, bare, visible)
-    if not found or found[0].p_value * len(found) > FALSE_ALARM:
+    scene = scene_of(fit, bare) if scene is None else scene
+    weighed = _weigh(scene, bare)
+    if not weighed or weighed[0].p_value * len(weighed) > FALSE_ALARM:
         return None
-    best = found[0]
-    left = float(seen.residual @ seen.residual) - best.explained
-    freedom = max(seen.degrees_of_freedom - best.rank, 1)
-    gain = best.explained * freedom / left - best.rank * np.log(seen.degrees_of_freedom)
-    return Varying(best.candidate.variant.effect, float(gain))
+    best = weighed[0]
+    remainder = float(scene.residual @ scene.residual) - best.explained
+    freedom = max(scene.degrees_of_freedom - best.rank, 1)
+    gain = best.explained * freedom / remainder - best.rank * np.log(scene.degrees_of_freedom)
+    return Varying(best.candidate.effect, float(gain))
 
 
-def tell_varying(
+def varying_effects(
     steady: Fit,
-    effects: Sequence[ChainEffect | ArtefactEffect],
-    others: Sequence[Variant],
+    effects: Sequence[MachineEffect],
+    others: Sequence[ChainVariant],
     rate: float,
-    known: Surroundings,
+    surroundings: Surroundings,
 ) -> tuple[ChainMissing, ...]:
-    """Everything that is told of effects that vary; ``steady`` is the fit with all else that was found, ``others``
-    the effects that may be their rivals.
+    """Effects that vary as results; ``steady`` is the fit with all else that was found, ``others`` the effects that
+    may be their rivals.
 
     Where a recorded column follows the sizes, the effect with that driver explains as much with one coefficient,
     and is the finding.
     """
-    found, _ = _weigh(steady, [one for one in others if one.tries == 1 and each_run(one.effect) is not None])
-    close = [one for one in found if one.score > found[0].score - CLOSE][:MOST_RIVALS] if found else []
+    bare = [variant for variant in others if variant.tries == 1 and each_run(variant.effect) is not None]
+    weighed = _weigh(scene_of(steady, bare), bare)
+    close = [evidence for evidence in weighed if evidence.score > weighed[0].score - CLOSE][:MOST_RIVALS]
     names = {effect.text for effect in effects}
-    near = [*effects, *(one.candidate.variant.effect for one in close if one.candidate.family not in names)]
-    variants = [variant for effect in near if (variant := each_run(effect)) is not None]
-    variants += [variant for effect in effects for variant in with_drivers(effect, known.drivers)]
-    seen = see(steady, variants)
-    result = scan(seen, rate=rate, most=len(effects))
-    return tell(steady, seen, result, refine_all(steady, seen, result), known)
+    rivals = [evidence.candidate.effect for evidence in close if evidence.candidate.family not in names]
+    variants = [variant for effect in (*effects, *rivals) if (variant := each_run(effect)) is not None]
+    variants += [variant for effect in effects for variant in with_drivers(effect, surroundings.drivers)]
+    scene = scene_of(steady, variants)
+    result = scan(scene, rate=rate, most=len(effects))
+    return missing_effects(scene, result, refine_all(scene, result.candidates), surroundings)

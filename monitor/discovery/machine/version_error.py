@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.held_out import held_out_error
-from monitor.discovery.machine.visible import see
+from monitor.discovery.machine.scene import scene_of
 
 
 @dataclass(frozen=True)
@@ -27,11 +24,11 @@ class VersionError:
 
 def version_error(fit: Fit) -> VersionError:
     """The error of a fitted model."""
-    seen = see(fit, [])
+    scene = scene_of(fit, [])
     test, repeatability = lack_of_fit(fit)
     return VersionError(
         rms=fit.rms,
-        held_out_rms=held_out_error(fit, seen, seen.added, np.arange(len(fit.problem.runs))),
+        held_out_rms=scene.held_out_error(scene.shared),
         repeatability=repeatability,
         stated_uncertainty=fit.sigma,
         lack_of_fit_p=None if test is None else test.p_value,

@@ -1,4 +1,4 @@
-"""A missing effect as a result: size, evidence, error before and after, and what it may be taken for."""
+"""A missing effect as a result: size, evidence, error before and after, and what it may be mistaken for."""
 
 from __future__ import annotations
 
@@ -9,12 +9,6 @@ import numpy as np
 from monitor.effects.description import Description
 from monitor.records import Array
 from monitor.units import Unit
-
-# Rivals whose evidence comes this close are not ruled out. Where two effects are s standard deviations apart,
-# the wrong one leads by more than z^2 with a probability of at most Phi(-z); z = 3.5 here.
-UNDECIDED = 12.0
-# An effect coincides with another where so much of it is explained by the other at any size.
-COINCIDES = 0.999
 
 
 @dataclass(frozen=True)
@@ -49,7 +43,7 @@ class Missing:
 
     rank: int
     effect: str
-    words: Description
+    description: Description
     parameters: tuple[str, ...]
     units: tuple[Unit, ...]
     coefficients: Array

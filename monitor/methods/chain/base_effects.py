@@ -1,10 +1,10 @@
-"""The location errors and gains that a chain needs, found from its own rank.
+"""The location errors and gains that a chain needs, determined from its own rank.
 
 Of all location errors of a serial chain many do the same thing at the tip; a complete and minimal set is
 chosen in a fixed order, outermost axes first, so that an error is given to the axis nearest to the workpiece
 or tool. For ``w C B X b Z Y (C1) t`` this gives the ten of SAMBA.
 
-A chain with fewer than three linear axes, such as a robot, cannot bring its tool to any target; it is looked at
+A chain with fewer than three linear axes, such as a robot, cannot bring its tool to any target; it is observed
 from outside, its base frame and the points on its tool being unknown. There the zeros of the joints come first:
 they are what a collision or an exchanged motor changes and what the control can correct. For six joints of an
 elbow robot this gives 18 errors, with frame and one point 27: 4 a rotary joint and 3 for the point, the number
@@ -39,19 +39,19 @@ def _candidates(chain: Chain) -> list[tuple[Joint, int]]:
     """
     frame = (chain.work or chain.tool)[0]
     depth = {
-        joint.name: len(branch) - place
+        joint.name: len(branch) - position
         for branch in (chain.work, chain.tool)
-        for place, joint in enumerate(branch)
+        for position, joint in enumerate(branch)
     }
     spindle_first = sorted(chain.joints, key=lambda joint: (joint.kind != "spindle", depth[joint.name]))
-    found = []
+    candidates = []
     for joint in spindle_first:
         if joint is frame:
             continue
         shifts = [axis for axis in range(3) if joint.turns and axis != joint.main]
         turns = [3 + axis for axis in range(3) if axis != joint.main and joint.kind != "spindle"]
-        found += [(joint, component) for component in (*turns, *shifts)]
-    return found
+        candidates += [(joint, component) for component in (*turns, *shifts)]
+    return candidates
 
 
 def _generic_jacobian(chain: Chain) -> tuple[Array, Array]:
@@ -61,28 +61,28 @@ def _generic_jacobian(chain: Chain) -> tuple[Array, Array]:
     half = {"linear": 0.0, "rotary": np.pi / 2, "spindle": np.pi}
     spread = np.array([half[joint.kind] for joint in chain.joints])
     positions = np.repeat(rng.uniform(-spread, spread, (POSES, len(chain.joints))), TARGETS, axis=0)
-    places = rng.uniform(-150.0, 150.0, (TARGETS, 3))
-    target = np.tile(places, (POSES, 1))
+    points = rng.uniform(-150.0, 150.0, (TARGETS, 3))
+    target = np.tile(points, (POSES, 1))
     errors = np.zeros((count, len(chain.joints), 2, 6))
     tip = np.array(TIP)
     positions = touching_positions(chain, positions, errors, target, tip)
-    seen = evaluate(chain, positions, errors, target, tip, jacobian=True)
-    assert seen.by_error is not None
+    pose = evaluate(chain, positions, errors, target, tip, jacobian=True)
+    assert pose.by_error is not None
     nuisance = np.zeros((count, 3, 3 * TARGETS + 3))
     for number in range(TARGETS):
         nuisance[number::TARGETS, :, 3 * number : 3 * number + 3] = -np.eye(3)
-    nuisance[..., -3:] = seen.by_tip
+    nuisance[..., -3:] = pose.by_tip
     gains = [
-        seen.by_error[:, :, place, 1, joint.main] * positions[:, None, place]
-        for place, joint in enumerate(chain.joints)
+        pose.by_error[:, :, index, 1, joint.main] * positions[:, None, index]
+        for index, joint in enumerate(chain.joints)
         if joint.kind == "linear"
     ]
-    known = np.concatenate([nuisance, np.stack(gains, axis=-1)], axis=-1).reshape(3 * count, -1)
-    return seen.by_error.reshape(3 * count, len(chain.joints), 2, 6), known
+    explained = np.concatenate([nuisance, np.stack(gains, axis=-1)], axis=-1).reshape(3 * count, -1)
+    return pose.by_error.reshape(3 * count, len(chain.joints), 2, 6), explained
 
 
 def _candidates_outside(chain: Chain) -> list[tuple[Joint, int]]:
-    """Location errors that a look from outside can find: the zeros of the joints, shifts, tilts, outermost first.
+    """Location errors that an observer outside can identify: the zeros of the joints, shifts, tilts, outermost first.
 
     A tilt that the zero of the joint before does together with a shift is left to these two, as in Denavit and
     Hartenberg's parameters; with a short link between them it would come out as large as the link is short.
@@ -97,7 +97,7 @@ def _candidates_outside(chain: Chain) -> list[tuple[Joint, int]]:
 
 
 def _generic_jacobian_outside(chain: Chain) -> tuple[Array, Array]:
-    """The same for a chain that is looked at from outside: the nuisance is a frame, points on the tool and gains."""
+    """The same for a chain that is observed from outside: the nuisance is a frame, points on the tool and gains."""
     rng = np.random.default_rng(SEED)
     count = POSES * TARGETS
     half = {"linear": REACH, "rotary": np.pi, "spindle": np.pi}
@@ -107,48 +107,48 @@ def _generic_jacobian_outside(chain: Chain) -> tuple[Array, Array]:
     only_tool = replace(chain, work=(), tool=chain.tool)
     first = len(chain.work)
     none = np.zeros((count, len(chain.tool), 2, 6))
-    seen = evaluate(only_tool, positions[:, first:], none, np.zeros(3), tip, jacobian=True)
-    assert seen.by_error is not None
+    pose = evaluate(only_tool, positions[:, first:], none, np.zeros(3), tip, jacobian=True)
+    assert pose.by_error is not None
     by_error = np.zeros((count, 3, len(chain.joints), 2, 6))
-    by_error[:, :, first:] = seen.by_error
+    by_error[:, :, first:] = pose.by_error
     nuisance = np.zeros((count, 3, 3 * TARGETS + 6))
     for number in range(TARGETS):
-        nuisance[number::TARGETS, :, 3 * number : 3 * number + 3] = seen.by_tip[number::TARGETS]
+        nuisance[number::TARGETS, :, 3 * number : 3 * number + 3] = pose.by_tip[number::TARGETS]
     nuisance[:, :, -6:-3] = np.eye(3)
-    nuisance[:, :, -3:] = np.swapaxes(np.cross(np.eye(3), seen.residual[:, None, :]), 1, 2)
+    nuisance[:, :, -3:] = np.swapaxes(np.cross(np.eye(3), pose.residual[:, None, :]), 1, 2)
     gains = [
-        by_error[:, :, place, 1, joint.main] * positions[:, None, place]
-        for place, joint in enumerate(chain.joints)
+        by_error[:, :, index, 1, joint.main] * positions[:, None, index]
+        for index, joint in enumerate(chain.joints)
         if joint.kind == "linear" and joint.branch == "tool"
     ]
-    known = np.concatenate([nuisance, *(gain[..., None] for gain in gains)], axis=-1)
-    return by_error.reshape(3 * count, len(chain.joints), 2, 6), known.reshape(3 * count, -1)
+    explained = np.concatenate([nuisance, *(gain[..., None] for gain in gains)], axis=-1)
+    return by_error.reshape(3 * count, len(chain.joints), 2, 6), explained.reshape(3 * count, -1)
 
 
 @cache
 def base_effects(chain: Chain, outside: bool | None = None) -> tuple[str, ...]:
     """The effects of a complete and minimal model of a chain, location errors in chain order, then gains.
 
-    ``outside`` says whether the chain is looked at from outside; None: where it cannot touch a target at will.
+    ``outside`` says whether the chain is observed from outside; None: where it cannot touch a target at will.
     """
     if outside is None:
         outside = len(chain.of_kind("linear")) < 3
-    by_error, known = (_generic_jacobian_outside if outside else _generic_jacobian)(chain)
-    basis = np.linalg.qr(known / np.linalg.norm(known, axis=0))[0]
-    chosen: set[tuple[str, int]] = set()
+    by_error, explained = (_generic_jacobian_outside if outside else _generic_jacobian)(chain)
+    basis = np.linalg.qr(explained / np.linalg.norm(explained, axis=0))[0]
+    selected: set[tuple[str, int]] = set()
     for joint, component in (_candidates_outside if outside else _candidates)(chain):
         column = by_error[:, chain.index(joint.name), 0, component]
-        left = column - basis @ (basis.T @ column)
-        left -= basis @ (basis.T @ left)
-        if np.linalg.norm(left) > RANK_TOLERANCE * np.linalg.norm(column):
-            basis = np.column_stack([basis, left / np.linalg.norm(left)])
-            chosen.add((joint.name, component))
+        remainder = column - basis @ (basis.T @ column)
+        remainder -= basis @ (basis.T @ remainder)
+        if np.linalg.norm(remainder) > RANK_TOLERANCE * np.linalg.norm(column):
+            basis = np.column_stack([basis, remainder / np.linalg.norm(remainder)])
+            selected.add((joint.name, component))
     ordered = sorted(chain.joints, key=lambda joint: joint.kind == "spindle")
     locations = [
         f"E{COMPONENTS[component]}0{joint.name}"
         for joint in ordered
         for component in range(6)
-        if (joint.name, component) in chosen
+        if (joint.name, component) in selected
     ]
     gains = [
         f"E{COMPONENTS[joint.main]}{joint.name}:poly1"

@@ -1,4 +1,4 @@
-"""What an identification found: the geometric errors of every run, and what the plan cannot separate."""
+"""The result of an identification: the geometric errors of every run, and what the plan cannot separate."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from monitor.units import Unit
 
 @dataclass(frozen=True)
 class Refusal:
-    """Parameters that the plan cannot tell apart, and why; none of them gets a number."""
+    """Parameters that the plan cannot separate, and why; none of them gets a number."""
 
     parameters: tuple[str, ...]
     why: str
@@ -63,11 +63,11 @@ class Identification:
 
 @dataclass(frozen=True)
 class StepwiseCoefficient:
-    """A coefficient found step by step and at once, in internal units; ``unit`` is that for people.
+    """A coefficient identified step by step and at once, in internal units; ``unit`` is that for people.
 
     ``stepwise`` and ``at_once`` with their standard uncertainties; ``by_method`` is the part of the difference that
     remains without noise (the method's own), ``u_noise`` the standard uncertainty of the rest. ``at_once`` is NaN for
-    what that fit does not have or refused; ``why`` says what tells the two apart.
+    what that fit does not have or refused; ``why`` names the reason of the difference.
     """
 
     parameter: str

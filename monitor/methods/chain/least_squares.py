@@ -2,7 +2,7 @@
 
 The runs share only the common unknowns, so every Gauss-Newton step takes each run's own columns out first
 (QR, then a singular value decomposition of the small triangle) and solves for the common ones on what is
-left. What the data cannot separate is found by the rank, gets no step and no number, and is named.
+left. What the data cannot separate is detected by the rank, gets no step and no number, and is named.
 """
 
 from __future__ import annotations
@@ -94,24 +94,33 @@ def eliminate(local: Array) -> _Elimination:
 
 def project_out(basis: Array, columns: Array) -> Array:
     """What is left of columns (R, N, k) once the span of ``basis`` (R, N, p) is taken out."""
-    left: Array = columns - basis @ (np.swapaxes(basis, -1, -2) @ columns)
-    return left
+    remainder: Array = columns - basis @ (np.swapaxes(basis, -1, -2) @ columns)
+    return remainder
 
 
-def _common_step(left: Array, whole: Array, residual: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-    """Step, covariance and identifiability of the common unknowns."""
-    count = left.shape[-1]
+@dataclass(frozen=True)
+class _CommonStep:
+    """The step of the common unknowns (c,), their covariance (c, c), and which of them the data determine (c,)."""
+
+    step: Array
+    covariance: Array
+    free: npt.NDArray[np.bool_]
+
+
+def _common_step(remainder: Array, whole: Array, residual: Array) -> _CommonStep:
+    """The step of the common unknowns from what is left of their derivatives, ``whole`` before, and the residual."""
+    count = remainder.shape[-1]
     if count == 0:
-        return np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool)
+        return _CommonStep(np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool))
     scale = np.linalg.norm(whole.reshape(-1, count), axis=0)
     scale[scale == 0] = 1.0
-    matrix = left.reshape(-1, count) / scale
+    matrix = remainder.reshape(-1, count) / scale
     u, s, vt = np.linalg.svd(matrix, full_matrices=False)
     keep = s > COMMON_RANK_TOLERANCE
     inverse_s = np.where(keep, 1.0 / np.where(keep, s, 1.0), 0.0)
     inverse = (vt.T * inverse_s) / scale[:, None]
     free = np.abs(vt[~keep]).max(axis=0, initial=0.0) < MEMBER_SHARE
-    return -inverse @ (u.T @ residual.reshape(-1)), inverse @ inverse.T, free
+    return _CommonStep(-inverse @ (u.T @ residual.reshape(-1)), inverse @ inverse.T, free)
 
 
 def solve(
@@ -125,31 +134,31 @@ def solve(
     Raises DataError if it does not converge in ``most`` steps, which means readings that contradict the machine file
     (a wrong sign, a wrong axis or a ball confused with another).
     """
-    now = linearise(local, common)
-    cost = float(np.sum(now.residual**2))
-    space, spanned = eliminate(now.local), now.local
+    current = linearise(local, common)
+    cost = float(np.sum(current.residual**2))
+    space, spanned = eliminate(current.local), current.local
     before = np.inf
     for iteration in range(1, most + 1):
-        if now.local is not spanned:
-            space, spanned = eliminate(now.local), now.local
-        whole = np.concatenate([now.common, now.residual[..., None]], axis=-1)
-        left = project_out(space.basis, whole)
-        step_common, covariance, free = _common_step(left[..., :-1], now.common, left[..., -1])
-        moved = now.residual + now.common @ step_common
+        if current.local is not spanned:
+            space, spanned = eliminate(current.local), current.local
+        whole = np.concatenate([current.common, current.residual[..., None]], axis=-1)
+        remainder = project_out(space.basis, whole)
+        of_common = _common_step(remainder[..., :-1], current.common, remainder[..., -1])
+        moved = current.residual + current.common @ of_common.step
         in_basis = -np.einsum("rnp,rn->rp", space.basis, moved)
         step_local = np.einsum("rkp,rp->rk", space.inverse, in_basis)
-        size = float(np.sqrt(np.sum(in_basis**2) + np.sum((left[..., :-1] @ step_common) ** 2)))
+        size = float(np.sqrt(np.sum(in_basis**2) + np.sum((remainder[..., :-1] @ of_common.step) ** 2)))
         factor = 1.0
         for _ in range(MOST_HALVINGS):
-            trial = linearise(local + factor * step_local, common + factor * step_common)
+            trial = linearise(local + factor * step_local, common + factor * of_common.step)
             trial_cost = float(np.sum(trial.residual**2))
             if trial_cost <= cost or size < 1.0:
                 break
             factor /= 2.0
-        local, common = local + factor * step_local, common + factor * step_common
-        now, cost = trial, trial_cost
+        local, common = local + factor * step_local, common + factor * of_common.step
+        current, cost = trial, trial_cost
         if size < STEP_TOLERANCE * max(1.0, np.sqrt(cost)) or before / 2.0 < size < ROUNDING:
-            return _solution(local, common, now, space, covariance, free, iteration)
+            return _solution(local, common, current, space, of_common, iteration)
         before = size
     raise DataError(
         f"the identification did not converge in {most} steps: the readings contradict the machine file; "
@@ -160,26 +169,25 @@ def solve(
 def _solution(
     local: Array,
     common: Array,
-    now: Linearisation,
+    last: Linearisation,
     space: _Elimination,
-    covariance: Array,
-    free: npt.NDArray[np.bool_],
+    of_common: _CommonStep,
     iterations: int,
 ) -> Solution:
     # The last step was a hundred-thousandth of a standard deviation or less: the space before it is that after it.
-    own = space.inverse @ np.swapaxes(space.inverse, -1, -2)
-    reaction = space.inverse @ (np.swapaxes(space.basis, -1, -2) @ now.common)
-    own = own + reaction @ covariance @ np.swapaxes(reaction, -1, -2)
+    local_covariance = space.inverse @ np.swapaxes(space.inverse, -1, -2)
+    reaction = space.inverse @ (np.swapaxes(space.basis, -1, -2) @ last.common)
+    local_covariance = local_covariance + reaction @ of_common.covariance @ np.swapaxes(reaction, -1, -2)
     share = np.abs(space.null_space).max(axis=1)
     return Solution(
         local=local,
         common=common,
-        local_covariance=own,
-        common_covariance=covariance,
+        local_covariance=local_covariance,
+        common_covariance=of_common.covariance,
         local_free=share < MEMBER_SHARE,
-        common_free=free,
+        common_free=of_common.free,
         null_space=space.null_space,
         rank=space.rank,
         iterations=iterations,
-        last=now,
+        last=last,
     )

@@ -4,13 +4,13 @@ Something on the tool side is brought to, or seen from, something on the work si
 coefficients of the model's base effects and those of its own that the method adds (balls, stylus tip, frames,
 faces); those common to the campaign are the coefficients of the effects that were added. A method says where the two
 ends of the chain are (``ends``), how they depend on its own unknowns (``by_own``), which part of the vector between
-them a reading tells (``observe``), and which calibrated quantities it has besides (``extras``).
+them a reading measures (``observe``), and which calibrated quantities it has besides (``extras``).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -22,8 +22,8 @@ from monitor.effects import Basis, ChainEffect, Context, Effect
 from monitor.effects.catalogue import of_balls
 from monitor.exceptions import DataError
 from monitor.machine import MOTION, ChainPose, evaluate
+from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
-from monitor.methods.chain.searched import STARTS_S, Added, added_in, resolved
 from monitor.records import Array
 
 # A wrong sign of an axis fits the readings perfectly with a gain of -2 and mirrored targets. A turn of 0.1 rad or
@@ -60,24 +60,24 @@ class ChainProblem(ABC):
         """Where the search for the own unknowns begins (R, q)."""
 
     @abstractmethod
-    def ends(self, own: Array) -> tuple[Array, Array]:
+    def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """Points (n, 3) mm at the work end, in the frame of the last work axis, and (n, 3) mm at the tool end, in
         that of the last tool axis, for own unknowns (R, q). A fresh array each: effects shift the first in place."""
 
     @abstractmethod
-    def by_own(self, own: Array, seen: ChainPose) -> Array:
+    def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
         """Derivatives (n, 3, q) of the vector from the work end to the tool end by the own unknowns."""
 
     def observe(self, rows: Array) -> Array:
-        """What the readings tell (n, d, ...) of vectors or their derivatives (n, 3, ...): all three components."""
+        """The part (n, d, ...) that is measured of vectors or their derivatives (n, 3, ...): all three components."""
         return rows
 
     def as_vectors(self, rows: Array) -> Array:
-        """Residuals (n, d) as vectors (n, 3) mm in the frame of the last work axis: the shortest that tell the same."""
+        """Residuals (n, d) as the shortest vectors (n, 3) mm in the frame of the last work axis."""
         if self.components == ("x", "y", "z"):
             return rows
-        seen = self.observe(np.tile(np.eye(3), (len(self.context), 1, 1)))
-        return np.asarray(np.einsum("nik,nk->ni", np.linalg.pinv(seen), rows))
+        directions = self.observe(np.tile(np.eye(3), (len(self.context), 1, 1)))
+        return np.asarray(np.einsum("nik,nk->ni", np.linalg.pinv(directions), rows))
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -86,7 +86,7 @@ class ChainProblem(ABC):
 
     @property
     def measured_joints(self) -> tuple[int, ...]:
-        """Places of the joints whose readings are what is measured; the others stand where the plan says."""
+        """Indices of the joints whose readings are what is measured; the others stand where the plan says."""
         return ()
 
     def foreseen(self) -> Self:
@@ -103,7 +103,7 @@ class ChainProblem(ABC):
         return replace(self, context=self.context.expecting(stops(bare, solve_problem(bare))))
 
     def for_search(self) -> Self:
-        """The problem in which missing effects are looked for."""
+        """The problem in which missing effects are searched."""
         return self.foreseen()
 
     @property
@@ -111,9 +111,9 @@ class ChainProblem(ABC):
         """Names of the e calibrated quantities that every run has besides its rows."""
         return ()
 
-    def extras(self, own: Array) -> tuple[Array, Array]:
+    def extras(self, nuisance: Array) -> tuple[Array, Array]:
         """Whitened residuals (R, e) of the calibrated quantities and derivatives (R, e, q) by the own unknowns."""
-        return np.zeros((len(self.runs), 0)), np.zeros((len(self.runs), 0, own.shape[1]))
+        return np.zeros((len(self.runs), 0)), np.zeros((len(self.runs), 0, nuisance.shape[1]))
 
     @property
     def movable(self) -> tuple[str, ...]:
@@ -133,11 +133,6 @@ class ChainProblem(ABC):
     def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
         """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
         return of_balls(drivers)
-
-    @property
-    def gross_times(self) -> float:
-        """A residual of so many stated standard uncertainties is first of all a mistake of the file."""
-        return 100.0
 
     def contradiction(self, solution: Solution) -> str | None:
         """Why the readings cannot come from this chain, in words; None where they may."""
@@ -173,16 +168,26 @@ class ChainProblem(ABC):
 
     @cached_property
     def _row(self) -> npt.NDArray[np.int64]:
-        """Place of every probing within its run."""
-        places = np.empty(len(self.context), dtype=np.int64)
+        """Index of every probing within its run."""
+        indices = np.empty(len(self.context), dtype=np.int64)
         for run in range(len(self.runs)):
             rows = np.flatnonzero(self._run == run)
-            places[rows] = np.arange(len(rows))
-        return places
+            indices[rows] = np.arange(len(rows))
+        return indices
 
     @cached_property
-    def _own(self) -> tuple[Basis, ...]:
+    def _bases(self) -> tuple[Basis, ...]:
         return tuple(effect.basis(self.context) for effect in self.base)
+
+    @cached_property
+    def base_columns(self) -> tuple[slice, ...]:
+        """Where the coefficients of each base effect stand among the unknowns of a run."""
+        return columns_of(basis.size for basis in self._bases)
+
+    @cached_property
+    def common_columns(self) -> tuple[slice, ...]:
+        """Where the unknowns of each added effect stand among the common ones."""
+        return columns_of(added.unknowns for added in self.shared)
 
     @cached_property
     def shared(self) -> tuple[Added, ...]:
@@ -207,17 +212,30 @@ class ChainProblem(ABC):
     def common_from(self, time_constant_s: float) -> Array:
         """No effect at all (c,), with every searched time constant at the given one."""
         start = np.zeros(len(self.added_names))
-        place = 0
-        for added in self.shared:
-            place += added.unknowns
+        for added, columns in zip(self.shared, self.common_columns, strict=True):
             if added.searched:
-                start[place - 1] = np.log(time_constant_s)
+                start[columns.stop - 1] = np.log(time_constant_s)
         return start
 
     def resolved(self, common: Array) -> tuple[Self, Array]:
         """The problem with every searched time constant fixed at ``common`` (c,), and the coefficients alone."""
         effects, coefficients = resolved(self.shared, common)
         return replace(self, added=effects), coefficients
+
+    def observed_displacements(self, common: Array, by_error: Array) -> Iterator[Array]:
+        """What each added effect at (c,) adds to the residuals: (n, d) in mm, to first order in its coefficients."""
+        for added, columns in zip(self.shared, self.common_columns, strict=True):
+            unknowns = common[columns]
+            yield self.observe(added.basis(unknowns).displacement(by_error) @ unknowns[: added.size])
+
+    def observed_by_common(self, common: Array, by_error: Array) -> Array:
+        """Derivatives (n, d, c) of the residuals by the common unknowns."""
+        none = np.zeros((len(self.context), len(self.components), 0))
+        parts = [
+            self.observe(added.displacement(common[columns], by_error))
+            for added, columns in zip(self.shared, self.common_columns, strict=True)
+        ]
+        return np.concatenate([none, *parts], axis=-1)
 
     @cached_property
     def local_names(self) -> tuple[str, ...]:
@@ -237,23 +255,19 @@ class ChainProblem(ABC):
     def padded(self, rows: Array) -> Array:
         """Rows (n, d, ...) as runs (R, d m, ...), m the longest run; the rest is zero."""
         depth = int(self._row.max()) + 1
-        found = np.zeros((len(self.runs), depth, *rows.shape[1:]))
-        found[self._run, self._row] = rows
-        return found.reshape(len(self.runs), depth * rows.shape[1], *rows.shape[2:])
+        padded = np.zeros((len(self.runs), depth, *rows.shape[1:]))
+        padded[self._run, self._row] = rows
+        return padded.reshape(len(self.runs), depth * rows.shape[1], *rows.shape[2:])
 
     def state(self, local: Array, common: Array) -> tuple[Array, Array, Array]:
         """Errors (n, J, 2, 6), work ends (n, 3) and tool ends (n, 3) at (R, p) and (c,), in internal units."""
         errors = np.zeros((len(self.context), len(self.context.chain.joints), 2, 6))
         target, tip = self.ends(self.own_of(local))
-        place = 0
-        for basis in self._own:
-            basis.apply(local[self._run, place : place + basis.size], errors, target)
-            place += basis.size
-        place = 0
-        for added in self.shared:
-            unknowns = common[place : place + added.unknowns]
+        for basis, columns in zip(self._bases, self.base_columns, strict=True):
+            basis.apply(local[self._run, columns], errors, target)
+        for added, columns in zip(self.shared, self.common_columns, strict=True):
+            unknowns = common[columns]
             added.basis(unknowns).apply(unknowns[: added.size], errors, target)
-            place += added.unknowns
         return errors, target, tip
 
     def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
@@ -267,42 +281,40 @@ class ChainProblem(ABC):
 
     def linearise(self, local: Array, common: Array) -> Linearisation:
         """Whitened residuals and derivatives at (R, p) and (c,)."""
-        seen = self.evaluated(local, common, jacobian=True)
-        assert seen.by_error is not None
-        own = self.own_of(local)
+        pose = self.evaluated(local, common, jacobian=True)
+        assert pose.by_error is not None
+        nuisance = self.own_of(local)
         by_local = np.concatenate(
-            [*(basis.displacement(seen.by_error) for basis in self._own), self.by_own(own, seen)], axis=-1
+            [*(basis.displacement(pose.by_error) for basis in self._bases), self.by_own(nuisance, pose)],
+            axis=-1,
         )
-        by_common = np.zeros((len(self.context), seen.residual.shape[1], len(common)))
-        place = 0
-        for added in self.shared:
-            its = slice(place, place + added.unknowns)
-            place += added.unknowns
-            by_common[:, :, its] = added.displacement(common[its], seen.by_error)
-        extra, by_extra = self.extras(own)
+        by_common = np.zeros((len(self.context), pose.residual.shape[1], len(common)))
+        for added, columns in zip(self.shared, self.common_columns, strict=True):
+            by_common[:, :, columns] = added.displacement(common[columns], pose.by_error)
+        extra, by_extra = self.extras(nuisance)
         count = len(self.base_names)
         return Linearisation(
-            np.concatenate([self._white(seen.residual), extra], axis=1),
+            np.concatenate([self._white(pose.residual), extra], axis=1),
             np.concatenate([self._white(by_local), np.pad(by_extra, ((0, 0), (0, 0), (count, 0)))], axis=1),
             np.concatenate([self._white(by_common), np.zeros((*extra.shape, len(common)))], axis=1),
         )
 
     def _white(self, rows: Array) -> Array:
-        told = self.observe(rows)
-        return self.padded(told / self.sigma.reshape(self.sigma.shape + (1,) * (told.ndim - 2)))
+        observed = self.observe(rows)
+        return self.padded(observed / self.sigma.reshape(self.sigma.shape + (1,) * (observed.ndim - 2)))
 
 
 def stops(problem: ChainProblem, solution: Solution) -> Array:
     """Where the measured joints stop (n, J) under a solution: the readings less the shortest move that would do away
     with a row's residual."""
     chain, measured = problem.context.chain, list(problem.measured_joints)
-    seen = problem.evaluated(solution.local, solution.common, jacobian=True)
-    assert seen.by_error is not None
-    along = np.array([chain.joints[place].direction for place in measured])
-    moved = problem.observe(np.einsum("nrac,ac->nra", seen.by_error[:, :, measured, MOTION, :3], along))
-    places = problem.context.positions.copy()
-    places[:, measured] -= np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(seen.residual))
-    return places
+    pose = problem.evaluated(solution.local, solution.common, jacobian=True)
+    assert pose.by_error is not None
+    along = np.array([chain.joints[index].direction for index in measured])
+    moved = problem.observe(np.einsum("nrac,ac->nra", pose.by_error[:, :, measured, MOTION, :3], along))
+    positions = problem.context.positions.copy()
+    positions[:, measured] -= np.einsum("nad,nd->na", np.linalg.pinv(moved), problem.observe(pose.residual))
+    return positions
 
 
 #: What gives the solution of a problem: ``solve_problem``, or who has it already.
@@ -331,37 +343,35 @@ def solve_problem(
 
 
 def _from_several_starts(problem: ChainProblem, begin: Array) -> Solution:
-    found: list[Solution] = []
+    solutions: list[Solution] = []
     fault: DataError | None = None
     for start in STARTS_S:
         try:
-            found.append(solve(problem.linearise, begin, problem.common_from(start)))
+            solutions.append(solve(problem.linearise, begin, problem.common_from(start)))
         except DataError as error:
             fault = error
-    if not found:
+    if not solutions:
         assert fault is not None
         raise fault
-    return min(found, key=lambda one: float(np.sum(one.last.residual**2)))
+    return min(solutions, key=lambda solution: float(np.sum(solution.last.residual**2)))
 
 
 def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
     """DataError where a location angle or a gain comes out too large to be an error, or too much is left."""
-    place = 0
-    for effect in problem.base:
-        names = effect.parameters(problem.context)
+    for effect, columns in zip(problem.base, problem.base_columns, strict=True):
         if isinstance(effect, ChainEffect) and (
             effect.is_gain or (effect.term.is_rotation and effect.text == effect.term.symbol)
         ):
-            found = np.where(solution.local_free[:, place], solution.local[:, place], 0.0)
-            worst = int(np.abs(found).argmax())
-            if abs(found[worst]) > problem.largest_error:
-                what = "mm/mm" if effect.is_gain else "rad"
+            free, values = solution.local_free[:, columns.start], solution.local[:, columns.start]
+            errors = np.where(free, values, 0.0)
+            worst = int(np.abs(errors).argmax())
+            if abs(errors[worst]) > problem.largest_error:
+                unit = "mm/mm" if effect.is_gain else "rad"
                 raise DataError(
-                    f"run {problem.runs[worst]}: {names[0]} comes out at {found[worst]:.3g} {what}, which is no error "
-                    "of a machine: the readings contradict the machine file; check the axis signs, the topology, the "
-                    "units, the columns and the order of the targets"
+                    f"run {problem.runs[worst]}: {problem.base_names[columns.start]} comes out at {errors[worst]:.3g} "
+                    f"{unit}, which is no error of a machine: the readings contradict the machine file; check the axis "
+                    "signs, the topology, the units, the columns and the order of the targets"
                 )
-        place += len(names)
     wrong = problem.contradiction(solution)
     if wrong is not None:
         raise DataError(f"the readings contradict the machine file: {wrong}")

@@ -1,4 +1,4 @@
-"""What a solved problem reports: the numbers of every run, and what the plan cannot tell apart."""
+"""The results of a solved problem: the numbers of every run, and what the plan cannot separate."""
 
 from __future__ import annotations
 
@@ -27,45 +27,45 @@ def _groups(null_space: Array, names: tuple[str, ...]) -> list[tuple[str, ...]]:
     member = np.abs(null_space).max(axis=0) >= MEMBER_SHARE
     size = np.sqrt(np.maximum(np.diag(projector), np.finfo(float).tiny))
     linked = (np.abs(projector) > MEMBER_SHARE * np.outer(size, size)) & np.outer(member, member)
-    left = [int(place) for place in np.flatnonzero(member)]
+    remaining = [int(column) for column in np.flatnonzero(member)]
     groups = []
-    while left:
-        group, front = {left[0]}, [left[0]]
+    while remaining:
+        group, front = {remaining[0]}, [remaining[0]]
         while front:
-            place = front.pop()
-            for other in np.flatnonzero(linked[place]):
+            column = front.pop()
+            for other in np.flatnonzero(linked[column]):
                 if int(other) not in group:
                     group.add(int(other))
                     front.append(int(other))
-        left = [place for place in left if place not in group]
-        groups.append(tuple(names[place] for place in sorted(group)))
+        remaining = [column for column in remaining if column not in group]
+        groups.append(tuple(names[column] for column in sorted(group)))
     return groups
 
 
-def _told(names: Sequence[str]) -> str:
+def _listed(names: Sequence[str]) -> str:
     """Names in words; those of many places of one thing, ``EYX(-88)``, as one."""
     heads = [name.partition("(")[0] if name.endswith(")") else name for name in names]
-    words = []
+    parts = []
     for head in dict.fromkeys(heads):
-        its = [name for name, own in zip(names, heads, strict=True) if own == head]
-        words += its if len(its) <= MOST_PLACES else [f"{head} at {len(its)} places"]
-    return " and ".join(words)
+        its = [name for name, name_head in zip(names, heads, strict=True) if name_head == head]
+        parts += its if len(its) <= MOST_PLACES else [f"{head} at {len(its)} places"]
+    return " and ".join(parts)
 
 
 def refusals(problem: ChainProblem, null_space: Array, run: int, advice: Advice) -> tuple[Refusal, ...]:
     """What one run cannot separate, by its null space, the reported parameters first, and why."""
     reported = problem.base_names
-    found = []
+    refused = []
     for group in _groups(null_space, problem.local_names):
         inside = tuple(name for name in group if name in reported)
         if not inside:
             continue
         others = [name for name in group if name not in inside]
-        with_what = f"{_told(inside)} cannot be told apart" if len(inside) > 1 else inside[0]
+        with_what = f"{_listed(inside)} cannot be told apart" if len(inside) > 1 else inside[0]
         if others:
             with_what += f"{' from' if len(inside) > 1 else ' cannot be told apart from'} {', '.join(others)}"
-        found.append(Refusal(inside, f"with this plan {with_what}{advice(problem, inside, run)}"))
-    return tuple(found)
+        refused.append(Refusal(inside, f"with this plan {with_what}{advice(problem, inside, run)}"))
+    return tuple(refused)
 
 
 def identification(
@@ -76,25 +76,25 @@ def identification(
     vectors = problem.vectors(solution.local, solution.common)
     spatial = problem.as_vectors(vectors)
     runs = []
-    for place, run in enumerate(problem.runs):
-        own = problem.context.run == run
-        residuals = vectors[own]
-        free = solution.local_free[place, :count]
+    for index, run in enumerate(problem.runs):
+        rows = problem.context.run == run
+        residuals = vectors[rows]
+        free = solution.local_free[index, :count]
         both = free[:, None] & free
-        weighted = solution.last.residual[place]
+        weighted = solution.last.residual[index]
         runs.append(
             RunIdentification(
                 run=int(run),
-                estimate=np.where(free, solution.local[place, :count], np.nan),
-                covariance=np.where(both, solution.local_covariance[place, :count, :count], np.nan),
+                estimate=np.where(free, solution.local[index, :count], np.nan),
+                covariance=np.where(both, solution.local_covariance[index, :count, :count], np.nan),
                 unknowns=dict(
-                    zip(problem.local_names[count:], map(float, solution.local[place, count:]), strict=True)
+                    zip(problem.local_names[count:], map(float, solution.local[index, count:]), strict=True)
                 ),
-                refused=refusals(problem, solution.null_space[place], int(run), advice),
-                residuals=spatial[own],
+                refused=refusals(problem, solution.null_space[index], int(run), advice),
+                residuals=spatial[rows],
                 rms=float(np.sqrt(np.mean(residuals**2))),
                 chi_square=float(weighted @ weighted),
-                degrees_of_freedom=residuals.size + len(problem.extra_names) - int(solution.rank[place]),
+                degrees_of_freedom=residuals.size + len(problem.extra_names) - int(solution.rank[index]),
             )
         )
     shared = shared_parameters(problem, solution)

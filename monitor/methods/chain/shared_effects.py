@@ -52,10 +52,8 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
     why: list[str] = ["" if free else UNSEEN for free in solution.common_free]
     by_error = problem.evaluated(solution.local, solution.common, jacobian=True).by_error
     assert by_error is not None
-    place = 0
-    for added in problem.shared:
-        own = slice(place, place + added.unknowns)
-        basis = added.basis(solution.common[own])
+    for added, columns in zip(problem.shared, problem.common_columns, strict=True):
+        basis = added.basis(solution.common[columns])
         moved = problem.observe(basis.displacement(by_error))
         limit = largest_coefficient(
             added.effect,
@@ -63,28 +61,27 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
             float(np.linalg.norm(moved, axis=1).max(initial=0.0)),
             problem.largest_effect,
         )
-        for one in range(place, place + added.size):
+        for column in range(columns.start, columns.start + added.size):
             units.append(added.effect.unit)
-            u = float(np.sqrt(covariance[one, one]))
-            if not why[one] and u > limit:
-                why[one] = (
+            u = float(np.sqrt(covariance[column, column]))
+            if not why[column] and u > limit:
+                why[column] = (
                     f"this plan sees so little of it that its standard uncertainty, "
                     f"{added.effect.unit.to_display(u):.2g} {added.effect.unit.name}, exceeds what a machine may have"
                 )
         if added.searched:
-            last = place + added.size
+            last = columns.stop - 1
             units.append(MINUTE)
             tau = float(np.exp(estimate[last]))
             estimate[last] = tau
             covariance[last, :] *= tau
             covariance[:, last] *= tau
-        place += added.unknowns
-    kept = np.array([not reason for reason in why], dtype=bool)
+    determined = np.array([not reason for reason in why], dtype=bool)
     return SharedParameters(
         names=problem.added_names,
         units=tuple(units),
-        estimate=np.where(kept, estimate, np.nan),
-        covariance=np.where(kept[:, None] & kept, covariance, np.nan),
+        estimate=np.where(determined, estimate, np.nan),
+        covariance=np.where(determined[:, None] & determined, covariance, np.nan),
         refused=tuple(
             Refusal((name,), reason) for name, reason in zip(problem.added_names, why, strict=True) if reason
         ),

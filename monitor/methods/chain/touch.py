@@ -30,7 +30,7 @@ class Distance:
 
 @dataclass(frozen=True)
 class TouchProblem(ChainProblem):
-    """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is told.
+    """Probings of balls. ``tip`` (3,) mm is the start for the stylus tip; every coordinate of a vector is measured.
 
     ``beside`` (n, 3) mm is what the readings differ by where the chain stands at expected places.
     """
@@ -59,14 +59,14 @@ class TouchProblem(ChainProblem):
 
     @property
     def measured_joints(self) -> tuple[int, ...]:
-        """The linear axes: their readings say where the tip met the ball."""
-        return tuple(place for place, joint in enumerate(self.context.chain.joints) if not joint.turns)
+        """The linear axes: their readings are where the tip met the ball."""
+        return tuple(index for index, joint in enumerate(self.context.chain.joints) if not joint.turns)
 
     def foreseen(self) -> TouchProblem:
         """As read, unless an axis stands still while a ball is probed at all its poses.
 
         Where balls move every axis by millimetres from touch to touch, the reading is as good as the expected place. An
-        axis that stands still (along a single rotary axis) tells little but its noise, and leaves gains to what moves
+        axis that stands still (along a single rotary axis) measures its noise, and leaves gains to what moves
         the others least: the chain is then taken where it is expected to stop, what the readings differ by beside it.
         """
         if self.context.expected is not None or not self._stands_still:
@@ -82,8 +82,8 @@ class TouchProblem(ChainProblem):
 
     def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """The chain where it stands, and what the readings differ by."""
-        seen = super().evaluated(local, common, jacobian=jacobian)
-        return seen if self.beside is None else replace(seen, residual=seen.residual + self.beside)
+        pose = super().evaluated(local, common, jacobian=jacobian)
+        return pose if self.beside is None else replace(pose, residual=pose.residual + self.beside)
 
     @property
     def _stands_still(self) -> bool:
@@ -92,37 +92,37 @@ class TouchProblem(ChainProblem):
         first = np.searchsorted(self._target[order], np.arange(len(self.targets)))
         read = self.context.positions[order]
         moved = (np.maximum.reduceat(read, first) - np.minimum.reduceat(read, first)).max(axis=0)
-        return any(moved[place] < STILL for place in self.measured_joints)
+        return any(moved[index] < STILL for index in self.measured_joints)
 
     @property
     def extra_names(self) -> tuple[str, ...]:
         """The calibrated distances."""
         return tuple("-".join(distance.between) for distance in self.distances)
 
-    def ends(self, own: Array) -> tuple[Array, Array]:
+    def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """The ball of every probing and the tip."""
-        balls = own[:, :-3].reshape(len(self.runs), len(self.targets), 3)
-        return balls[self._run, self._target], own[self._run, -3:]
+        balls = nuisance[:, :-3].reshape(len(self.runs), len(self.targets), 3)
+        return balls[self._run, self._target], nuisance[self._run, -3:]
 
-    def by_own(self, own: Array, seen: ChainPose) -> Array:
+    def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
         """Derivatives (n, 3, q) by balls and tip."""
-        found = np.zeros((len(self.context), 3, own.shape[1]))
+        derivatives = np.zeros((len(self.context), 3, nuisance.shape[1]))
         for axis in range(3):
-            found[np.arange(len(self.context)), axis, 3 * self._target + axis] = -1.0
-        found[:, :, -3:] = seen.by_tip
-        return found
+            derivatives[np.arange(len(self.context)), axis, 3 * self._target + axis] = -1.0
+        derivatives[:, :, -3:] = pose.by_tip
+        return derivatives
 
-    def extras(self, own: Array) -> tuple[Array, Array]:
+    def extras(self, nuisance: Array) -> tuple[Array, Array]:
         """Length of every calibrated distance less the calibrated one."""
-        balls = own[:, :-3].reshape(len(self.runs), len(self.targets), 3)
+        balls = nuisance[:, :-3].reshape(len(self.runs), len(self.targets), 3)
         residual = np.zeros((len(self.runs), len(self.distances)))
-        by_own = np.zeros((len(self.runs), len(self.distances), own.shape[1]))
-        for place, distance in enumerate(self.distances):
+        by_own = np.zeros((len(self.runs), len(self.distances), nuisance.shape[1]))
+        for index, distance in enumerate(self.distances):
             first, second = (self.targets.index(name) for name in distance.between)
             between = balls[:, first] - balls[:, second]
             length = np.linalg.norm(between, axis=-1)
-            residual[:, place] = (length - distance.length) / distance.standard_uncertainty
+            residual[:, index] = (length - distance.length) / distance.standard_uncertainty
             slope = between / length[:, None] / distance.standard_uncertainty
-            by_own[:, place, 3 * first : 3 * first + 3] = slope
-            by_own[:, place, 3 * second : 3 * second + 3] = -slope
+            by_own[:, index, 3 * first : 3 * first + 3] = slope
+            by_own[:, index, 3 * second : 3 * second + 3] = -slope
         return residual, by_own

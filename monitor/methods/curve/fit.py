@@ -1,6 +1,6 @@
 """The least-squares fit of a curve: one response over its inputs, a base model in one line, and added effects.
 
-Everything linear is solved for exactly at every step; periods, constants and places that are to be found from the
+Everything linear is solved for exactly at every step; periods, constants and places that are to be estimated from the
 data are refined by Gauss-Newton on all unknowns together (variable projection gives the start: Golub and
 Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). Where neighbouring rows resemble each other the standard
 uncertainties allow for it; the estimates stay those of ordinary least squares.
@@ -8,6 +8,7 @@ uncertainties allow for it; the estimates stay those of ordinary least squares.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,7 +68,7 @@ class CurveFit:
 
     @property
     def exact(self) -> bool:
-        """Whether what is left is the rounding of numbers and no noise that says anything."""
+        """Whether the residual is the rounding of numbers rather than noise."""
         return self.rms < EXACT * float(np.ptp(self.problem.curve.measured[~self.problem.left_out]))
 
     @property
@@ -82,52 +83,68 @@ def fit(problem: CurveProblem) -> CurveFit:
 
     Raises DataError where there are no more rows than unknowns, EffectError where a value cannot be searched.
     """
-    kept = ~problem.left_out
+    weighted = ~problem.left_out
     y = problem.curve.measured
-    effects = list(problem.effects)
-    for place, effect in enumerate(effects):
-        if effect.free and effect.value is None:
-            effects[place] = searched(problem, effects, place)
-    for place, effect in enumerate(effects):
-        if effect.free and effect.shape == "step":
-            effects[place] = searched(problem, effects, place)
-    free = [place for place, effect in enumerate(effects) if effect.free and effect.shape != "step"]
+    effects = _started(problem)
+    free = [index for index, effect in enumerate(effects) if effect.free and effect.shape != "step"]
     iterations = 1
     if free:
         effects, iterations = refined(problem, effects, free)
     names, units, columns = problem.columns(effects)
-    estimate, rank, null = solve(columns[kept], y[kept])
-    slopes = [slope(problem, names, estimate, effects[place]) for place in free]
+    estimate, rank, null = solve(columns[weighted], y[weighted])
+    slopes = [slope(problem, names, estimate, effects[index]) for index in free]
     design = np.column_stack([columns, *slopes]) if slopes else columns
-    freedom = int(kept.sum()) - rank - sum(effect.free for effect in effects)
+    freedom = int(weighted.sum()) - rank - sum(effect.free for effect in effects)
     if freedom < 1:
         raise DataError(
-            f"campaign {problem.curve.name} has {int(kept.sum())} rows for {len(names) + len(free)} unknowns; "
+            f"campaign {problem.curve.name} has {int(weighted.sum())} rows for {len(names) + len(free)} unknowns; "
             "measure more, or leave an effect out"
         )
     residual = y - columns @ estimate
-    variance = float(np.sum(residual[kept] ** 2)) / freedom
-    inverse = inverse_normal(design[kept])
-    covariance = variance * inverse
-    u_values = []
-    for effect in effects:
-        if effect.free and effect.shape != "step":
-            place = len(names) + free.index(effects.index(effect))
-            u_values.append(float(np.sqrt(covariance[place, place])) * float(effect.value or 0.0) ** 2)
-        else:
-            u_values.append(float("nan"))
+    variance = float(np.sum(residual[weighted] ** 2)) / freedom
+    covariance = variance * inverse_normal(design[weighted])
     member = np.abs(null).max(axis=0, initial=0.0) > MEMBER_SHARE
-    refused: tuple[Refusal, ...] = ()
-    if member.any():
-        group = tuple(name for name, one in zip(names, member, strict=True) if one)
-        refused = (
-            Refusal(
-                group, f"with these rows {' and '.join(group)} cannot be told apart; vary them separately"
-            ),
-        )
     size = len(names)
     return CurveFit(
-        problem, names, units, np.where(member, np.nan, estimate),
-        np.where(member[:, None] | member, np.nan, covariance[:size, :size]),
-        tuple(effects), tuple(u_values), design, residual, rank, freedom, refused, iterations,
-    )  # fmt: skip
+        problem=problem,
+        names=names,
+        units=units,
+        estimate=np.where(member, np.nan, estimate),
+        covariance=np.where(member[:, None] | member, np.nan, covariance[:size, :size]),
+        effects=tuple(effects),
+        u_values=_u_values(effects, free, np.sqrt(np.diag(covariance)[size:])),
+        design=design,
+        residual=residual,
+        rank=rank,
+        degrees_of_freedom=freedom,
+        refused=_refused([name for name, inside in zip(names, member, strict=True) if inside]),
+        iterations=iterations,
+    )
+
+
+def _started(problem: CurveProblem) -> list[CurveEffect]:
+    """The effects with every searched value at its best of the grid, steps last, beside all others."""
+    effects = list(problem.effects)
+    for index, effect in enumerate(effects):
+        if effect.free and effect.value is None:
+            effects[index] = searched(problem, effects, index)
+    for index, effect in enumerate(effects):
+        if effect.free and effect.shape == "step":
+            effects[index] = searched(problem, effects, index)
+    return effects
+
+
+def _u_values(effects: Sequence[CurveEffect], free: Sequence[int], u_rates: Array) -> tuple[float, ...]:
+    """Standard uncertainties of the searched values from those of their inverses, NaN where nothing was refined."""
+    u_of = dict(zip(free, u_rates, strict=True))
+    return tuple(
+        float(u_of[index]) * float(effect.value or 0.0) ** 2 if index in u_of else float("nan")
+        for index, effect in enumerate(effects)
+    )
+
+
+def _refused(names: Sequence[str]) -> tuple[Refusal, ...]:
+    if not names:
+        return ()
+    group = " and ".join(names)
+    return (Refusal(tuple(names), f"with these rows {group} cannot be told apart; vary them separately"),)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import NAME, problem_of
-from monitor.methods.method import CurveMethod, Words
+from monitor.methods.method import CurveMethod, Nouns
 
 METHOD = CurveMethod(
     name=NAME,
     title="curve",
     description="one response over its inputs: no machine at all",
-    words=Words(target="row", row="row", tool_point="response"),
+    nouns=Nouns(target="row", row="row", tool_point="response"),
     problem_of=problem_of,
     fit=fit,
 )

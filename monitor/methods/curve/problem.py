@@ -55,10 +55,10 @@ class CurveProblem:
     @cached_property
     def order(self) -> npt.NDArray[np.int64]:
         """The rows that have weight, in the order in which they were measured."""
-        kept = np.flatnonzero(~self.left_out)
+        weighted = np.flatnonzero(~self.left_out)
         if self.curve.time is None:
-            return kept
-        return kept[np.argsort(self.inputs.numbers[self.curve.time][kept], kind="stable")]
+            return weighted
+        return weighted[np.argsort(self.inputs.numbers[self.curve.time][weighted], kind="stable")]
 
     def with_effects(self, effects: Sequence[CurveEffect]) -> CurveProblem:
         """The problem with further effects."""
@@ -71,11 +71,11 @@ class CurveProblem:
         if self.constant:
             names, units, columns = [CONSTANT], [unit or "1"], [np.ones((len(self.curve), 1))]
         for effect in _with_lower_powers(effects):
-            own = coefficient_names(effect, self.inputs)
-            if own[0] in names:
+            coefficients = coefficient_names(effect, self.inputs)
+            if coefficients[0] in names:
                 continue
-            names += own
-            units += [coefficient_unit(effect, self.inputs, unit)] * len(own)
+            names += coefficients
+            units += [coefficient_unit(effect, self.inputs, unit)] * len(coefficients)
             columns.append(curve_columns(effect, self.inputs))
         stacked = np.concatenate(columns, axis=1) if columns else np.zeros((len(self.curve), 0))
         return tuple(names), tuple(units), stacked
@@ -93,11 +93,11 @@ def problem_of(campaign: CurveCampaign, model: Model = DEFAULT_MODEL) -> CurvePr
     inputs = inputs_of(campaign)
     constant, base = parse_base(campaign.base, campaign.response, inputs)
     added = tuple(parse_curve_effect(text, inputs) for text in model.added)
-    known = [effect.text for effect in base]
+    texts = [effect.text for effect in base]
     for effect in added:
-        if effect.text in known:
+        if effect.text in texts:
             raise EffectError(f"model {model.name} has {effect.text} already; name an effect once")
-        known.append(effect.text)
+        texts.append(effect.text)
     return CurveProblem(campaign, inputs, constant, base, added, np.zeros(len(campaign), dtype=bool))
 
 

@@ -30,12 +30,12 @@ def solve(columns: Array, y: Array) -> tuple[Array, int, Array]:
     # QR keeps more digits than the normal equations, and so does a second step on what is left.
     if rank == columns.shape[1]:
         q, r = linalg.qr(columns / scale, mode="economic")
-        found = linalg.solve_triangular(r, q.T @ y)
-        found = found + linalg.solve_triangular(r, q.T @ (y - (columns / scale) @ found))
-        return np.asarray(found / scale), rank, np.zeros((0, columns.shape[1]))
-    found = vectors[:rank].T @ ((u[:, :rank].T @ y) / values[:rank])
+        scaled = linalg.solve_triangular(r, q.T @ y)
+        scaled = scaled + linalg.solve_triangular(r, q.T @ (y - (columns / scale) @ scaled))
+        return np.asarray(scaled / scale), rank, np.zeros((0, columns.shape[1]))
+    scaled = vectors[:rank].T @ ((u[:, :rank].T @ y) / values[:rank])
     full = linalg.svd(columns / scale, full_matrices=True)[2]
-    return np.asarray(found / scale), rank, np.asarray(full[rank:])
+    return np.asarray(scaled / scale), rank, np.asarray(full[rank:])
 
 
 def inverse_normal(columns: Array) -> Array:
@@ -48,8 +48,8 @@ def inverse_normal(columns: Array) -> Array:
 
 def slope(problem: CurveProblem, names: Sequence[str], estimate: Array, effect: CurveEffect) -> Array:
     """How the model (n,) moves with the inverse of an effect's searched value (a frequency or a rate)."""
-    own = coefficient_names(effect, problem.inputs)
-    size = estimate[[names.index(name) for name in own]]
+    coefficients = coefficient_names(effect, problem.inputs)
+    size = estimate[[names.index(name) for name in coefficients]]
     x = problem.inputs.numbers[effect.column]
     columns = curve_columns(effect, problem.inputs)
     if effect.shape == "sin":
@@ -64,40 +64,40 @@ def refined(
     problem: CurveProblem, effects: Sequence[CurveEffect], free: Sequence[int]
 ) -> tuple[list[CurveEffect], int]:
     """Effects with all searched values at the least-squares point, by Gauss-Newton with halved steps."""
-    kept, y, now = ~problem.left_out, problem.curve.measured, list(effects)
+    weighted, y, current = ~problem.left_out, problem.curve.measured, list(effects)
 
     def state(at: Sequence[CurveEffect]) -> tuple[tuple[str, ...], Array, Array, Array]:
         names, _, columns = problem.columns(at)
-        estimate, _, _ = solve(columns[kept], y[kept])
-        return names, columns, estimate, (y - columns @ estimate)[kept]
+        estimate, _, _ = solve(columns[weighted], y[weighted])
+        return names, columns, estimate, (y - columns @ estimate)[weighted]
 
-    low, high = np.array([_bounds(problem, now[place]) for place in free]).T
-    names, columns, estimate, left = state(now)
+    low, high = np.array([_bounds(problem, current[index]) for index in free]).T
+    names, columns, estimate, residual = state(current)
     for iteration in range(1, MOST_ITERATIONS + 1):
-        slopes = np.column_stack([slope(problem, names, estimate, now[place]) for place in free])
-        both = np.column_stack([columns, slopes])[kept]
-        step = solve(both, left)[0][columns.shape[1] :]
-        rates = np.array([1.0 / float(now[place].value or 1.0) for place in free])
+        slopes = np.column_stack([slope(problem, names, estimate, current[index]) for index in free])
+        both = np.column_stack([columns, slopes])[weighted]
+        step = solve(both, residual)[0][columns.shape[1] :]
+        rates = np.array([1.0 / float(current[index].value or 1.0) for index in free])
         for halving in range(30):
-            trial = list(now)
+            trial = list(current)
             moved = np.clip(rates + step / 2.0**halving, low, high)
-            for place, rate in zip(free, moved, strict=True):
-                trial[place] = now[place].at(1.0 / float(rate))
+            for index, rate in zip(free, moved, strict=True):
+                trial[index] = current[index].at(1.0 / float(rate))
             then = state(trial)
-            if then[3] @ then[3] <= left @ left:
+            if then[3] @ then[3] <= residual @ residual:
                 break
         else:
-            return now, iteration
+            return current, iteration
         change = float(np.max(np.abs(moved / rates - 1.0)))
-        now, (names, columns, estimate, left) = trial, then
+        current, (names, columns, estimate, residual) = trial, then
         if change < CONVERGED:
-            return now, iteration
-    return now, MOST_ITERATIONS
+            return current, iteration
+    return current, MOST_ITERATIONS
 
 
 def _bounds(problem: CurveProblem, effect: CurveEffect) -> tuple[float, float]:
     """How far the frequency or rate of a searched value may go from where it begins: half of what two periods have to
-    differ by to be told apart, so that they do not run into each other; a factor of ten or a hundred for a constant."""
+    differ by to be separated, so that they do not run into each other; a factor of ten or a hundred for a constant."""
     rate = 1.0 / float(effect.value or 1.0)
     if effect.shape == "sin":
         # A cycle longer than the range is a bend, not a cycle.
@@ -106,9 +106,9 @@ def _bounds(problem: CurveProblem, effect: CurveEffect) -> tuple[float, float]:
     return min(rate / 100.0, rate * 10.0), max(rate / 100.0, rate * 10.0)
 
 
-def searched(problem: CurveProblem, effects: Sequence[CurveEffect], place: int) -> CurveEffect:
+def searched(problem: CurveProblem, effects: Sequence[CurveEffect], index: int) -> CurveEffect:
     """The effect with the value of the grid that leaves least, the other effects fitted along."""
-    effect = effects[place]
+    effect = effects[index]
     values = grid(effect, problem.inputs)
     if effect.shape == "step" and effect.value is not None:
         values = np.append(values, effect.value)
@@ -117,17 +117,21 @@ def searched(problem: CurveProblem, effects: Sequence[CurveEffect], place: int) 
             f"'{effect.text}': the {SEARCHED[effect.shape]} cannot be searched, {effect.column} takes too few "
             f"values; write it, such as {effect.column}:{effect.shape}12"
         )
-    kept, y = ~problem.left_out, problem.curve.measured
-    others = [one for other, one in enumerate(effects) if other != place and (one.value or not one.free)]
+    weighted, y = ~problem.left_out, problem.curve.measured
+    others = [
+        rival
+        for position, rival in enumerate(effects)
+        if position != index and (rival.value or not rival.free)
+    ]
     _, _, nuisance = problem.columns(others)
-    basis = linalg.orth(nuisance[kept] / np.maximum(np.linalg.norm(nuisance[kept], axis=0), 1e-300))
-    left = y[kept] - basis @ (basis.T @ y[kept])
+    basis = linalg.orth(nuisance[weighted] / np.maximum(np.linalg.norm(nuisance[weighted], axis=0), 1e-300))
+    residual = y[weighted] - basis @ (basis.T @ y[weighted])
     best, least = effect.at(float(values[0])), np.inf
     for value in values:
-        columns = curve_columns(effect, problem.inputs, float(value))[kept]
+        columns = curve_columns(effect, problem.inputs, float(value))[weighted]
         columns = columns - basis @ (basis.T @ columns)
-        found = np.linalg.lstsq(columns, left, rcond=1e-10)[0]
-        rest = float(np.sum((left - columns @ found) ** 2))
+        coefficients = np.linalg.lstsq(columns, residual, rcond=1e-10)[0]
+        rest = float(np.sum((residual - columns @ coefficients) ** 2))
         if rest < least:
             best, least = effect.at(float(value)), rest
     return best

@@ -103,9 +103,9 @@ def _direction(joint: Joint) -> int:
     return joint.main
 
 
-def at(symbol: str, place: float) -> str:
+def at(symbol: str, position: float) -> str:
     """The name of an error at a place: ``EXX(-88)``."""
-    return f"{symbol}({place:.9g})"
+    return f"{symbol}({position:.9g})"
 
 
 def all_conditions(plane: Plane, nodes: dict[str, tuple[float, ...]], first_angle: float) -> dict[str, str]:
@@ -115,7 +115,7 @@ def all_conditions(plane: Plane, nodes: dict[str, tuple[float, ...]], first_angl
     """
     u, v, table = plane.u.name, plane.v.name, plane.table.name
     first, second = plane.letter(plane.u), plane.letter(plane.v)
-    words = {
+    meaning = {
         plane.term(plane.u, plane.u): f"where {u} counts its positioning error from",
         plane.term(plane.v, plane.u): f"the origin in {second} along {u}",
         plane.term(plane.u, plane.v): f"the origin in {first} along {v}",
@@ -124,11 +124,12 @@ def all_conditions(plane: Plane, nodes: dict[str, tuple[float, ...]], first_angl
             None, plane.carrier
         ): f"the direction that {plane.carried.name} has where {plane.carrier.name} stands at its origin",
     }
-    found = {
-        at(symbol, min(nodes[axis.name], key=abs)): words[symbol] for symbol, axis in plane.axis_terms.items()
+    conditions = {
+        at(symbol, min(nodes[axis.name], key=abs)): meaning[symbol]
+        for symbol, axis in plane.axis_terms.items()
     }
     shift_u, shift_v, turn = plane.table_terms
-    found |= {
+    conditions |= {
         at(shift_u, first_angle): f"the origin in {first}: the axis of {table} at its first angle",
         at(shift_v, first_angle): f"the origin in {second}: the axis of {table} at its first angle",
         at(turn, first_angle): f"the angle of the workpiece on {table} at its first angle",
@@ -142,7 +143,7 @@ def all_conditions(plane: Plane, nodes: dict[str, tuple[float, ...]], first_angl
             plane.term(plane.u, plane.u), nodes[u][-1]
         ): "the unit of length, which must be measured by other means",
     }
-    return found
+    return conditions
 
 
 def base_texts(
@@ -150,8 +151,8 @@ def base_texts(
 ) -> tuple[str, ...]:
     """The effects that are free in every run, with the nodes of ``held`` parameters fixed at zero."""
 
-    def table(symbol: str, places: Sequence[float]) -> str:
-        return f"{symbol}:{nodes_text(places, [place for place in places if at(symbol, place) in held])}"
+    def table(symbol: str, positions: Sequence[float]) -> str:
+        return f"{symbol}:{nodes_text(positions, [position for position in positions if at(symbol, position) in held])}"
 
     return (
         *(table(symbol, calibration.nodes[axis.name]) for symbol, axis in plane.axis_terms.items()),

@@ -1,4 +1,4 @@
-"""Free-form self-calibration: the shape of a workpiece and the errors of the axes that probe it, found together.
+"""Free-form self-calibration: the shape of a workpiece and the errors of the axes that probe it, identified together.
 
 The same points are probed with the rotary table at several angles. The errors of two linear axes are tables over
 their travel, those of the rotary table one set an angle, the shape one number a point along the surface's normal;
@@ -21,7 +21,7 @@ from monitor.methods.free_form.axes import plane_of
 from monitor.methods.free_form.plan import candidates_of
 from monitor.methods.free_form.problem import FreeFormProblem
 from monitor.methods.free_form.rank import nullity, reason_of
-from monitor.methods.method import AnglePlan, ChainMethod, Words
+from monitor.methods.method import AnglePlan, ChainMethod, Nouns
 from monitor.records import Campaign
 from monitor.units import DEGREE
 
@@ -55,7 +55,7 @@ def refuse(campaign: Campaign, problem: ChainProblem) -> None:
 def _refuse_too_little(problem: FreeFormProblem) -> None:
     """DataError where a run's angles or readings are too few, by the count of Eq. (6) and by the null space."""
     table = problem.context.chain.index(problem.plane.table.name)
-    for place, run in enumerate(problem.runs):
+    for index, run in enumerate(problem.runs):
         rows = problem.context.run == run
         degrees = np.unique(np.round(problem.context.positions[rows, table] / DEGREE.factor, 6))
         points = len(np.unique(problem.context.target[rows]))
@@ -68,19 +68,19 @@ def _refuse_too_little(problem: FreeFormProblem) -> None:
                 f"{unknowns} unknowns (Eq. 6); probe at more angles, or choose fewer nodes"
             )
         if len(degrees) < FEWEST_ANGLES:
-            left = nullity(problem, place)
+            unseen = nullity(problem, index)
             conditions = len(problem.held) + len(problem.on_shape) + 1
-            found = (
-                f"the null space has {left + conditions} dimensions, {left} more than the {conditions} boundary "
+            finding = (
+                f"the null space has {unseen + conditions} dimensions, {unseen} more than the {conditions} boundary "
                 "conditions fix: errors of the two linear axes that the turn maps onto each other hide in the shape"
-                if left
+                if unseen
                 else "no combination of unknowns is quite unseen, but each point has only two readings, of which its "
                 "own shape takes one: the corners of the tables alone separate shape and axes, and a single bad touch "
                 "cannot be told"
             )
             raise DataError(
                 f"run {run} probed at {len(degrees)} angles of {name}: {readings} readings for {unknowns} unknowns "
-                f"satisfy the count of Eq. 6, which is necessary but not enough; {found}; probe at three angles or "
+                f"satisfy the count of Eq. 6, which is necessary but not enough; {finding}; probe at three angles or "
                 "more that are not all multiples of 90 degrees apart"
             )
 
@@ -100,7 +100,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="free-form self-calibration",
     description="a workpiece of unknown shape, probed at several angles of a table",
-    words=Words(target="target", row="touch", tool_point="tip"),
+    nouns=Nouns(target="target", row="touch", tool_point="tip"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,

@@ -49,7 +49,7 @@ class Expected:
 class Candidates:
     """Rows (n, p) in standard uncertainties at every angle, ``angle`` (n,) degrees; ``inside`` (n,) the nodes.
 
-    ``always`` (k, p) are the known length and the conditions on the shape; ``own`` the columns of each angle.
+    ``always`` (k, p) are the known length and the conditions on the shape; ``own_columns`` the columns of each angle.
     """
 
     problem: FreeFormProblem
@@ -58,7 +58,7 @@ class Candidates:
     angle: Array
     inside: npt.NDArray[np.bool_]
     always: Array
-    own: dict[float, tuple[int, ...]]
+    own_columns: dict[float, tuple[int, ...]]
 
     @property
     def table(self) -> str:
@@ -78,11 +78,11 @@ class Candidates:
 
     def expected(self, angles: Sequence[float]) -> Expected:
         """What a plan of these angles promises."""
-        chosen = np.isin(self.angle, angles)
-        seen = chosen & self.inside
-        others = {column for angle, its in self.own.items() if angle not in angles for column in its}
+        planned = np.isin(self.angle, angles)
+        probed = planned & self.inside
+        others = {column for angle, its in self.own_columns.items() if angle not in angles for column in its}
         columns = np.array([c for c in range(self.rows.shape[1]) if c not in others])
-        rows = np.concatenate([self.rows[seen][:, columns], self.always[:, columns]])
+        rows = np.concatenate([self.rows[probed][:, columns], self.always[:, columns]])
         scale = np.linalg.norm(rows, axis=0)
         scale = np.where(scale > 0.0, scale, 1.0)
         values, vectors = np.linalg.eigh((rows / scale).T @ (rows / scale))
@@ -94,23 +94,23 @@ class Candidates:
         reported = set(self.problem.base_names)
         return Expected(
             tuple(angles),
-            int(seen.sum()),
-            int((chosen & ~self.inside).sum()),
+            int(probed.sum()),
+            int((planned & ~self.inside).sum()),
             int((~free).sum()),
-            {names[c]: float(one) for c, one in zip(columns, u, strict=True) if names[c] in reported},
+            {names[c]: float(value) for c, value in zip(columns, u, strict=True) if names[c] in reported},
         )
 
     def next_angles(self, count: int) -> tuple[list[Expected], tuple[float, ...]]:
         """Every single angle added to the present plan, best first, and the ``count`` angles chosen one by one."""
         single: list[Expected] = []
-        chosen: tuple[float, ...] = ()
+        best: tuple[float, ...] = ()
         for _ in range(count):
-            before = (*self.present, *chosen)
-            left = [angle for angle in self.own if angle not in before]
-            ranked = sorted((self.expected((*before, angle)) for angle in left), key=_merit)
+            before = (*self.present, *best)
+            remaining = [angle for angle in self.own_columns if angle not in before]
+            ranked = sorted((self.expected((*before, angle)) for angle in remaining), key=_merit)
             single = single or ranked
-            chosen = (*chosen, ranked[0].angles[-1])
-        return single, chosen
+            best = (*best, ranked[0].angles[-1])
+        return single, best
 
 
 def _merit(plan: Expected) -> tuple[int, float]:
@@ -157,10 +157,10 @@ def candidates_of(campaign: Campaign, model: Model, angles: Sequence[float]) -> 
         nodes = problem.nodes[joint.name]
         # A nominal place that is typed to a micrometre may pass the last node by as much.
         inside &= (reading >= nodes[0] - 1e-3) & (reading <= nodes[-1] + 1e-3)
-    own: dict[float, tuple[int, ...]] = dict.fromkeys(every, ())
+    own_columns: dict[float, tuple[int, ...]] = dict.fromkeys(every, ())
     for symbol in problem.plane.table_terms:
-        for one in every:
-            name = f"{symbol}({one:.9g})"
+        for degree in every:
+            name = f"{symbol}({degree:.9g})"
             if name in problem.local_names:
-                own[one] += (problem.local_names.index(name),)
-    return Candidates(problem, present, design[:count], angle, inside, design[count:], own)
+                own_columns[degree] += (problem.local_names.index(name),)
+    return Candidates(problem, present, design[:count], angle, inside, design[count:], own_columns)

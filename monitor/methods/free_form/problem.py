@@ -26,12 +26,12 @@ class FreeFormProblem(ChainProblem):
     """Probings along a normal. A run's own unknown is the error that was measured by other means, ``length``.
 
     ``held`` are the parameters that are zero by choice, ``on_shape`` the conditions that fix the frame in the
-    workpiece. ``known`` (n,) is the value of ``length`` in mm, the same for all rows of a run.
+    workpiece. ``length_at_rows`` (n,) is the value of ``length`` in mm, the same for all rows of a run.
     """
 
     plane: Plane
     length: KnownError
-    known: Array
+    length_at_rows: Array
     held: tuple[str, ...]
     on_shape: tuple[str, ...]
     nodes: dict[str, tuple[float, ...]]
@@ -46,7 +46,7 @@ class FreeFormProblem(ChainProblem):
     def own_start(self) -> Array:
         """The known error at its value (R, 1)."""
         _, first = np.unique(self._run, return_index=True)
-        return self.known[first, None].copy()
+        return self.length_at_rows[first, None].copy()
 
     @property
     def known_errors(self) -> tuple[tuple[ChainEffect, str], ...]:
@@ -54,7 +54,7 @@ class FreeFormProblem(ChainProblem):
         symbol, _, rest = self.length.parameter.partition("(")
         chain = self.context.chain
         nodes = self.nodes[chain.joints[parse_term(symbol, chain).joint].name]
-        only = nodes_text(nodes, [place for place in nodes if at("", place) != f"({rest}"])
+        only = nodes_text(nodes, [position for position in nodes if at("", position) != f"({rest}"])
         effect = parse_effect(f"{symbol}:{only}", chain)
         assert isinstance(effect, ChainEffect)
         return ((effect, self.length.parameter),)
@@ -86,31 +86,33 @@ class FreeFormProblem(ChainProblem):
         """Unit normals (n, 3) of the surface, in the frame of the workpiece."""
         return normals_of(self.context)
 
-    def ends(self, own: Array) -> tuple[Array, Array]:
+    def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """The nominal point and the stylus tip on the axis of the spindle."""
         return self.context.nominal.copy(), np.zeros((len(self.context), 3))
 
     def observe(self, rows: Array) -> Array:
         """Along the normal (Eq. 3): (n, 3, ...) to (n, 1, ...)."""
-        told: Array = np.einsum("ni,ni...->n...", self.normals, rows)[:, None]
-        return told
+        along_normal: Array = np.einsum("ni,ni...->n...", self.normals, rows)[:, None]
+        return along_normal
 
-    def by_own(self, own: Array, seen: ChainPose) -> Array:
+    def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
         """Derivatives (n, 3, 1) by the known error."""
-        assert seen.by_error is not None
+        assert pose.by_error is not None
         term, hat = self._length_effect
-        found: Array = (seen.by_error[:, :, term.joint, term.stage, term.component] * hat[:, None])[..., None]
-        return found
+        derivative: Array = (pose.by_error[:, :, term.joint, term.stage, term.component] * hat[:, None])[
+            ..., None
+        ]
+        return derivative
 
-    def extras(self, own: Array) -> tuple[Array, Array]:
+    def extras(self, nuisance: Array) -> tuple[Array, Array]:
         """The known error less its value, in its standard uncertainty."""
         u = self.length.standard_uncertainty
-        return (own - self.own_start) / u, np.full((len(self.runs), 1, 1), 1.0 / u)
+        return (nuisance - self.own_start) / u, np.full((len(self.runs), 1, 1), 1.0 / u)
 
     @cached_property
     def _shape_rows(self) -> Array:
         """Rows (R, k, p) of the conditions on the shape: no shift along u, v and no turn of the whole shape."""
-        places = {name: place for place, name in enumerate(self.local_names)}
+        places = {name: index for index, name in enumerate(self.local_names)}
         u, v = (np.array(joint.direction) for joint in (self.plane.u, self.plane.v))
         w = np.cross(u, v)
         moved = {
@@ -119,10 +121,10 @@ class FreeFormProblem(ChainProblem):
             "shape turn": np.cross(w, self.context.nominal),
         }
         rows = np.zeros((len(self.runs), len(self.on_shape), len(self.local_names)))
-        for place, condition in enumerate(self.on_shape):
+        for index, condition in enumerate(self.on_shape):
             along = np.einsum("ni,ni->n", moved[condition], self.normals)
             for row, target in enumerate(self.context.target):
-                rows[self._run[row], place, places[f"shape({target})"]] = along[row]
+                rows[self._run[row], index, places[f"shape({target})"]] = along[row]
         size = np.linalg.norm(rows, axis=-1, keepdims=True) * CONDITION_SHARE * float(self.sigma.min())
         scaled: Array = rows / np.where(size > 0.0, size, 1.0)
         return scaled
@@ -132,13 +134,13 @@ class FreeFormProblem(ChainProblem):
         """The same probings where a machine without errors would have met the nominal points.
 
         There the null vectors are exact. At the readings themselves errors of 50 µrad and 10 µm leave products of
-        second order, 1e-4 of a column, which no tolerance would tell from a plan that barely sees an unknown.
+        second order, 1e-4 of a column, which no tolerance would separate from a plan that barely determines an unknown.
         """
         chain, positions = self.context.chain, self.context.positions.copy()
         none = np.zeros((len(self.context), len(chain.joints), 2, 6))
         target, tip = self.ends(self.own_start)
-        seen = evaluate(chain, positions, none, target, tip)
-        off = np.einsum("nij,nj->ni", seen.work_rotation, seen.residual)
+        pose = evaluate(chain, positions, none, target, tip)
+        off = np.einsum("nij,nj->ni", pose.work_rotation, pose.residual)
         for joint in (self.plane.u, self.plane.v):
             along = off @ np.array(joint.direction)
             positions[:, chain.index(joint.name)] += along if joint.branch == "work" else -along
@@ -160,7 +162,7 @@ class FreeFormProblem(ChainProblem):
 
     @cached_property
     def as_read(self) -> Array:
-        """What the readings tell (n, 1) in mm of a machine and workpiece without errors, exactly (Eq. 3)."""
+        """The residuals (n, 1) in mm of a machine and workpiece without errors, exactly (Eq. 3)."""
         none = np.zeros((len(self.context), len(self.context.chain.joints), 2, 6))
         ends = self.ends(self.own_start)
         return self.observe(evaluate(self.context.chain, self.context.positions, none, *ends).residual)
@@ -168,11 +170,11 @@ class FreeFormProblem(ChainProblem):
     @cached_property
     def _rows(self) -> Array:
         """Derivatives (n, 1, p) of a row by the unknowns of its run: Eqs. (7), (12) and (13)."""
-        seen, nominal = self._at_nominal, self.nominal
-        assert seen.by_error is not None
-        parts = [effect.basis(nominal.context).displacement(seen.by_error) for effect in self.base]
+        pose, nominal = self._at_nominal, self.nominal
+        assert pose.by_error is not None
+        parts = [effect.basis(nominal.context).displacement(pose.by_error) for effect in self.base]
         return np.concatenate(
-            [*map(self.observe, parts), self.observe(nominal.by_own(self.own_start, seen))], axis=-1
+            [*map(self.observe, parts), self.observe(nominal.by_own(self.own_start, pose))], axis=-1
         )
 
     @cached_property
@@ -187,15 +189,12 @@ class FreeFormProblem(ChainProblem):
 
     def vectors(self, local: Array, common: Array) -> Array:
         """Residuals (n, 1) in mm: what was read, and what the errors do to it at the nominal points (Eq. 14)."""
-        found: Array = self.as_read + np.einsum("nip,np->ni", self._rows, local[self._run])
-        seen, place = self._at_nominal, 0
-        assert seen.by_error is not None
-        for added in self.shared:
-            unknowns = common[place : place + added.unknowns]
-            moved = added.basis(unknowns).displacement(seen.by_error) @ unknowns[: added.size]
-            found = found + self.observe(moved)
-            place += added.unknowns
-        return found
+        by_error = self._at_nominal.by_error
+        assert by_error is not None
+        vectors: Array = self.as_read + np.einsum("nip,np->ni", self._rows, local[self._run])
+        for moved in self.observed_displacements(common, by_error):
+            vectors = vectors + moved
+        return vectors
 
     def linearise(self, local: Array, common: Array) -> Linearisation:
         """Whitened residuals and derivatives. The model is linear, as Eq. (15) has it, with its rows from the chain.
@@ -209,22 +208,17 @@ class FreeFormProblem(ChainProblem):
         return Linearisation(np.concatenate(residual, axis=1), self._design, self._by_common(common))
 
     def _by_common(self, common: Array) -> Array:
-        seen, place = self._at_nominal, 0
-        assert seen.by_error is not None
-        parts = [np.zeros((len(self.context), 1, 0))]
-        for added in self.shared:
-            unknowns = common[place : place + added.unknowns]
-            parts.append(self.observe(added.displacement(unknowns, seen.by_error)))
-            place += added.unknowns
-        rows = self.padded(np.concatenate(parts, axis=-1) / self.sigma[..., None])
+        by_error = self._at_nominal.by_error
+        assert by_error is not None
+        rows = self.padded(self.observed_by_common(common, by_error) / self.sigma[..., None])
         more = len(self.extra_names)
         return np.concatenate([rows, np.zeros((len(self.runs), more, len(common)))], axis=1)
 
     @property
     def conditions(self) -> dict[str, str]:
         """Every condition of this problem with what it fixes, the known error last."""
-        known = all_conditions(self.plane, self.nodes, self.first_angle)
-        words = dict(zip(WORKPIECE_CONDITIONS, ("shift along u", "shift along v", "turn"), strict=True))
-        chosen = {name: known.get(name, "chosen by the campaign") for name in self.held}
-        chosen |= {name: f"the shape as a whole has no {words[name]}" for name in self.on_shape}
-        return chosen | {self.length.parameter: known.get(self.length.parameter, "the unit of length")}
+        meanings = all_conditions(self.plane, self.nodes, self.first_angle)
+        motions = dict(zip(WORKPIECE_CONDITIONS, ("shift along u", "shift along v", "turn"), strict=True))
+        conditions = {name: meanings.get(name, "chosen by the campaign") for name in self.held}
+        conditions |= {name: f"the shape as a whole has no {motions[name]}" for name in self.on_shape}
+        return conditions | {self.length.parameter: meanings.get(self.length.parameter, "the unit of length")}

@@ -33,21 +33,25 @@ def missing_conditions(problem: FreeFormProblem) -> dict[str, str]:
 
     One on the workpiece stands for one on the table's first angle: shifts for the shifts, the turn for the turn.
     """
-    known = all_conditions(problem.plane, problem.nodes, problem.first_angle)
+    conditions = all_conditions(problem.plane, problem.nodes, problem.first_angle)
     shift_u, shift_v, turn = (f"{symbol}({problem.first_angle:.9g})" for symbol in problem.plane.table_terms)
     instead = dict(zip(WORKPIECE_CONDITIONS, (shift_u, shift_v, turn), strict=True))
-    there = {*problem.held, problem.length.parameter, *(instead[one] for one in problem.on_shape)}
-    return {name: words for name, words in known.items() if name not in there}
+    present = {
+        *problem.held,
+        problem.length.parameter,
+        *(instead[condition] for condition in problem.on_shape),
+    }
+    return {name: meaning for name, meaning in conditions.items() if name not in present}
 
 
 def reason_of(problem: FreeFormProblem, parameters: tuple[str, ...], run: int) -> str:
-    """Why ``parameters`` of a run cannot be told apart, and what would separate them."""
-    missing = {name: words for name, words in missing_conditions(problem).items() if name in parameters}
+    """Why ``parameters`` of a run cannot be separated, and what would separate them."""
+    missing = {name: meaning for name, meaning in missing_conditions(problem).items() if name in parameters}
     if missing:
-        told = "; ".join(f"{name} = 0 ({words})" for name, words in missing.items())
+        listed = "; ".join(f"{name} = 0 ({meaning})" for name, meaning in missing.items())
         return (
-            f": the boundary condition{'s' * (len(missing) > 1)} {told} {'are' if len(missing) > 1 else 'is'} missing; "
-            "add to the conditions of [artefact.self_calibration]"
+            f": the boundary condition{'s' * (len(missing) > 1)} {listed} {'are' if len(missing) > 1 else 'is'} "
+            "missing; add to the conditions of [artefact.self_calibration]"
         )
     rows = problem.context.run == run
     unseen = _unseen(problem, parameters, rows)
@@ -68,7 +72,7 @@ def reason_of(problem: FreeFormProblem, parameters: tuple[str, ...], run: int) -
 def _unseen(problem: FreeFormProblem, parameters: tuple[str, ...], rows: Array) -> str:
     """The parameters that act at none of the probings."""
     local = problem.linearise(problem.start, problem.common_start).local
-    place = int(np.flatnonzero(problem.runs == problem.context.run[rows][0])[0])
-    size = np.linalg.norm(local[place], axis=0)
+    index = int(np.flatnonzero(problem.runs == problem.context.run[rows][0])[0])
+    size = np.linalg.norm(local[index], axis=0)
     silent = [name for name in parameters if size[problem.local_names.index(name)] == 0.0]
     return ", ".join(silent)

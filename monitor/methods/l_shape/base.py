@@ -21,13 +21,13 @@ def l_shape_base(chain: Chain) -> tuple[str, ...]:
     frame, second, third = sorted(chain.joints, key=lambda joint: joint is not (chain.work or chain.tool)[0])
     # The second axis may turn in the plane that the first one spans with it, the third about both of them.
     across = [joint.direction.index(1.0) for joint in (frame, second, third)]
-    found = [f"E{'ABC'[across[2]]}0{second.name}"]
-    found += [f"E{'ABC'[one]}0{third.name}" for one in sorted(across[:2])]
+    effects = [f"E{'ABC'[across[2]]}0{second.name}"]
+    effects += [f"E{'ABC'[axis]}0{third.name}" for axis in sorted(across[:2])]
     for joint in chain.joints:
         for component in "XYZABC":
             along = component in "XYZ" and joint.direction["XYZ".index(component)] == 1.0
             straight = component in "XYZ" and not along
-            found += [
+            effects += [
                 f"E{component}{joint.name}:poly{order}" for order in ORDERS if order > 1 or not straight
             ]
-    return tuple(found)
+    return tuple(effects)

@@ -10,7 +10,7 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.l_shape.base import ORDERS, l_shape_base
 from monitor.methods.l_shape.problem import LShapeProblem
 from monitor.methods.l_shape.stepwise import stepwise
-from monitor.methods.method import ChainMethod, Stepwise, Words
+from monitor.methods.method import ChainMethod, Nouns, Stepwise
 from monitor.methods.model import Model, chain_of
 from monitor.records import Campaign
 from monitor.units import MICROMETRE
@@ -51,7 +51,7 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
     """What the plan left out."""
     assert isinstance(problem, LShapeProblem)
     rows = problem.context.run == run
-    used = {problem.piece.placements[place].plane for place in np.unique(problem.placement[rows])}
+    used = {problem.piece.placements[index].plane for index in np.unique(problem.placement[rows])}
     missing = [plane for plane in ("XY", "XZ", "YZ") if plane not in used]
     if missing:
         return f"; lay the piece in the {' and the '.join(missing)} plane too"
@@ -62,7 +62,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="L-shaped standard piece",
     description="modules of an L, scanned by an angle sensor: the 21 errors of three axes",
-    words=Words(target="module", row="reading", tool_point="tip"),
+    nouns=Nouns(target="module", row="reading", tool_point="tip"),
     problem_of=problem_of,
     advice=advice,
     base_effects=l_shape_base,

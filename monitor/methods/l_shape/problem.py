@@ -48,14 +48,17 @@ class LShapeProblem(ChainProblem):
     @cached_property
     def module(self) -> npt.NDArray[np.int64]:
         """Place of every row's module in the piece (n,)."""
-        places = {module.id: place for place, module in enumerate(self.piece.modules)}
-        return np.array([places[str(target)] for target in self.context.target])
+        indices = {module.id: index for index, module in enumerate(self.piece.modules)}
+        return np.array([indices[str(target)] for target in self.context.target])
 
     @cached_property
     def _frames(self) -> Array:
         """Unit vectors (P, 3, 3) u, v, w of every placement: along the arms, and out of the faces."""
         arms = np.array(
-            [[np.eye(3)["XYZ".index(axis)] for axis in one.plane] for one in self.piece.placements]
+            [
+                [np.eye(3)["XYZ".index(axis)] for axis in placement.plane]
+                for placement in self.piece.placements
+            ]
         )
         return np.stack([arms[:, 0], arms[:, 1], np.cross(arms[:, 0], arms[:, 1])], axis=1)
 
@@ -67,18 +70,18 @@ class LShapeProblem(ChainProblem):
     @cached_property
     def _used(self) -> tuple[int, ...]:
         """Places of the placements that were measured."""
-        return tuple(int(place) for place in np.unique(self.placement))
+        return tuple(int(index) for index in np.unique(self.placement))
 
     @cached_property
     def calibrated(self) -> tuple[int, ...]:
         """Places of the modules whose calibration matters: all that were scanned but the reference."""
-        return tuple(int(one) for one in np.unique(self.module) if one != self.piece.reference)
+        return tuple(int(index) for index in np.unique(self.module) if index != self.piece.reference)
 
     @cached_property
     def own_names(self) -> tuple[str, ...]:
-        setup = [f"{self.piece.placements[one].plane} {what}" for one in self._used for what in SETUP]
-        modules = [self.piece.modules[one].id for one in self.calibrated]
-        return (*setup, *(f"module {one} {what}" for one in modules for what in _CALIBRATION))
+        setup = [f"{self.piece.placements[index].plane} {motion}" for index in self._used for motion in SETUP]
+        modules = [self.piece.modules[index].id for index in self.calibrated]
+        return (*setup, *(f"module {module} {part}" for module in modules for part in _CALIBRATION))
 
     def all_orders(self) -> tuple[ChainEffect | ArtefactEffect, ...]:
         """The base effects and the first orders of the straightness, which the stepwise way has besides."""
@@ -89,17 +92,12 @@ class LShapeProblem(ChainProblem):
             for component in "XYZ"
             if joint.direction["XYZ".index(component)] != 1.0
         ]
-        own = tuple(effect for effect in self.base if isinstance(effect, (ChainEffect, ArtefactEffect)))
-        return (*own, *(parse_effect(text, chain) for text in texts))
+        base = tuple(effect for effect in self.base if isinstance(effect, (ChainEffect, ArtefactEffect)))
+        return (*base, *(parse_effect(text, chain) for text in texts))
 
     @cached_property
     def own_start(self) -> Array:
         return np.zeros((len(self.runs), len(self.own_names)))
-
-    @property
-    def gross_times(self) -> float:
-        """Spots move by micrometres whatever is exchanged; noise and module errors leave no more than this."""
-        return 2.5
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -109,13 +107,15 @@ class LShapeProblem(ChainProblem):
     def extra_names(self) -> tuple[str, ...]:
         return tuple(name for name in self.own_names if name.startswith("module "))
 
-    def _parts(self, own: Array) -> tuple[Array, Array]:
+    def _parts(self, nuisance: Array) -> tuple[Array, Array]:
         """Setup (n, 5) of every row's placement and deviations (n, 4) of its module, in mm and rad."""
         count = len(SETUP) * len(self._used)
-        setup = own[:, :count].reshape(len(own), len(self._used), len(SETUP))
+        setup = nuisance[:, :count].reshape(len(nuisance), len(self._used), len(SETUP))
         which = np.searchsorted(np.array(self._used), self.placement)
-        modules = np.zeros((len(own), len(self.piece.modules), 4))
-        modules[:, list(self.calibrated)] = own[:, count:].reshape(len(own), len(self.calibrated), 4)
+        modules = np.zeros((len(nuisance), len(self.piece.modules), 4))
+        modules[:, list(self.calibrated)] = nuisance[:, count:].reshape(
+            len(nuisance), len(self.calibrated), 4
+        )
         return setup[self._run, which], modules[self._run, self.module]
 
     @cached_property
@@ -125,33 +125,35 @@ class LShapeProblem(ChainProblem):
         places: Array = (centres - centres[self.piece.reference])[self.module]
         return places
 
-    def ends(self, own: Array) -> tuple[Array, Array]:
+    def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """The middle of the module's paraboloid and the sensor's reference point."""
-        setup, deviation = self._parts(own)
+        setup, deviation = self._parts(nuisance)
         flat = self.in_plane + deviation[:, :2]
         cos, sin = np.cos(setup[:, 2]), np.sin(setup[:, 2])
         turned = np.column_stack([cos * flat[:, 0] - sin * flat[:, 1], sin * flat[:, 0] + cos * flat[:, 1]])
-        corners = np.array([one.corner for one in self.piece.placements])[self.placement] + np.array(self.tip)
+        corners = np.array([placement.corner for placement in self.piece.placements])[
+            self.placement
+        ] + np.array(self.tip)
         target = corners + np.einsum("nk,nki->ni", turned + setup[:, :2], self.frames[:, :2])
         return target, np.tile(np.array(self.tip), (len(target), 1))
 
     def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """Residuals (n, 6): displacement in mm from the module to the sensor, then how much further a point 1 mm
-        along the faces' normal is displaced, in mm/mm, both less what the spots say."""
+        along the faces' normal is displaced, in mm/mm, both less what the spots measure."""
         errors, target, tip = self.state(local, common)
         chain, positions = self.context.chain, self.context.positions
         normal, arms = self.frames[:, 2], self.frames[:, :2]
         first = evaluate(chain, positions, errors, target, tip, jacobian=jacobian)
         setup, deviation = self._parts(self.own_of(local))
-        module = np.array([one.tilt for one in self.piece.modules])[self.module]
+        module = np.array([module.tilt for module in self.piece.modules])[self.module]
         tilts = -self.spots[:, :2] / (2.0 * self.piece.focal_length)
         lengths = -self.piece.paraboloid * (self.spots[:, 2:] / (2.0 * self.piece.focal_length) + tilts)
         turned = np.einsum("nij,nj->ni", first.by_tip, normal) - normal
-        given = tilts + setup[:, 3:] + deviation[:, 2:] + module
+        stated = tilts + setup[:, 3:] + deviation[:, 2:] + module
         residual = np.concatenate(
             [
                 first.residual - np.einsum("nk,nki->ni", lengths, arms),
-                turned - np.einsum("nk,nki->ni", given, arms),
+                turned - np.einsum("nk,nki->ni", stated, arms),
             ],
             axis=1,
         )
@@ -162,69 +164,63 @@ class LShapeProblem(ChainProblem):
             by_error = np.concatenate([first.by_error, second.by_error - first.by_error], axis=1)
         return ChainPose(residual, first.by_tip, first.work_rotation, by_error)
 
-    def by_own(self, own: Array, seen: ChainPose) -> Array:
+    def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
         """Derivatives (n, 6, q) by setup and modules."""
-        found = np.zeros((len(self.context), 6, own.shape[1]))
-        setup, deviation = self._parts(own)
+        derivatives = np.zeros((len(self.context), 6, nuisance.shape[1]))
+        setup, deviation = self._parts(nuisance)
         u, v = self.frames[:, 0], self.frames[:, 1]
         flat = self.in_plane + deviation[:, :2]
         cos, sin = np.cos(setup[:, 2, None]), np.sin(setup[:, 2, None])
         along, across = cos * u + sin * v, cos * v - sin * u
-        rows = np.arange(len(found))
+        rows = np.arange(len(derivatives))
         first = len(SETUP) * np.searchsorted(np.array(self._used), self.placement)
-        found[rows, :3, first] = -u
-        found[rows, :3, first + 1] = -v
-        found[rows, :3, first + 2] = -(flat[:, :1] * across - flat[:, 1:] * along)
-        found[rows, 3:, first + 3] = -u
-        found[rows, 3:, first + 4] = -v
+        derivatives[rows, :3, first] = -u
+        derivatives[rows, :3, first + 1] = -v
+        derivatives[rows, :3, first + 2] = -(flat[:, :1] * across - flat[:, 1:] * along)
+        derivatives[rows, 3:, first + 3] = -u
+        derivatives[rows, 3:, first + 4] = -v
         start = len(SETUP) * len(self._used)
-        for place, module in enumerate(self.calibrated):
-            own_rows = np.flatnonzero(self.module == module)
-            column = start + 4 * place
-            found[own_rows, :3, column] = -along[own_rows]
-            found[own_rows, :3, column + 1] = -across[own_rows]
-            found[own_rows, 3:, column + 2] = -u[own_rows]
-            found[own_rows, 3:, column + 3] = -v[own_rows]
-        return found
+        for index, module in enumerate(self.calibrated):
+            module_rows = np.flatnonzero(self.module == module)
+            column = start + 4 * index
+            derivatives[module_rows, :3, column] = -along[module_rows]
+            derivatives[module_rows, :3, column + 1] = -across[module_rows]
+            derivatives[module_rows, 3:, column + 2] = -u[module_rows]
+            derivatives[module_rows, 3:, column + 3] = -v[module_rows]
+        return derivatives
 
     @cached_property
     def _perfect(self) -> ChainPose:
-        """A machine without errors and a piece laid down exactly: what the spots say of it, and the derivatives."""
+        """A machine without errors and a piece laid down exactly: its spots, and the derivatives."""
         return self.evaluated(self.start, np.zeros(len(self.added_names)), jacobian=True)
 
     @cached_property
     def _rows(self) -> Array:
         """Derivatives (n, 4, p) of a row by the unknowns of its run."""
-        seen = self._perfect
-        assert seen.by_error is not None
-        parts = [effect.basis(self.context).displacement(seen.by_error) for effect in self.base]
-        return self.observe(np.concatenate([*parts, self.by_own(self.own_start, seen)], axis=-1))
+        pose = self._perfect
+        assert pose.by_error is not None
+        parts = [effect.basis(self.context).displacement(pose.by_error) for effect in self.base]
+        return self.observe(np.concatenate([*parts, self.by_own(self.own_start, pose)], axis=-1))
 
     def vectors(self, local: Array, common: Array) -> Array:
         """Residuals (n, 4) in mm on the detector, to first order in all errors, as Eqs. (4) to (6) have them."""
-        seen, place = self._perfect, 0
-        assert seen.by_error is not None
-        found: Array = self.observe(seen.residual) + np.einsum("nip,np->ni", self._rows, local[self._run])
-        for added in self.shared:
-            unknowns = common[place : place + added.unknowns]
-            found += self.observe(added.basis(unknowns).displacement(seen.by_error) @ unknowns[: added.size])
-            place += added.unknowns
-        return found
+        perfect = self._perfect
+        assert perfect.by_error is not None
+        vectors: Array = self.observe(perfect.residual)
+        vectors = vectors + np.einsum("nip,np->ni", self._rows, local[self._run])
+        for moved in self.observed_displacements(common, perfect.by_error):
+            vectors += moved
+        return vectors
 
     def linearise(self, local: Array, common: Array) -> Linearisation:
         """Whitened residuals and derivatives.
 
-        To first order, as the source has it: what the placements cannot tell apart is then exactly so, where products
-        of errors (3e-4 of a derivative) would seem to tell it. Neglected: a tenth of a micrometre for a piece of 200
-        mm that lies 1 mrad askew, 4 nm at 0.2 mrad.
+        To first order, as the source has it: what the placements cannot separate is then exactly so, where products
+        of errors (3e-4 of a derivative) would seem to separate it. Neglected: a tenth of a micrometre for a piece of
+        200 mm that lies 1 mrad askew, 4 nm at 0.2 mrad.
         """
-        seen, place = self._perfect, 0
-        assert seen.by_error is not None
-        parts = [np.zeros((len(self.context), 4, 0))]
-        for added in self.shared:
-            unknowns = common[place : place + added.unknowns]
-            parts.append(self.observe(added.displacement(unknowns, seen.by_error)))
-            place += added.unknowns
+        by_error = self._perfect.by_error
+        assert by_error is not None
         extra, by_extra = self.extras(self.own_of(local))
         before = ((0, 0), (0, 0), (len(self.base_names), 0))
         sigma = self.sigma[..., None]
@@ -233,7 +229,7 @@ class LShapeProblem(ChainProblem):
             np.concatenate([self.padded(self._rows / sigma), np.pad(by_extra, before)], axis=1),
             np.concatenate(
                 [
-                    self.padded(np.concatenate(parts, axis=-1) / sigma),
+                    self.padded(self.observed_by_common(common, by_error) / sigma),
                     np.zeros((*extra.shape, len(common))),
                 ],
                 axis=1,
@@ -252,7 +248,7 @@ class LShapeProblem(ChainProblem):
 
     def for_search(self) -> LShapeProblem:
         """The modules deviate from their calibration alike in all R runs. Each run has a deviation of its own here,
-        so its uncertainty is widened by the root of R: all runs together then say as little of it as one does."""
+        so its uncertainty is widened by the root of R: all runs together then determine it no better than one does."""
         wider = float(np.sqrt(len(self.runs)))
         piece = replace(
             self.piece,
@@ -261,11 +257,11 @@ class LShapeProblem(ChainProblem):
         )
         return replace(self.foreseen(), piece=piece)
 
-    def extras(self, own: Array) -> tuple[Array, Array]:
+    def extras(self, nuisance: Array) -> tuple[Array, Array]:
         """The modules' deviations from their calibration, in standard uncertainties of it."""
         first = len(SETUP) * len(self._used)
         piece = self.piece
         u = np.tile([piece.place_uncertainty] * 2 + [piece.tilt_uncertainty] * 2, len(self.calibrated))
-        by_own = np.zeros((len(own), len(u), own.shape[1]))
+        by_own = np.zeros((len(nuisance), len(u), nuisance.shape[1]))
         by_own[:, np.arange(len(u)), first + np.arange(len(u))] = 1.0 / u
-        return own[:, first:] / u, by_own
+        return nuisance[:, first:] / u, by_own

@@ -50,19 +50,19 @@ def squareness(slope_first: float, slope_second: float) -> float:
 
 
 def _arms(problem: LShapeProblem, rows: Rows) -> dict[str, tuple[_Arm, _Arm]]:
-    found = {}
-    for place, placement in enumerate(problem.piece.placements):
-        own = rows[problem.placement[rows] == place]
-        if len(own) == 0:
+    arms_of_plane = {}
+    for index, placement in enumerate(problem.piece.placements):
+        placed = rows[problem.placement[rows] == index]
+        if len(placed) == 0:
             continue
-        flat = problem.in_plane[own]
+        flat = problem.in_plane[placed]
         arms = []
         for along in (0, 1):
-            on = own[np.abs(flat[:, 1 - along]) < 1e-3 * np.ptp(flat)]
+            on = placed[np.abs(flat[:, 1 - along]) < 1e-3 * np.ptp(flat)]
             order = np.argsort(np.abs(problem.in_plane[on][:, along]), kind="stable")
             arms.append(_Arm(on[order], placement.plane[along]))
-        found[placement.plane] = (arms[0], arms[1])
-    return found
+        arms_of_plane[placement.plane] = (arms[0], arms[1])
+    return arms_of_plane
 
 
 def _cubic(position: Array, value: Array) -> Array:
@@ -70,8 +70,8 @@ def _cubic(position: Array, value: Array) -> Array:
     powers = np.stack([position**order for order in ORDERS], axis=1)
     scale = np.abs(powers).max(axis=0)
     columns = (powers - powers[0]) / scale
-    known = value - value[0]
-    coefficients: Array = np.linalg.lstsq(columns, known, rcond=None)[0] / scale
+    deviation = value - value[0]
+    coefficients: Array = np.linalg.lstsq(columns, deviation, rcond=None)[0] / scale
     return coefficients
 
 
@@ -82,18 +82,18 @@ def _steps(problem: LShapeProblem, rows: Rows, spots: Array) -> dict[str, float]
     lengths = -piece.paraboloid * (spots[:, 2:] / (2.0 * piece.focal_length) + tilts)
     tilts = tilts + np.array([module.tilt for module in piece.modules])[problem.module]
     arms = _arms(problem, rows)
-    found: dict[str, Array] = {}
+    cubics: dict[str, Array] = {}
     # Step 1: u, v and w are right-handed, so a tilt along u is a turn about v, one along v a turn about -u.
     for plane, both in arms.items():
         for arm in both:
             q = problem.context.positions[arm.rows, chain.index(arm.axis)]
             for about, column in ((plane[1], tilts[arm.rows, 0]), (plane[0], -tilts[arm.rows, 1])):
-                found.setdefault(f"E{'ABC'['XYZ'.index(about)]}{arm.axis}", _cubic(q, column))
+                cubics.setdefault(f"E{'ABC'['XYZ'.index(about)]}{arm.axis}", _cubic(q, column))
     # Step 2.
     angles: dict[str, float] = {}
-    for plane, (one, two) in arms.items():
+    for plane, (first_arm, second_arm) in arms.items():
         slopes = []
-        for arm, along in ((one, 0), (two, 1)):
+        for arm, along in ((first_arm, 0), (second_arm, 1)):
             path = problem.in_plane[arm.rows] + lengths[arm.rows]
             slopes.append(float(np.polyfit(path[:, along], path[:, 1 - along], 1)[0]))
         # The second path turns away from the first where it leans against its direction.
@@ -105,15 +105,15 @@ def _steps(problem: LShapeProblem, rows: Rows, spots: Array) -> dict[str, float]
         for arm in both:
             q = problem.context.positions[arm.rows, chain.index(arm.axis)]
             lever = _lever(problem, arm)
-            turned = np.stack([_at(found.get(f"E{c}{arm.axis}"), q) for c in "ABC"], axis=1)
+            turned = np.stack([_at(cubics.get(f"E{c}{arm.axis}"), q) for c in "ABC"], axis=1)
             moved = np.cross(turned, lever)
             # Where the sensor is in the piece's plane, less how far the axis went by its readings.
             at = problem.in_plane[arm.rows] + lengths[arm.rows]
             at[:, plane.index(arm.axis)] -= q - q[0]
             for direction, axis, column in ((u, plane[0], at[:, 0]), (v, plane[1], at[:, 1])):
-                found.setdefault(f"E{axis}{arm.axis}", _cubic(q, column - moved @ direction))
+                cubics.setdefault(f"E{axis}{arm.axis}", _cubic(q, column - moved @ direction))
     numbers = dict(angles)
-    for name, coefficients in found.items():
+    for name, coefficients in cubics.items():
         for order, value in zip(ORDERS, coefficients, strict=True):
             numbers[f"{name}:poly{order}"] = float(value)
     return numbers
@@ -137,8 +137,8 @@ def _lever(problem: LShapeProblem, arm: _Arm) -> Array:
     """From the axis' own frame to the sensor (n, 3) mm: the motion of the axes beyond it, and the tip."""
     chain = problem.context.chain
     lever = np.tile(np.array(problem.tip), (len(arm.rows), 1))
-    place = chain.index(arm.axis)
-    for beyond in range(place + 1, len(chain.joints)):
+    index = chain.index(arm.axis)
+    for beyond in range(index + 1, len(chain.joints)):
         direction = np.array(chain.joints[beyond].direction)
         lever += problem.context.positions[arm.rows, beyond, None] * direction
     return lever
@@ -164,34 +164,38 @@ def stepwise(problem: ChainProblem, solution: Solution, run: int) -> tuple[Stepw
                     f"run {run} scanned {len(arm.rows)} modules along {arm.axis} in the {plane} plane; "
                     "a cubic needs four"
                 )
-    place = int(np.flatnonzero(problem.runs == run)[0])
+    index = int(np.flatnonzero(problem.runs == run)[0])
     measured = _steps(problem, rows, problem.spots)
     # Without noise: the spots that the fit predicts, with the modules as they were calibrated.
-    own = solution.local.copy()
-    own[:, -4 * len(problem.calibrated) :] = 0.0
-    clean = _steps(problem, rows, problem.spots + problem.vectors(own, solution.common))
+    as_calibrated = solution.local.copy()
+    as_calibrated[:, -4 * len(problem.calibrated) :] = 0.0
+    clean = _steps(problem, rows, problem.spots + problem.vectors(as_calibrated, solution.common))
     names = list(measured)
-    slopes, at_once = _sensitivities(problem, solution, rows, place, measured)
-    base = {effect.text: at for at, effect in enumerate(problem.base) if solution.local_free[place, at]}
+    slopes, at_once = _sensitivities(problem, solution, rows, index, measured)
+    base = {
+        effect.text: column
+        for column, effect in enumerate(problem.base)
+        if solution.local_free[index, column]
+    }
     units = {effect.text: effect.unit for effect in problem.all_orders()}
-    told = []
+    coefficients = []
     for row, name in enumerate(names):
-        at = base.get(name)
-        once = float(solution.local[place, at]) if at is not None else float("nan")
-        told.append(
+        column = base.get(name)
+        once = float(solution.local[index, column]) if column is not None else float("nan")
+        coefficients.append(
             StepwiseCoefficient(
                 parameter=name,
                 unit=units[name],
                 stepwise=measured[name],
                 u_stepwise=float(np.linalg.norm(slopes[row])),
                 at_once=once,
-                u_at_once=float(np.linalg.norm(at_once[row])) if at is not None else float("nan"),
-                by_method=clean[name] - once if at is not None else 0.0,
+                u_at_once=float(np.linalg.norm(at_once[row])) if column is not None else float("nan"),
+                by_method=clean[name] - once if column is not None else 0.0,
                 u_noise=float(np.linalg.norm(slopes[row] - at_once[row])),
                 why=_why(name),
             )
         )
-    return tuple(told)
+    return tuple(coefficients)
 
 
 def _why(name: str) -> str:
@@ -201,7 +205,7 @@ def _why(name: str) -> str:
 
 
 def _sensitivities(
-    problem: LShapeProblem, solution: Solution, rows: Rows, place: int, measured: dict[str, float]
+    problem: LShapeProblem, solution: Solution, rows: Rows, index: int, measured: dict[str, float]
 ) -> tuple[Array, Array]:
     """How the coefficients of both ways follow every input, each in its standard uncertainty: (k, N) twice.
 
@@ -217,7 +221,7 @@ def _sensitivities(
         for axis in range(4):
             u = piece.place_uncertainty if axis < 2 else piece.tilt_uncertainty
             columns.append(_change(_recalibrated(problem, module, axis, u), rows, measured))
-    last = solution.last.local[place]
+    last = solution.last.local[index]
     scale = np.linalg.norm(last, axis=0)
     scale[scale == 0.0] = 1.0
     inverse = np.linalg.pinv(last / scale, rcond=RANK_TOLERANCE) / scale[:, None]
@@ -236,8 +240,8 @@ def _sensitivities(
 
 def _change(moved: LShapeProblem, rows: Rows, measured: dict[str, float]) -> list[float]:
     # The steps are linear in their inputs but for the arctangent of a slope of some 1e-4.
-    one = _steps(moved, rows, moved.spots)
-    return [one[name] - measured[name] for name in measured]
+    coefficients = _steps(moved, rows, moved.spots)
+    return [coefficients[name] - measured[name] for name in measured]
 
 
 def _shifted(problem: LShapeProblem, row: int, axis: int, by: float) -> LShapeProblem:
@@ -247,9 +251,9 @@ def _shifted(problem: LShapeProblem, row: int, axis: int, by: float) -> LShapePr
 
 
 def _recalibrated(problem: LShapeProblem, module: int, axis: int, by: float) -> LShapeProblem:
-    one = problem.piece.modules[module]
-    centre, tilt = list(one.centre), list(one.tilt)
+    calibrated = problem.piece.modules[module]
+    centre, tilt = list(calibrated.centre), list(calibrated.tilt)
     (centre if axis < 2 else tilt)[axis % 2] += by
     modules = list(problem.piece.modules)
-    modules[module] = replace(one, centre=(centre[0], centre[1]), tilt=(tilt[0], tilt[1]))
+    modules[module] = replace(calibrated, centre=(centre[0], centre[1]), tilt=(tilt[0], tilt[1]))
     return replace(problem, piece=replace(problem.piece, modules=tuple(modules)))

@@ -1,4 +1,4 @@
-"""The location errors of rotary axes that touching one piece at indexed angles can tell, found from the chain's rank.
+"""The location errors of rotary axes that touching one piece at indexed angles determines, by the chain's rank.
 
 The linear axes and the stylus tip count as known, the piece as unknown: whatever does the same as moving the piece
 or the points on it drops out. For ``w C A Y b X Z t`` these are the eight of Ibaraki et al. 2012, Table 1.
@@ -30,16 +30,16 @@ def _generic(chain: Chain) -> tuple[Array, Array]:
     rng = np.random.default_rng(SEED)
     spread = np.array([np.pi / 2 if joint.kind == "rotary" else 0.0 for joint in chain.joints])
     positions = np.repeat(rng.uniform(-spread, spread, (POSES, len(chain.joints))), POINTS, axis=0)
-    place = np.tile(rng.uniform(-150.0, 150.0, (POINTS, 3)), (POSES, 1))
+    point = np.tile(rng.uniform(-150.0, 150.0, (POINTS, 3)), (POSES, 1))
     normal = rng.standard_normal((POINTS, 3))
     normal = np.tile(normal / np.linalg.norm(normal, axis=1, keepdims=True), (POSES, 1))
-    errors = np.zeros((len(place), len(chain.joints), 2, 6))
+    errors = np.zeros((len(point), len(chain.joints), 2, 6))
     tip = np.array(TIP)
-    positions = touching_positions(chain, positions, errors, place, tip)
-    seen = evaluate(chain, positions, errors, place, tip, jacobian=True)
-    assert seen.by_error is not None
+    positions = touching_positions(chain, positions, errors, point, tip)
+    pose = evaluate(chain, positions, errors, point, tip, jacobian=True)
+    assert pose.by_error is not None
     heights = np.tile(np.eye(POINTS), (POSES, 1))
-    return np.einsum("ni,nijk->njk", normal, seen.by_error[:, :, :, 0]), heights
+    return np.einsum("ni,nijk->njk", normal, pose.by_error[:, :, :, 0]), heights
 
 
 def _candidates(chain: Chain) -> list[tuple[str, int]]:
@@ -49,12 +49,14 @@ def _candidates(chain: Chain) -> list[tuple[str, int]]:
     outwards; last the turns about an axis's own axis, which are zeros of an axis.
     """
     rotary = chain.of_kind("rotary")
-    known = {text[1:] for text in base_effects(chain)}
+    of_samba = {text[1:] for text in base_effects(chain)}
     every = [(joint, component) for joint in rotary for component in range(6)]
-    preferred = [(j.name, k) for j, k in every if f"{COMPONENTS[k]}0{j.name}" in known]
+    preferred = [(j.name, k) for j, k in every if f"{COMPONENTS[k]}0{j.name}" in of_samba]
     zeros = [(j.name, k) for j, k in every if k >= 3 and abs(j.direction[k - 3]) > OWN_AXIS]
     others = [(j.name, k) for j, k in every]
-    return list(dict.fromkeys([*preferred, *(one for one in others if one not in zeros), *zeros]))
+    return list(
+        dict.fromkeys([*preferred, *(candidate for candidate in others if candidate not in zeros), *zeros])
+    )
 
 
 @cache
@@ -65,15 +67,15 @@ def rotary_base(chain: Chain) -> tuple[str, ...]:
     """
     if not chain.of_kind("rotary"):
         raise DataError(f"'{chain.topology}' has no rotary axis: rotary-probing finds errors of rotary axes")
-    by_error, known = _generic(chain)
-    basis = np.linalg.qr(known)[0]
-    chosen: set[str] = set()
+    by_error, explained = _generic(chain)
+    basis = np.linalg.qr(explained)[0]
+    selected: set[str] = set()
     for name, component in _candidates(chain):
         column = by_error[:, chain.index(name), component]
-        left = column - basis @ (basis.T @ column)
-        left -= basis @ (basis.T @ left)
-        if np.linalg.norm(left) > RANK_TOLERANCE * np.linalg.norm(column):
-            basis = np.column_stack([basis, left / np.linalg.norm(left)])
-            chosen.add(f"E{COMPONENTS[component]}0{name}")
+        remainder = column - basis @ (basis.T @ column)
+        remainder -= basis @ (basis.T @ remainder)
+        if np.linalg.norm(remainder) > RANK_TOLERANCE * np.linalg.norm(column):
+            basis = np.column_stack([basis, remainder / np.linalg.norm(remainder)])
+            selected.add(f"E{COMPONENTS[component]}0{name}")
     ordered = [f"E{letter}0{joint.name}" for joint in chain.of_kind("rotary") for letter in COMPONENTS]
-    return tuple(text for text in ordered if text in chosen)
+    return tuple(text for text in ordered if text in selected)

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.method import ChainMethod, Words
+from monitor.methods.chain.sufficiency import still_joints
+from monitor.methods.method import ChainMethod, Nouns
 from monitor.methods.rotary_probing.base import rotary_base
 from monitor.methods.rotary_probing.problem import NAME, problem_of
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
-    """What the plan kept still and would have to move."""
-    rows = problem.context.run == run
-    still = [
-        joint.name
-        for place, joint in enumerate(problem.context.chain.joints)
-        if joint.kind == "rotary" and np.ptp(problem.context.positions[rows, place]) == 0
-    ]
+    """What the plan did not move and would have to move."""
+    still = [joint.name for joint in still_joints(problem, run, "rotary")]
     if still:
         return f": {' and '.join(still)} stands at one angle throughout; index it too"
     return "; touch more faces or other angles: the same points at opposite angles, and faces that look elsewhere"
@@ -27,7 +21,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="rotary probing",
     description="a block, a part or spheres, touched at indexed angles of two rotary axes",
-    words=Words(target="target", row="touch", tool_point="tip"),
+    nouns=Nouns(target="target", row="touch", tool_point="tip"),
     problem_of=problem_of,
     advice=advice,
     base_effects=rotary_base,

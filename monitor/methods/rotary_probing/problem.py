@@ -1,10 +1,10 @@
 """Rotary probing: location errors of rotary axes from touching one test piece at indexed angles.
 
-A touch tells one number: how far the stylus tip's centre stands from the surface, along its normal. The same points
+A touch measures one number: how far the stylus tip's centre stands from the surface, along its normal. The same points
 are touched at several angles, so their heights are unknowns of the run, and place and shape of the piece cancel. A
 sphere is touched from several sides at every pose; its centre and its effective radius (its own and the tip's) are
 unknowns. The linear axes and the stylus tip count as known: their errors go into the result (docs/rotary-probing.md
-says how far), as none of these touches can tell them from errors of the rotary axes.
+says how far), as none of these touches separates them from errors of the rotary axes.
 
 Any chain with rotary axes, any poses, faces with any normals. Source: S. Ibaraki, T. Iritani, T. Matsushita, 2012;
 its closed forms are a reference of the tests. Two products of small numbers are neglected: the tilt of a face against
@@ -43,12 +43,12 @@ DIRECTIONS = 3
 
 @dataclass(frozen=True)
 class RotaryProblem(ChainProblem):
-    """Touches of faces and spheres. ``normal`` (n, 3) is the direction in which a touch tells, outwards, in the frame
-    of the last work axis; ``place`` (n, 3) mm the touched point's reference in it, a sphere's centre for its touches;
+    """Touches of faces and spheres. ``normal`` (n, 3) is the direction that a touch measures, outwards, in the frame of
+    the last work axis; ``reference`` (n, 3) mm where the touched point lies in it, a sphere's centre for its touches;
     ``ball`` (n,) whether the target is a sphere; ``tip`` (3,) mm the tip's centre in the spindle frame."""
 
     normal: Array
-    place: Array
+    reference: Array
     ball: npt.NDArray[np.bool_]
     tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -86,31 +86,31 @@ class RotaryProblem(ChainProblem):
     @property
     def measured_joints(self) -> tuple[int, ...]:
         """The linear axes: they stop where the tip meets the surface."""
-        return tuple(place for place, joint in enumerate(self.context.chain.joints) if not joint.turns)
+        return tuple(index for index, joint in enumerate(self.context.chain.joints) if not joint.turns)
 
-    def ends(self, own: Array) -> tuple[Array, Array]:
+    def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """Points of the surface (of the surface that the tip's centre meets) and the tip."""
-        mine = own[self._run]
+        mine = nuisance[self._run]
         rows = np.arange(len(self.context))
         height = mine[rows, self._first + 3 * self.ball]
-        ends = self.place + height[:, None] * self.normal
+        ends = self.reference + height[:, None] * self.normal
         for axis in range(3):
             ends[self.ball, axis] += mine[self.ball, self._first[self.ball] + axis]
         return ends, np.broadcast_to(np.array(self.tip), ends.shape)
 
-    def by_own(self, own: Array, seen: ChainPose) -> Array:
+    def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
         """Derivatives (n, 3, q) by heights, centres and radii."""
-        found = np.zeros((len(self.context), 3, own.shape[1]))
+        derivatives = np.zeros((len(self.context), 3, nuisance.shape[1]))
         rows = np.arange(len(self.context))
-        found[rows, :, self._first + 3 * self.ball] = -self.normal
+        derivatives[rows, :, self._first + 3 * self.ball] = -self.normal
         for axis in range(3):
-            found[rows[self.ball], axis, self._first[self.ball] + axis] = -1.0
-        return found
+            derivatives[rows[self.ball], axis, self._first[self.ball] + axis] = -1.0
+        return derivatives
 
     def observe(self, rows: Array) -> Array:
         """The part along the normal (n, 1, ...)."""
-        told: Array = np.einsum("ni,ni...->n...", self.normal, rows)[:, None]
-        return told
+        along_normal: Array = np.einsum("ni,ni...->n...", self.normal, rows)[:, None]
+        return along_normal
 
 
 def _normals(campaign: Campaign) -> Array:
@@ -133,19 +133,19 @@ def _normals(campaign: Campaign) -> Array:
 
 def _references(context: Context, tips: Array, ball: npt.NDArray[np.bool_]) -> Array:
     """Where each touched point lies (n, 3): the mean over its run and target, a sphere's nominal centre."""
-    found = np.where(ball[:, None], context.nominal, 0.0)
+    references = np.where(ball[:, None], context.nominal, 0.0)
     for run in np.unique(context.run):
         for target in np.unique(context.target[(context.run == run) & ~ball]):
             rows = (context.run == run) & (context.target == target)
-            found[rows] = tips[rows].mean(axis=0)
-            apart = float(np.linalg.norm(tips[rows] - found[rows], axis=1).max())
+            references[rows] = tips[rows].mean(axis=0)
+            apart = float(np.linalg.norm(tips[rows] - references[rows], axis=1).max())
             if apart > FARTHEST_APART:
                 raise DataError(
                     f"run {run}: the touches of point {target} lie up to {2.0 * apart:.3g} mm apart in the table's "
                     "frame: the readings contradict the machine file; check the axis signs, the topology, the tip and "
                     "that every point has its own name"
                 )
-    return found
+    return references
 
 
 def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProblem:
@@ -155,21 +155,21 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProble
     contradict the machine file, a normal that is none, or a machine without a rotary axis.
     """
     chain = chain_of(campaign.machine)
-    own = model if model.base else replace(model, base=rotary_base(chain))
+    whole = model if model.base else replace(model, base=rotary_base(chain))
     context = context_of(campaign, chain)
     normal = _normals(campaign)
-    ball = np.isin(context.target, [one.id for one in campaign.artefact.balls])
+    ball = np.isin(context.target, [sphere.id for sphere in campaign.artefact.balls])
     tip = campaign.probe.tip or (0.0, 0.0, 0.0)
     none = np.zeros((len(context), len(chain.joints), 2, 6))
     tips = evaluate(chain, context.positions, none, np.zeros((len(context), 3)), np.array(tip)).residual
-    place = _references(context, tips, ball)
+    reference = _references(context, tips, ball)
     problem = RotaryProblem(
-        context=replace(context, nominal=place),
-        base=own.base_of(chain),
-        added=own.added_to(chain),
+        context=replace(context, nominal=reference),
+        base=whole.base_of(chain),
+        added=whole.added_to(chain),
         sigma=np.full((len(context), 1), campaign.probe.standard_uncertainty),
         normal=normal,
-        place=place,
+        reference=reference,
         ball=ball,
         tip=tip,
     )
@@ -184,13 +184,13 @@ def _directed(problem: RotaryProblem, tips: Array) -> RotaryProblem:
     stated = problem.normal[problem.ball]
     for _ in range(DIRECTIONS):
         solution = solve_problem(plain)
-        own = solution.local[:, len(plain.base_names) :]
+        nuisance = solution.local[:, len(plain.base_names) :]
         rows = np.flatnonzero(problem.ball)
-        mine = own[plain._run[rows]]
+        mine = nuisance[plain._run[rows]]
         shift = np.stack([mine[np.arange(len(rows)), plain._first[rows] + axis] for axis in range(3)], axis=1)
         # The vector leads from the sphere's surface to the tip; from its centre it is a radius along the normal more.
         vector = plain.evaluated(solution.local, solution.common).residual[rows]
-        vector = vector + plain.ends(own)[0][rows] - (plain.place[rows] + shift)
+        vector = vector + plain.ends(nuisance)[0][rows] - (plain.reference[rows] + shift)
         direction = vector / np.linalg.norm(vector, axis=1, keepdims=True)
         tilt = np.arccos(np.clip(np.sum(direction * stated, axis=1), -1.0, 1.0))
         if float(tilt.max()) > LARGEST_TILT:

@@ -1,6 +1,6 @@
 """SAMBA: scale and master balls artefact; balls touched at many indexations, a calibrated bar for the length.
 
-The geometric errors, the balls' places and the stylus tip are found together (34 unknowns with 4 balls and a
+The geometric errors, the balls' places and the stylus tip are identified together (34 unknowns with 4 balls and a
 bar on a five-axis machine), so nothing but the bar has to be calibrated. Source: A. Los, Uncertainty
 estimation in indirect calibration of five-axis machine tools, Polytechnique Montréal 2017, chapters 3 and 4;
 conventions as in docs/conventions.md.
@@ -14,9 +14,11 @@ from monitor.effects import ChainEffect, context_of
 from monitor.exceptions import DataError
 from monitor.machine import refuse_untouchable
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
 from monitor.methods.chain.touch import Distance, TouchProblem
-from monitor.methods.method import ChainMethod, TouchPlan, Words
+from monitor.methods.method import ChainMethod, Nouns, Rehearsal, TouchPlan
 from monitor.methods.model import Model, chain_of
+from monitor.methods.samba.virtual import virtual_campaign
 from monitor.records import Array, Campaign
 
 NAME = "samba"
@@ -56,54 +58,53 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TouchProblem
             f"campaign {campaign.name} never probed {' and '.join(missing)} of the scale bar; without the bar "
             "nothing gives the unit of length"
         )
-    present = np.isin(
-        [run.run for run in sorted(campaign.runs, key=lambda run: run.run)], campaign.probings.run
-    )
+    probed = np.isin(sorted(run.run for run in campaign.runs), campaign.probings.run)
     problem = TouchProblem(
         context=context_of(campaign, chain),
         base=model.base_of(chain),
         added=model.added_to(chain),
         sigma=np.full((len(campaign.probings), 3), campaign.probe.standard_uncertainty),
-        distances=(Distance(bar.balls, bar_length(campaign)[present], bar.standard_uncertainty),),
+        distances=(Distance(bar.balls, bar_length(campaign)[probed], bar.standard_uncertainty),),
         tip=campaign.probe.tip or (0.0, 0.0, 0.0),
     )
     return problem.foreseen() if problem.added else problem
 
 
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
-    """What the plan kept still and would have to move."""
-    rows = problem.context.run == run
+    """What the plan did not move and would have to move."""
+    missing = _bar_ends_missing(problem, run)
+    if missing and _gains(problem).intersection(parameters):
+        return f": run {run} did not probe {' and '.join(missing)} of the scale bar, the unit of length"
+    still = still_joints(problem, run, "rotary", "spindle")
+    if not still:
+        return "; probe more indexations"
+    spindle = next((joint.name for joint in still if joint.kind == "spindle"), None)
+    if spindle is not None and any(name.endswith(f"0{spindle}") for name in parameters):
+        return f": {spindle} stands at one angle throughout; probe also with {spindle} at 90, 180 and 270 degrees"
+    return f": {', '.join(joint.name for joint in still)} stands at one angle throughout; index it too"
+
+
+def _bar_ends_missing(problem: ChainProblem, run: int) -> list[str]:
     distances = problem.distances if isinstance(problem, TouchProblem) else ()
-    bar = sorted({name for distance in distances for name in distance.between})
-    missing = [name for name in bar if name not in problem.context.target[rows]]
-    gains = {
+    ends = sorted({name for distance in distances for name in distance.between})
+    targets = problem.context.target[problem.context.run == run]
+    return [name for name in ends if name not in targets]
+
+
+def _gains(problem: ChainProblem) -> set[str]:
+    return {
         name
         for effect in problem.base
         if isinstance(effect, ChainEffect) and effect.is_gain
         for name in effect.parameters(problem.context)
     }
-    if missing and gains.intersection(parameters):
-        return f": run {run} did not probe {' and '.join(missing)} of the scale bar, the unit of length"
-    still = []
-    for place, joint in enumerate(problem.context.chain.joints):
-        if joint.turns and np.ptp(problem.context.positions[rows, place]) == 0:
-            still.append(joint)
-    if not still:
-        return "; probe more indexations"
-    spindle = [joint for joint in still if joint.kind == "spindle"]
-    if spindle and any(name.endswith(f"0{spindle[0].name}") for name in parameters):
-        name = spindle[0].name
-        return f": {name} stands at one angle throughout; probe also with {name} at 90, 180 and 270 degrees"
-    return f": {', '.join(joint.name for joint in still)} stands at one angle throughout; index it too"
 
 
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:
     """DataError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
-        targets = problem.context.target[problem.context.run == run]
-        readings = 3 * len(targets) + len(problem.extra_names)
-        # A ball that this run left out is no unknown of it.
-        unknowns = len(problem.local_names) - 3 * (len(problem.targets) - len(np.unique(targets)))
+        readings = 3 * int(np.sum(problem.context.run == run)) + len(problem.extra_names)
+        unknowns = unknowns_of_run(problem, run)
         if readings < unknowns:
             raise DataError(
                 f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
@@ -115,9 +116,10 @@ METHOD = ChainMethod(
     name=NAME,
     title="scale and master balls",
     description="balls and a scale bar, touched at indexed angles",
-    words=Words(target="ball", row="touch", tool_point="tip"),
+    nouns=Nouns(target="ball", row="touch", tool_point="tip"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,
     plan=TouchPlan(),
+    rehearsal=Rehearsal("machine tool", virtual_campaign, noise_um=1.0),
 )

@@ -11,7 +11,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from monitor.effects import context_of, parse_effect
+from monitor.effects import Context, context_of, parse_effect
 from monitor.exceptions import EffectError
 from monitor.machine import evaluate, parse_term, touching_positions
 from monitor.methods.model import chain_of
@@ -64,14 +64,14 @@ def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
     first = datetime(2026, 3, 2, 8, 30, tzinfo=UTC)
     runs = tuple(
         Run(
-            run=day * RUNS_A_DAY + place + 1,
-            started_at=first + timedelta(days=day) + place * BETWEEN_RUNS,
+            run=day * RUNS_A_DAY + index + 1,
+            started_at=first + timedelta(days=day) + index * BETWEEN_RUNS,
             day=day + 1,
             warm_up=False,
-            conditions={"ambient_degC": round(21.5 + 0.3 * place + float(rng.normal(0.0, 0.2)), 2)},
+            conditions={"ambient_degC": round(21.5 + 0.3 * index + float(rng.normal(0.0, 0.2)), 2)},
         )
         for day in range(DAYS)
-        for place in range(RUNS_A_DAY)
+        for index in range(RUNS_A_DAY)
     )
     count = len(plan)
     sequence = np.tile(np.arange(1, count + 1), len(runs))
@@ -90,7 +90,7 @@ def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
         probe=Probe("virtual probe", "virtual", noise),
         artefact=Artefact(
             "four balls and a scale bar",
-            tuple(Ball(ball, place, 19.05) for ball, place in balls.items()),
+            tuple(Ball(ball, nominal, 19.05) for ball, nominal in balls.items()),
             ScaleBar(("S1", "S2"), BAR_LENGTH, BAR_UNCERTAINTY, "virtual"),
         ),
         runs=runs,
@@ -127,35 +127,44 @@ def virtual_campaign(
     for _ in range(2):
         campaign = replace(campaign, probings=replace(campaign.probings, readings=readings))
         context = context_of(campaign, chain)
-        errors = np.zeros((len(context), len(chain.joints), 2, 6))
-        for symbol, value in ERRORS.items():
-            term = parse_term(symbol, chain)
-            errors[:, term.joint, term.stage, term.component] += value
-        for axis, gain in GAINS.items():
-            term = parse_term(f"E{axis}{axis}", chain)
-            errors[:, term.joint, term.stage, term.component] += gain * context.positions[:, term.joint]
-        target = true_target.copy()
+        errors, target = _errors(context), true_target.copy()
         if effect is not None and any(np.any(readings[axis]) for axis in "XYZ"):
-            basis = parse_effect(effect, chain).basis(context)
-            seen = evaluate(chain, context.positions, errors, target, tip, jacobian=True)
-            assert seen.by_error is not None
-            moved = basis.displacement(seen.by_error) @ np.ones(basis.size)
-            largest = float(np.linalg.norm(moved, axis=1).max())
-            if largest == 0.0:
-                raise EffectError(
-                    f"{effect} does nothing at the probings of the virtual plan; choose another effect"
-                )
-            basis.apply(np.full(basis.size, peak / largest), errors, target)
+            _hide(effect, peak, context, errors, target, tip)
         positions = touching_positions(chain, context.positions, errors, target, tip)
-        for place, joint in enumerate(chain.joints):
+        for index, joint in enumerate(chain.joints):
             if not joint.turns:
-                readings[joint.name] = joint.sign * positions[:, place]
+                readings[joint.name] = joint.sign * positions[:, index]
     # The controller prints six decimals of a linear reading; angles are set values.
     noisy = {
         axis: np.round(values + rng.normal(0.0, noise, len(values)), 6) if axis in "XYZ" else values
         for axis, values in readings.items()
     }
     return replace(campaign, probings=replace(campaign.probings, readings=noisy))
+
+
+def _errors(context: Context) -> Array:
+    """Errors (n, J, 2, 6) of the machine without the hidden effect."""
+    chain = context.chain
+    errors = np.zeros((len(context), len(chain.joints), 2, 6))
+    for symbol, value in ERRORS.items():
+        term = parse_term(symbol, chain)
+        errors[:, term.joint, term.stage, term.component] += value
+    for axis, gain in GAINS.items():
+        term = parse_term(f"E{axis}{axis}", chain)
+        errors[:, term.joint, term.stage, term.component] += gain * context.positions[:, term.joint]
+    return errors
+
+
+def _hide(effect: str, peak: float, context: Context, errors: Array, target: Array, tip: Array) -> None:
+    """Add an effect with the largest displacement ``peak`` to the errors and the targets. Raises EffectError."""
+    basis = parse_effect(effect, context.chain).basis(context)
+    pose = evaluate(context.chain, context.positions, errors, target, tip, jacobian=True)
+    assert pose.by_error is not None
+    moved = basis.displacement(pose.by_error) @ np.ones(basis.size)
+    largest = float(np.linalg.norm(moved, axis=1).max())
+    if largest == 0.0:
+        raise EffectError(f"{effect} does nothing at the probings of the virtual plan; choose another effect")
+    basis.apply(np.full(basis.size, peak / largest), errors, target)
 
 
 def _fit_bar(places: dict[str, Array], length: float) -> None:

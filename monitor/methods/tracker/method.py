@@ -1,98 +1,37 @@
-"""Tracker: reflectors on the tool of any serial chain, looked at from outside at given joint readings.
+"""Tracker: reflectors on the tool of any serial chain, observed from outside at given joint readings.
 
-Location errors of the joints and gains of linear axes are found together with the tracker's frame and the places of
-the reflectors, of which nothing has to be known. Source: B. Mooring, Z. Roth, M. Driels, Fundamentals of manipulator
+Location errors of the joints and gains of linear axes are identified together with the tracker's frame and the places
+of the reflectors, of which nothing has to be known. Source: B. Mooring, Z. Roth, M. Driels, Fundamentals of manipulator
 calibration, Wiley 1991, chapters 3 to 5; conventions as in docs/conventions.md. Axes on the work side are not seen
 and do not take part.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from monitor.effects import Context, context_of
-from monitor.effects.artefact.tracker import measured_points
 from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.method import ChainMethod, Unable, Words
-from monitor.methods.model import Model, chain_of
-from monitor.methods.tracker.problem import TrackingProblem, first_guess
-from monitor.records import Array, Campaign
-
-NAME = "tracker"
-DEFAULT_MODEL = Model(NAME)
-# Three coordinates agree to the last digit by chance once in thousands of rows.
-MOST_COPIES = 0.05
-
-
-def tool_side(chain: Chain) -> Chain:
-    """The part of a chain that a tracker beside the machine sees moving."""
-    if not chain.tool:
-        raise DataError(
-            f"'{chain.topology}' has no axis on the tool's side; a tracker beside the machine sees none of it move"
-        )
-    return Chain(chain.topology, (), chain.tool, chain.down)
+from monitor.methods.chain.sufficiency import still_joints, unknowns_of_run
+from monitor.methods.method import ChainMethod, Nouns, Rehearsal, Unable
+from monitor.methods.tracker.assembly import NAME, problem_of, tool_side
+from monitor.methods.tracker.virtual import virtual_robot
+from monitor.records import Campaign
 
 
 def tracker_base(chain: Chain) -> tuple[str, ...]:
-    """The effects that are free in every run: those of the tool's side, looked at from outside."""
+    """The effects that are free in every run: those of the tool's side, observed from outside."""
     return base_effects(tool_side(chain), outside=True)
 
 
-def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TrackingProblem:
-    """The least-squares problem of a campaign under a model.
-
-    Every coordinate of a point has the stated standard uncertainty.
-    """
-    chain = tool_side(chain_of(campaign.machine))
-    context = context_of(campaign, chain)
-    fixed = tuple(one.id for one in campaign.artefact.reflectors if one.fixed)
-    points = measured_points(context)
-    for run in np.unique(context.run):
-        if not np.any((context.run == run) & ~np.isin(context.target, list(fixed))):
-            raise DataError(f"run {run} of campaign {campaign.name} measured no reflector on the tool")
-    _refuse_copies(campaign, context, points)
-    carried, places = first_guess(context, points, fixed)
-    ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
-    return TrackingProblem(
-        context=replace(context, nominal=carried),
-        base=model.base_of(chain, outside=True),
-        added=model.added_to(chain, outside=True),
-        sigma=np.full((len(context), 3), campaign.probe.standard_uncertainty),
-        reflectors=tuple((float(x), float(y), float(z)) for x, y, z in places),
-        fixed=fixed,
-        gear_ratios=tuple((name, ratio) for name, ratio in ratios.items() if ratio is not None),
-    )
-
-
-def _refuse_copies(campaign: Campaign, context: Context, points: Array) -> None:
-    """Rows that stand there twice to the last digit are no second measurement: noise would look like effects."""
-    targets = np.unique(context.target, return_inverse=True)[1]
-    rows = np.column_stack([context.run, targets, context.positions, points])
-    copies = len(rows) - len(np.unique(rows, axis=0))
-    if copies > MOST_COPIES * len(rows):
-        raise DataError(
-            f"{copies} of {len(rows)} rows of campaign {campaign.name} repeat another row of the same run to the last "
-            "digit, measured point and all: leave the copies out, they are no measurements of their own"
-        )
-
-
 def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
-    """What the plan kept still and would have to move."""
-    rows = problem.context.run == run
-    still = [
-        joint.name
-        for place, joint in enumerate(problem.context.chain.joints)
-        if np.ptp(problem.context.positions[rows, place]) == 0
-    ]
+    """What the plan did not move and would have to move."""
+    still = [joint.name for joint in still_joints(problem, run)]
     if still:
         return f": {', '.join(still)} stood still throughout; move {'it' if len(still) == 1 else 'them'} too"
-    targets = [target for target in problem.targets if np.any(rows & (problem.context.target == target))]
-    if len(targets) == 1:
+    if len(np.unique(problem.context.target[problem.context.run == run])) == 1:
         return "; add reflectors away from the last axis, or poses that turn the wrist more"
     return "; add poses over the whole range of the joints"
 
@@ -100,11 +39,10 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:
     """DataError where a run has fewer readings than its unknowns need."""
     for run in problem.runs:
-        targets = problem.context.target[problem.context.run == run]
-        unknowns = len(problem.local_names) - 3 * (len(problem.targets) - len(np.unique(targets)))
-        if 3 * len(targets) < unknowns:
+        readings, unknowns = 3 * int(np.sum(problem.context.run == run)), unknowns_of_run(problem, run)
+        if readings < unknowns:
             raise DataError(
-                f"run {run} of campaign {campaign.name} has {3 * len(targets)} readings for {unknowns} unknowns; "
+                f"run {run} of campaign {campaign.name} has {readings} readings for {unknowns} unknowns; "
                 "measure more poses"
             )
 
@@ -113,11 +51,12 @@ METHOD = ChainMethod(
     name=NAME,
     title="tracker",
     description="reflectors on a robot or any serial machine, seen by a laser tracker or camera",
-    words=Words(target="reflector", row="reading", tool_point="reflectors"),
+    nouns=Nouns(target="reflector", row="reading", tool_point="reflectors"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,
     base_effects=tracker_base,
     trial_rows=150,
+    rehearsal=Rehearsal("robot", virtual_robot, noise_um=20.0),
     coordinates=Unable("points seen by a tracker stand in another frame in every run"),
 )

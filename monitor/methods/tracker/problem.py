@@ -1,4 +1,4 @@
-"""Looking from outside: reflectors carried by the tool, measured by a tracker or camera in a frame of its own.
+"""Observation from outside: reflectors carried by the tool, measured by a tracker or camera in a frame of its own.
 
 A run's own unknowns are the frame (as a small motion away from a first guess), the places of the reflectors on the
 tool in the frame of the last tool axis, and those of reflectors fixed beside the machine. The first guess comes
@@ -57,8 +57,8 @@ class TrackingProblem(ChainProblem):
     @cached_property
     def own_start(self) -> Array:
         """The first guess (R, q)."""
-        one = np.concatenate([np.zeros(6), np.array(self.reflectors).reshape(-1)])
-        return np.tile(one, (len(self.runs), 1))
+        start = np.concatenate([np.zeros(6), np.array(self.reflectors).reshape(-1)])
+        return np.tile(start, (len(self.runs), 1))
 
     @property
     def largest_error(self) -> float:
@@ -91,56 +91,58 @@ class TrackingProblem(ChainProblem):
             [self.context.nominal[self._run == run].mean(axis=0) for run in range(len(self.runs))]
         )
 
-    def _turned(self, own: Array) -> tuple[Array, Array, Array]:
+    def _turned(self, nuisance: Array) -> tuple[Array, Array, Array]:
         """Rotations (R, 3, 3) of the frames, and those of their two outer turns."""
-        about_c = rotation_about(AXES[2], own[:, 5])
-        about_cb = about_c @ rotation_about(AXES[1], own[:, 4])
-        return about_cb @ rotation_about(AXES[0], own[:, 3]), about_cb, about_c
+        about_c = rotation_about(AXES[2], nuisance[:, 5])
+        about_cb = about_c @ rotation_about(AXES[1], nuisance[:, 4])
+        return about_cb @ rotation_about(AXES[0], nuisance[:, 3]), about_cb, about_c
 
-    def ends(self, own: Array) -> tuple[Array, Array]:
+    def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """The measured points in the machine's frame, and the reflectors in that of the last axis."""
-        turn, _, _ = self._turned(own)
+        turn, _, _ = self._turned(nuisance)
         arm = self.context.nominal - self._centre[self._run]
-        points = np.einsum("nij,nj->ni", turn[self._run], arm) + self._centre[self._run] + own[self._run, :3]
-        places = own[:, 6:].reshape(len(self.runs), len(self.targets), 3)
+        points = (
+            np.einsum("nij,nj->ni", turn[self._run], arm) + self._centre[self._run] + nuisance[self._run, :3]
+        )
+        places = nuisance[:, 6:].reshape(len(self.runs), len(self.targets), 3)
         return points, places[self._run, self._target]
 
     def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> ChainPose:
         """The chain at (R, p) and (c,); reflectors beside the machine are not carried by it."""
         errors, points, places = self.state(local, common)
         context = self.context
-        seen = evaluate(context.chain, context.positions, errors, points, places, jacobian=jacobian)
+        pose = evaluate(context.chain, context.positions, errors, points, places, jacobian=jacobian)
         if not self._fixed.any():
-            return seen
-        residual, by_tip = seen.residual.copy(), seen.by_tip.copy()
+            return pose
+        residual, by_tip = pose.residual.copy(), pose.by_tip.copy()
         residual[self._fixed] = (places - points)[self._fixed]
         by_tip[self._fixed] = np.eye(3)
-        by_error = seen.by_error
+        by_error = pose.by_error
         if by_error is not None:
             by_error[self._fixed] = 0.0
-        return replace(seen, residual=residual, by_tip=by_tip, by_error=by_error)
+        return replace(pose, residual=residual, by_tip=by_tip, by_error=by_error)
 
-    def by_own(self, own: Array, seen: ChainPose) -> Array:
+    def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
         """Derivatives (n, 3, q) by frame and reflectors."""
-        found = np.zeros((len(self.context), 3, own.shape[1]))
-        found[:, :, :3] = -np.eye(3)
-        turn, about_cb, about_c = self._turned(own)
+        derivatives = np.zeros((len(self.context), 3, nuisance.shape[1]))
+        derivatives[:, :, :3] = -np.eye(3)
+        turn, about_cb, about_c = self._turned(nuisance)
         arm = self.context.nominal - self._centre[self._run]
         turned = np.einsum("nij,nj->ni", turn[self._run], arm)
         # d(R_C R_B R_A) turns about R_C R_B x, R_C y and z.
-        for place, axes in enumerate((about_cb[:, :, 0], about_c[:, :, 1], np.tile(AXES[2], (len(turn), 1)))):
-            found[:, :, 3 + place] = -np.cross(axes[self._run], turned)
+        for index, axes in enumerate((about_cb[:, :, 0], about_c[:, :, 1], np.tile(AXES[2], (len(turn), 1)))):
+            derivatives[:, :, 3 + index] = -np.cross(axes[self._run], turned)
         rows = np.arange(len(self.context))
         for axis in range(3):
-            found[rows, :, 6 + 3 * self._target + axis] = seen.by_tip[:, :, axis]
-        return found
+            derivatives[rows, :, 6 + 3 * self._target + axis] = pose.by_tip[:, :, axis]
+        return derivatives
 
     def contradiction(self, solution: Solution) -> str | None:
         """Why the readings cannot come from this chain, in words; None where they may."""
-        left = self.vectors(solution.local, solution.common)
+        residual = self.vectors(solution.local, solution.common)
         weight = np.isfinite(self.sigma[:, 0]) & ~self._fixed
         spread = float(np.sqrt(np.mean((self.context.nominal - self._centre[self._run])[weight] ** 2)))
-        rms = float(np.sqrt(np.mean(left[weight] ** 2)))
+        rms = float(np.sqrt(np.mean(residual[weight] ** 2)))
         if rms <= CONTRADICTS * spread:
             return None
         return (
@@ -157,7 +159,7 @@ def first_guess(context: Context, points: Array, fixed: Sequence[str]) -> tuple[
     """
     count = len(context)
     none = np.zeros((count, len(context.chain.joints), 2, 6))
-    seen = evaluate(context.chain, context.positions, none, np.zeros((count, 3)), np.zeros(3))
+    pose = evaluate(context.chain, context.positions, none, np.zeros((count, 3)), np.zeros(3))
     targets = np.unique(context.target)
     carried = np.empty((count, 3))
     sums, times = np.zeros((len(targets), 3)), np.zeros(len(targets))
@@ -165,16 +167,16 @@ def first_guess(context: Context, points: Array, fixed: Sequence[str]) -> tuple[
         rows = np.flatnonzero(context.run == run)
         tool = rows[~np.isin(context.target[rows], list(fixed))]
         names, at = np.unique(context.target[tool], return_inverse=True)
-        turn, shift, places = _frame(seen.by_tip[tool], seen.residual[tool], points[tool], at)
+        turn, shift, places = _frame(pose.by_tip[tool], pose.residual[tool], points[tool], at)
         carried[rows] = points[rows] @ turn.T + shift
-        for name, place in zip(names, places, strict=True):
+        for name, position in zip(names, places, strict=True):
             number = int(np.flatnonzero(targets == name)[0])
-            sums[number] += place
+            sums[number] += position
             times[number] += 1.0
         for number, name in enumerate(targets):
-            own = rows[context.target[rows] == name]
-            if name in fixed and len(own):
-                sums[number] += carried[own].mean(axis=0)
+            target_rows = rows[context.target[rows] == name]
+            if name in fixed and len(target_rows):
+                sums[number] += carried[target_rows].mean(axis=0)
                 times[number] += 1.0
     return carried, sums / np.maximum(times, 1.0)[:, None]
 
@@ -204,6 +206,6 @@ def _frame(
             "of the tracker's columns (mm) and of offset_mm"
         )
     turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
-    left = (origin - arm @ turn.T).reshape(-1)
-    rest = np.linalg.lstsq(flat[:, 9:], -left, rcond=1e-8)[0]
+    remainder = (origin - arm @ turn.T).reshape(-1)
+    rest = np.linalg.lstsq(flat[:, 9:], -remainder, rcond=1e-8)[0]
     return turn, rest[:3] - turn @ middle, rest[3:].reshape(kinds, 3)

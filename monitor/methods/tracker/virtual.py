@@ -16,7 +16,7 @@ from monitor.exceptions import EffectError
 from monitor.machine import Chain, evaluate
 from monitor.machine.chain import rotation_about
 from monitor.methods.model import chain_of
-from monitor.methods.tracker.method import problem_of
+from monitor.methods.tracker.assembly import problem_of
 from monitor.records import (
     Array,
     Artefact,
@@ -69,7 +69,9 @@ def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
             gravity=(0.0, 0.0, -1.0),
         ),
         probe=Probe("virtual tracker", "virtual", noise),
-        artefact=Artefact("three reflectors", (), None, tuple(Reflector(one) for one in REFLECTORS)),
+        artefact=Artefact(
+            "three reflectors", (), None, tuple(Reflector(reflector) for reflector in REFLECTORS)
+        ),
         runs=(Run(1, datetime(2026, 3, 2, 8, 30, tzinfo=UTC), 1, False, {"ambient_degC": 21.5}),),
         probings=Probings(
             run=np.ones(rows, dtype=np.int64),
@@ -77,8 +79,8 @@ def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
             time=np.repeat(np.arange(POSES) * SECONDS_A_POSE, len(REFLECTORS)),
             target=np.array(list(REFLECTORS) * POSES),
             readings={
-                axis: np.repeat(degrees[:, place] * DEGREE.factor, len(REFLECTORS))
-                for place, (axis, *_) in enumerate(AXES)
+                axis: np.repeat(degrees[:, index] * DEGREE.factor, len(REFLECTORS))
+                for index, (axis, *_) in enumerate(AXES)
             },
         ),
     )
@@ -87,10 +89,10 @@ def _blank(name: str, noise: float, rng: np.random.Generator) -> Campaign:
 def _locations(chain: Chain, rng: np.random.Generator, count: int) -> Array:
     """Errors (n, J, 2, 6) of a robot without the effect."""
     errors = np.zeros((count, len(chain.joints), 2, 6))
-    for place, joint in enumerate(chain.joints):
-        errors[:, place, 0, :3] = rng.normal(0.0, SHIFT, 3)
-        errors[:, place, 0, 3:] = rng.normal(0.0, TILT, 3)
-        errors[:, place, 0, 3 + joint.main] = rng.normal(0.0, ZERO)
+    for index, joint in enumerate(chain.joints):
+        errors[:, index, 0, :3] = rng.normal(0.0, SHIFT, 3)
+        errors[:, index, 0, 3:] = rng.normal(0.0, TILT, 3)
+        errors[:, index, 0, 3 + joint.main] = rng.normal(0.0, ZERO)
     return errors
 
 

@@ -59,11 +59,11 @@ def check(plan: Plan) -> Iterable[Fault]:
 
 def _vectors(plan: Plan, names: tuple[str, ...]) -> Array | None:
     """The vectors (n, 3), zero where a column is not there; None where fewer than two are."""
-    there = [plan.probings.channels.get(name) for name in names]
-    if sum(column is not None for column in there) < 2:
+    present = [plan.probings.channels.get(name) for name in names]
+    if sum(column is not None for column in present) < 2:
         return None
     zero = np.zeros(len(plan.probings))
-    return np.column_stack([zero if column is None else column for column in there])
+    return np.column_stack([zero if column is None else column for column in present])
 
 
 def _changing(plan: Plan, names: tuple[str, ...], vectors: Array) -> Iterable[Fault]:

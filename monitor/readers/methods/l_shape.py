@@ -28,24 +28,24 @@ def check(plan: Plan) -> Iterable[Fault]:
             continue
         empty = np.flatnonzero(np.isnan(channels[column]))
         if len(empty):
-            told = f"{len(empty)} cells are empty, the first here; every scanned module has four spots and a placement"
-            yield Fault(plan.file, int(plan.lines[empty[0]]), column, told)
+            text = f"{len(empty)} cells are empty, the first here; every scanned module has four spots and a placement"
+            yield Fault(plan.file, int(plan.lines[empty[0]]), column, text)
     if piece is None:
         return
     if PLACEMENT in channels:
         numbers = np.arange(1, len(piece.placements) + 1)
-        known = np.isin(channels[PLACEMENT], numbers) | np.isnan(channels[PLACEMENT])
-        for row in np.flatnonzero(~known)[:1]:
-            told = (
+        described = np.isin(channels[PLACEMENT], numbers) | np.isnan(channels[PLACEMENT])
+        for row in np.flatnonzero(~described)[:1]:
+            text = (
                 f"{quoted(f'{channels[PLACEMENT][row]:g}')} is no placement; campaign.toml lists "
                 f"{len(piece.placements)}, numbered from 1 in their order"
             )
-            yield Fault(plan.file, int(plan.lines[row]), PLACEMENT, told)
+            yield Fault(plan.file, int(plan.lines[row]), PLACEMENT, text)
     names = {module.id for module in piece.modules}
     for name in sorted({str(target) for target in plan.probings.target} - names):
         line = int(plan.lines[np.flatnonzero(plan.probings.target == name)[0]])
-        told = f"there is no module {quoted(name)}; the modules are {one_of(sorted(names))}"
-        yield Fault(plan.file, line, "target", told)
+        text = f"there is no module {quoted(name)}; the modules are {one_of(sorted(names))}"
+        yield Fault(plan.file, line, "target", text)
 
 
 def declared(artefact: Artefact) -> DeclaredPlaces | None:

@@ -27,16 +27,16 @@ FEWEST_POSES, FEWEST_TOUCHES = 2, 4
 def check(plan: Plan) -> Iterable[Fault]:
     """Faults of the plan: no rotary axis, a normal that is none, a point that does not come back."""
     if not plan.turning:
-        told = "the topology has no rotary axis; the method rotary-probing finds the errors of rotary axes"
-        yield Fault("campaign.toml", None, "machine.topology", told)
+        text = "the topology has no rotary axis; the method rotary-probing finds the errors of rotary axes"
+        yield Fault("campaign.toml", None, "machine.topology", text)
         return
     missing = [name for name in NORMAL if name not in plan.probings.channels]
     for name in missing:
-        told = (
+        text = (
             "the column is missing; the method rotary-probing needs normal_x, normal_y and normal_z, the outward "
             "normal of the touched surface in the frame of the last work axis"
         )
-        yield Fault(plan.file, 1, name, told)
+        yield Fault(plan.file, 1, name, text)
     if missing:
         return
     normal = np.column_stack([plan.probings.channels[name] for name in NORMAL])
@@ -45,9 +45,9 @@ def check(plan: Plan) -> Iterable[Fault]:
     for row in np.flatnonzero(wrong).tolist():
         yield Fault(plan.file, int(plan.lines[row]), *_what_is_wrong(normal[row]))
     balls = {ball.id for ball in plan.artefact.balls}
-    kept = np.isin(plan.probings.run, plan.runs)
+    intact = np.isin(plan.probings.run, plan.runs)
     for run in plan.runs:
-        rows = np.flatnonzero((plan.probings.run == run) & kept)
+        rows = np.flatnonzero((plan.probings.run == run) & intact)
         yield from _points(plan, rows, normal, wrong, balls)
 
 

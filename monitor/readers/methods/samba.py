@@ -24,25 +24,25 @@ def check(plan: Plan) -> Iterable[Fault]:
     turned = [probings.readings[axis] for axis in plan.turning]
     # Rows of equal run, target and indexation become one.
     names, target = np.unique(probings.target, return_inverse=True)
-    name_at = {str(name): place for place, name in enumerate(names)}
+    name_at = {str(name): index for index, name in enumerate(names)}
     poses = np.zeros(len(probings), dtype=np.int64)
     if turned:
         _, poses = np.unique(np.column_stack(turned), axis=0, return_inverse=True)
-    seen = np.unique(np.column_stack([probings.run, target, poses.reshape(-1)]), axis=0)
-    pairs, counts = np.unique(seen[:, :2], axis=0, return_counts=True)
+    probed = np.unique(np.column_stack([probings.run, target, poses.reshape(-1)]), axis=0)
+    pairs, counts = np.unique(probed[:, :2], axis=0, return_counts=True)
     count_of = {(int(run), int(name)): int(n) for (run, name), n in zip(pairs, counts, strict=True)}
-    found, first = np.unique(probings.run, return_index=True)
-    line_of = {int(run): int(line) for run, line in zip(found, plan.lines[first], strict=True)}
+    run_numbers, first = np.unique(probings.run, return_index=True)
+    line_of = {int(run): int(line) for run, line in zip(run_numbers, plan.lines[first], strict=True)}
 
     for run in plan.runs:
         missed = [end for end in ends if (run, name_at.get(end, -1)) not in count_of]
         if missed:
-            told = " and ".join(quoted(end) for end in missed)
+            text = " and ".join(quoted(end) for end in missed)
             yield Fault(
                 plan.file,
                 line_of[run],
                 "target",
-                f"run {run}: the scale bar was never probed at {told}; probe both of its balls in every run",
+                f"run {run}: the scale bar was never probed at {text}; probe both of its balls in every run",
             )
         for ball in balls:
             times = count_of.get((run, name_at.get(ball, -1)), 0)

@@ -25,8 +25,8 @@ def check(plan: Plan) -> Iterable[Fault]:
         line = int(plan.lines[np.flatnonzero(rows)[0]])
         poses = len(np.unique(joints[rows & on_tool], axis=0))
         if not np.any(rows & on_tool):
-            told = "no reflector on the tool was measured; measure one or more besides the fixed ones"
-            yield Fault(plan.file, line, "target", f"run {run}: {told}")
+            text = "no reflector on the tool was measured; measure one or more besides the fixed ones"
+            yield Fault(plan.file, line, "target", f"run {run}: {text}")
         elif poses < FEWEST_POSES:
             yield Fault(
                 plan.file,

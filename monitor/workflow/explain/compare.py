@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,12 +19,8 @@ from monitor.workflow.explain.request import CompareRequest
 from monitor.workflow.identify.fitting import fitted
 from monitor.workflow.models import label
 
-
-def compare_answer(fit: Fit | CurveFit, campaign: str, model: str) -> CompareAnswer:
-    """The comparison of a fitted model with its campaign."""
-    if isinstance(fit, CurveFit):
-        return CompareAnswer(curve_comparison(compare_curve(fit), model))
-    return CompareAnswer(machine_comparison(compare_fit(fit, campaign, model)), fit.problem.target_word)
+#: Draws the figures of an answer into a folder and returns the names of the files.
+Draw = Callable[[Path], Sequence[str]]
 
 
 def compare(db: Database, request: CompareRequest) -> CompareAnswer:
@@ -32,21 +29,36 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
     Raises NotFoundError, DataError where the readings do not suffice, InputError for a folder that cannot be made.
     """
     fit = fitted(db, request.campaign, request.model)
-    answer = compare_answer(fit.fit, request.campaign, label(fit.model))
+    model = label(fit.model)
+    answer, draw = (
+        _compare_curve(fit.fit, model)
+        if isinstance(fit.fit, CurveFit)
+        else _compare_machine(fit.fit, request.campaign, model)
+    )
     save_analysis(
         db, "comparison", to_document(answer), method=fit.campaign.method, campaign=request.campaign,
         model=fit.model.name, model_version=fit.model.version,
     )  # fmt: skip
-    if request.figures is None:
-        return answer
-    return replace(answer, figures=_figures(answer, fit.fit, request.figures))
+    return answer if request.figures is None else replace(answer, figures=tuple(draw(request.figures)))
 
 
-def _figures(answer: CompareAnswer, fit: Fit | CurveFit, folder: Path) -> tuple[str, ...]:
-    # Loaded here: drawing costs a second that a comparison without figures need not wait.
-    from monitor.workflow.explain.curve_figures import curve_figures
-    from monitor.workflow.explain.figures import comparison_figures
+def _compare_machine(fit: Fit, campaign: str, model: str) -> tuple[CompareAnswer, Draw]:
+    comparison = compare_fit(fit, campaign, model)
 
-    if isinstance(fit, CurveFit):
-        return tuple(curve_figures(fit, None, folder))
-    return tuple(comparison_figures(to_document(answer), fit, folder))
+    def draw(folder: Path) -> Sequence[str]:
+        # Loaded here: drawing costs a second that a comparison without figures need not wait.
+        from monitor.workflow.explain.figures import comparison_figures
+
+        return comparison_figures(comparison, fit, folder)
+
+    return CompareAnswer(machine_comparison(comparison), fit.problem.target_word), draw
+
+
+def _compare_curve(fit: CurveFit, model: str) -> tuple[CompareAnswer, Draw]:
+    def draw(folder: Path) -> Sequence[str]:
+        # Loaded here, as above.
+        from monitor.workflow.explain.curve_figures import curve_figures
+
+        return curve_figures(fit, None, folder)
+
+    return CompareAnswer(curve_comparison(compare_curve(fit), model)), draw

@@ -1,97 +1,69 @@
-"""Figures of curves: the residual falling as effects are added, and the error of every version of a model."""
+"""The figure of a curve: what its model leaves, and how that falls as effects are added."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.effects.curve import SEQUENCE
 from monitor.methods.curve.fit import CurveFit, fit
-from monitor.methods.curve.problem import CurveProblem
 from monitor.reporting.figures.curve import Residuals, residuals_figure
-from monitor.reporting.figures.models import error_falling
-from monitor.reporting.figures.style import save
-from monitor.workflow.figure_files import make_folder
-
-Document = dict[str, Any]
+from monitor.reporting.figures.style import Figure
+from monitor.workflow.figure_files import make_folder, save_figure
 
 
-def _axis(found: CurveFit, explanation: CurveExplanation | None) -> str:
-    """The input to draw over: that of the first missing effect, else the first of the model, else the time."""
-    numbers = found.problem.inputs.numbers
-    wanted = [] if explanation is None else [one.fitted.column for one in explanation.missing]
-    wanted += [effect.column for effect in found.effects]
-    clock = found.problem.curve.time or SEQUENCE
-    return next((name for name in wanted if name in numbers), clock)
-
-
-def _with_unit(found: CurveFit, name: str) -> str:
-    unit = found.problem.curve.units.get(name, "")
-    return f"{name} / {unit}" if unit and not name.endswith(f"_{unit}") else name
-
-
-def residual_figure(found: CurveFit, explanation: CurveExplanation | None) -> Any:
-    """The figure of a comparison, or of an explanation with every effect added in turn."""
-    curve = found.problem.curve
-    name = _axis(found, explanation)
-    panels = [Residuals(f"model as it is: RMS {found.rms:.4g}", found.residual)]
-    out = found.problem.left_out
-    if explanation is not None:
-        out = explanation.final.problem.left_out
-        now = fit(_without(found, explanation))
-        panels = [Residuals(f"model as it is: RMS {now.rms:.4g}", now.residual)]
-        for one in explanation.missing:
-            now = fit(now.settled.with_effects([one.fitted]))
-            panels.append(Residuals(f"+ {one.effect}: RMS {now.rms:.4g}", now.residual))
-    return residuals_figure(
-        found.problem.inputs.numbers[name],
-        curve.measured,
-        x_name="row" if name == SEQUENCE else _with_unit(found, name),
-        response=_with_unit(found, curve.response),
-        residuals=panels,
-        outliers=out,
-        title=_title(curve.name, explanation, panels),
-    )
-
-
-def _without(found: CurveFit, explanation: CurveExplanation) -> CurveProblem:
-    """The model as given, without the outliers that the explanation left out."""
-    return replace(found.settled, left_out=explanation.final.problem.left_out)
-
-
-def _title(name: str, explanation: CurveExplanation | None, panels: list[Residuals]) -> str:
-    if explanation is None:
-        return f"{name}: what the model leaves"
-    if not explanation.missing:
-        return f"{name}: nothing is missing that these rows can show"
-    return f"{name}: {len(explanation.missing)} missing effect{'s' if len(explanation.missing) > 1 else ''} found"
-
-
-def curve_figures(found: CurveFit, explanation: CurveExplanation | None, folder: Path) -> list[str]:
-    """Draw a comparison or an explanation; the files that were made."""
+def curve_figures(first: CurveFit, explanation: CurveExplanation | None, folder: Path) -> list[str]:
+    """Draw the model as given (``first``), with an explanation every missing effect too; return the files."""
     make_folder(folder)
     name = "residual" if explanation is None else "missing-effects"
-    return [
-        str(save(residual_figure(found, explanation), folder / f"{name}.{kind}")) for kind in ("svg", "png")
-    ]
+    return save_figure(residual_figure(first, explanation), folder, name)
 
 
-def curve_history_figure(steps: list[Document], folder: Path) -> list[str]:
-    """The error falling, version by version."""
-    make_folder(folder)
-    floor = steps[-1]["stated_uncertainty"] or steps[-1]["repeatability"]
-    figure = error_falling(
-        [one["model"] if one["added"] is None else f"+ {one['added']}" for one in steps],
-        [one["rms"] for one in steps],
-        [np.nan if one["heldout_rms"] is None else one["heldout_rms"] for one in steps],
-        noise_um=0.0 if floor is None else floor,
-        noise_name="no repeats" if floor is None else "stated uncertainty or repeatability",
-        unit="" if steps[0]["unit"] == "1" else steps[0]["unit"],
-        title=f"{steps[-1]['model']} on {steps[-1]['campaign']}: "
-        f"the error falls from {steps[0]['rms']:.4g} to {steps[-1]['rms']:.4g}",
+def residual_figure(first: CurveFit, explanation: CurveExplanation | None) -> Figure:
+    """Draw the residual of a comparison, or of an explanation with every effect added in turn."""
+    curve = first.problem.curve
+    column = _drawn_over(first, explanation)
+    return residuals_figure(
+        first.problem.inputs.numbers[column],
+        curve.measured,
+        x_name="row" if column == SEQUENCE else _with_unit(first, column),
+        response=_with_unit(first, curve.response),
+        residuals=_panels(first, explanation),
+        outliers=(first if explanation is None else explanation.final).problem.left_out,
+        title=_title(curve.name, explanation),
     )
-    return [str(save(figure, folder / f"error-falling.{kind}")) for kind in ("svg", "png")]
+
+
+def _drawn_over(first: CurveFit, explanation: CurveExplanation | None) -> str:
+    """The input to draw over: that of the first missing effect, else the first of the model, else the time."""
+    numbers = first.problem.inputs.numbers
+    columns = [] if explanation is None else [effect.fitted.column for effect in explanation.missing]
+    columns += [effect.column for effect in first.effects]
+    clock = first.problem.curve.time or SEQUENCE
+    return next((column for column in columns if column in numbers), clock)
+
+
+def _with_unit(first: CurveFit, column: str) -> str:
+    unit = first.problem.curve.units.get(column, "")
+    return f"{column} / {unit}" if unit and not column.endswith(f"_{unit}") else column
+
+
+def _panels(first: CurveFit, explanation: CurveExplanation | None) -> list[Residuals]:
+    """The residual of the model as it is, and of every missing effect added to it in turn, without the outliers."""
+    if explanation is not None:
+        first = fit(replace(first.settled, left_out=explanation.final.problem.left_out))
+    panels = [Residuals(f"model as it is: RMS {first.rms:.4g}", first.residual)]
+    for effect in () if explanation is None else explanation.missing:
+        first = fit(first.settled.with_effects([effect.fitted]))
+        panels.append(Residuals(f"+ {effect.effect}: RMS {first.rms:.4g}", first.residual))
+    return panels
+
+
+def _title(name: str, explanation: CurveExplanation | None) -> str:
+    if explanation is None:
+        return f"{name}: what the model leaves"
+    count = len(explanation.missing)
+    if not count:
+        return f"{name}: nothing is missing that these rows can show"
+    return f"{name}: {count} missing effect{'s' if count > 1 else ''} found"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -11,12 +12,13 @@ import numpy as np
 from monitor.discovery import Explanation, Fit, Verdict, find_mistakes, fit, is_gross
 from monitor.discovery import compare as compare_fit
 from monitor.discovery import explain as search
-from monitor.discovery.curve.explain import CurveExplanation, explain_curve
+from monitor.discovery.curve.explain import explain_curve
 from monitor.documents import to_document
 from monitor.exceptions import DataError
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
+from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explain_answer
 from monitor.workflow.explain.explain_answer import ExplainAnswer
 from monitor.workflow.explain.machine_answer import explain_answer
@@ -68,16 +70,44 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
     """
     measured = load_measured(db, request.campaign)
     model = resolve(db, request.model, measured.method)
-    if isinstance(measured, CurveCampaign):
-        curve = explain_curve(curve_problem(measured, model), rate=request.rate)
-        answer = curve_explain_answer(curve, label(model))
-        save_explanation(db, answer, measured.method, model)
-        return _with_figures(answer, curve, None, request.figures)
-    first = first_fit(measured, model)
-    explanation = explanation_of(measured, model, first, request.rate)
-    answer = explain_answer(explanation)
+    answer, draw = (
+        _search_curve(measured, model, request.rate)
+        if isinstance(measured, CurveCampaign)
+        else _search_machine(measured, model, request.rate)
+    )
     save_explanation(db, answer, measured.method, model)
-    return _with_figures(answer, explanation, first, request.figures)
+    return answer if request.figures is None else replace(answer, figures=tuple(draw(request.figures)))
+
+
+def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[ExplainAnswer, Draw]:
+    first = first_fit(campaign, model)
+    explanation = explanation_of(campaign, model, first, rate)
+    answer = explain_answer(explanation)
+
+    def draw(folder: Path) -> Sequence[str]:
+        # Loaded here: drawing costs a second that an explanation without figures need not wait.
+        from monitor.workflow.explain.figures import comparison_figures, explanation_figures
+
+        files = [
+            *comparison_figures(explanation.comparison, first, folder),
+            *explanation_figures(answer, explanation, folder),
+        ]
+        # The residual over the workspace belongs to both.
+        return list(dict.fromkeys(files))
+
+    return answer, draw
+
+
+def _search_curve(curve: CurveCampaign, model: StoredModel, rate: float) -> tuple[ExplainAnswer, Draw]:
+    explanation = explain_curve(curve_problem(curve, model), rate=rate)
+
+    def draw(folder: Path) -> Sequence[str]:
+        # Loaded here, as above.
+        from monitor.workflow.explain.curve_figures import curve_figures
+
+        return curve_figures(explanation.first, explanation, folder)
+
+    return curve_explain_answer(explanation, label(model)), draw
 
 
 def save_explanation(
@@ -92,25 +122,3 @@ def save_explanation(
         campaign=answer.comparison.campaign, model=model.name, model_version=model.version,
         seed=None if answer.machine is None else SEED,
     )  # fmt: skip
-
-
-def _with_figures(
-    answer: ExplainAnswer, explanation: Explanation | CurveExplanation, first: Fit | None, folder: Path | None
-) -> ExplainAnswer:
-    """Draw where the model fails as it is, and what it lacks, into ``folder``; add the names of the files."""
-    if folder is None:
-        return answer
-    # Loaded here: drawing costs a second that an explanation without figures need not wait.
-    from monitor.workflow.explain.curve_figures import curve_figures
-    from monitor.workflow.explain.figures import comparison_figures, explanation_figures
-
-    if isinstance(explanation, CurveExplanation):
-        return replace(answer, figures=tuple(curve_figures(explanation.first, explanation, folder)))
-    assert first is not None
-    document = to_document(answer)
-    files = (
-        *comparison_figures(document, first, folder),
-        *explanation_figures(document, explanation, folder),
-    )
-    # The residual over the workspace belongs to both.
-    return replace(answer, figures=tuple(dict.fromkeys(files)))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from monitor.discovery import Explanation, Fit
+from monitor.discovery import ChainComparison, Explanation, Fit
 from monitor.effects import ChainEffect
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -17,12 +17,13 @@ from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import Figure
 from monitor.reporting.numbers import round_result
 from monitor.units import MICROMETRE
+from monitor.workflow.explain.explain_answer import ExplainAnswer, MachineMissing
 from monitor.workflow.explain.residuals import drivers_followed, in_machine_frame, mean_over_runs
 from monitor.workflow.explain.residuals_against import against_effect
 from monitor.workflow.explain.shape import shape_figure
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 from monitor.workflow.figure_files import make_folder, save_figure
 
-Document = dict[str, Any]
 # A ball touched once a run is followed exactly: a smaller residual than this has nothing to show.
 SMALLEST_SHOWN_UM = 0.005
 # Rivals of an effect that a figure has room for.
@@ -31,22 +32,23 @@ OVER_WORKSPACE = "What the model leaves, mean over the runs, over the workspace"
 NOISE_NAME = "probe's stated uncertainty"
 
 
-def comparison_figures(document: Document, fit: Fit, folder: Path) -> list[str]:
+def comparison_figures(comparison: ChainComparison, fit: Fit, folder: Path) -> list[str]:
     """Draw where the model fails: by target, axis and run, over the workspace, against what it may depend on."""
     make_folder(folder)
+    um = MICROMETRE.to_display
     groups = {}
     for name in ("target", "axis", "run"):
         residuals = {
-            label: part["rms_um"]
-            for label, part in document["by"].get(name, {}).items()
-            if part["rms_um"] > SMALLEST_SHOWN_UM
+            label: um(part.rms)
+            for label, part in comparison.by.get(name, {}).items()
+            if um(part.rms) > SMALLEST_SHOWN_UM
         }
         if residuals:
             groups[name] = (list(residuals), list(residuals.values()))
-    level = document["expected_rms_um"]
+    level = um(comparison.expected_rms)
     title = (
-        f"{document['campaign']}: RMS {document['rms_um']:.2f} µm where {level:.2f} µm is expected: "
-        f"{document['verdict']}"
+        f"{comparison.campaign}: RMS {um(comparison.rms):.2f} µm where {level:.2f} µm is expected: "
+        f"{comparison.verdict.value}"
     )
     bars = residual_bars(groups, level_um=level, level_name="expected", title=title)
     files = save_figure(bars, folder, "where-it-fails")
@@ -60,7 +62,7 @@ def comparison_figures(document: Document, fit: Fit, folder: Path) -> list[str]:
             residual_name=f"residual along {axis} / µm",
         )
         files += save_figure(figure, folder, f"residual-against-{name.split(' ')[0].lower()}")
-    return files + shape_figure(document["campaign"], fit, folder)
+    return files + shape_figure(comparison.campaign, fit, folder)
 
 
 def _over_workspace(fit: Fit, positions: Array, vectors: Array, folder: Path) -> list[str]:
@@ -68,15 +70,16 @@ def _over_workspace(fit: Fit, positions: Array, vectors: Array, folder: Path) ->
     return save_figure(figure, folder, "residual-vectors")
 
 
-def explanation_figures(document: Document, explanation: Explanation, folder: Path) -> list[str]:
+def explanation_figures(answer: ExplainAnswer, explanation: Explanation, folder: Path) -> list[str]:
     """Draw what is missing: effects by evidence, the best against the measurement, the error falling."""
     make_folder(folder)
-    missing = document["missing"]
+    missing = [effect for effect in answer.missing if isinstance(effect, MachineMissing)]
     if not missing:
         return []
-    best = missing[0]["effect"]
-    files = save_figure(_ranked(document), folder, "missing-effects")
-    files += save_figure(_falling(document), folder, "error-falling")
+    best = missing[0].effect
+    noise_um = MICROMETRE.to_display(explanation.comparison.stated_uncertainty)
+    files = save_figure(_ranked(missing, answer.answer), folder, "missing-effects")
+    files += save_figure(_falling(missing, noise_um), folder, "error-falling")
     files += _failing(explanation, best, folder)
     prediction = _predicted(explanation, best)
     if prediction is not None:
@@ -85,22 +88,20 @@ def explanation_figures(document: Document, explanation: Explanation, folder: Pa
     return files
 
 
-def _ranked(document: Document) -> Figure:
+def _ranked(missing: Sequence[MachineMissing], title: str) -> Figure:
     """Draw missing effects with their rivals; the sentences are in the answer, a bar has room for the size alone."""
     names: list[str] = []
     peaks: list[float] = []
     groups: list[int] = []
     notes: list[str] = []
-    for missing in document["missing"]:
-        rivals = missing["indistinguishable_from"][:MOST_RIVALS]
-        names += [missing["effect"], *rivals]
-        peaks += [missing["peak_um"]] * (1 + len(rivals))
-        groups += [missing["rank"]] * (1 + len(rivals))
-        notes += [_size(missing["amplitude"], missing["u"], missing["unit"])]
+    for effect in missing:
+        rivals = effect.indistinguishable_from[:MOST_RIVALS]
+        names += [effect.effect, *rivals]
+        peaks += [effect.peak_um] * (1 + len(rivals))
+        groups += [effect.rank] * (1 + len(rivals))
+        notes += [_size(effect.amplitude, effect.u, effect.unit)]
         notes += ["not ruled out"] * len(rivals)
-    return ranked_effects(
-        names, peaks, groups, title=document["answer"], value_name="peak displacement / µm", notes=notes
-    )
+    return ranked_effects(names, peaks, groups, title=title, value_name="peak displacement / µm", notes=notes)
 
 
 def _failing(explanation: Explanation, effect: str, folder: Path) -> list[str]:
@@ -136,15 +137,14 @@ def _not_a_number_for_none(values: list[float | None]) -> list[float]:
     return [np.nan if value is None else value for value in values]
 
 
-def _falling(document: Document) -> Figure:
-    missing = document["missing"]
-    rms = [missing[0]["rms_before_um"], *(effect["rms_after_um"] for effect in missing)]
-    held_out = [missing[0]["heldout_before_um"], *(effect["heldout_after_um"] for effect in missing)]
+def _falling(missing: Sequence[MachineMissing], noise_um: float) -> Figure:
+    rms = [missing[0].rms_before_um, *(effect.rms_after_um for effect in missing)]
+    held_out = [missing[0].heldout_before_um, *(effect.heldout_after_um for effect in missing)]
     return error_falling(
-        ["as it is", *(f"+ {effect['effect']}" for effect in missing)],
+        ["as it is", *(f"+ {effect.effect}" for effect in missing)],
         rms,
         _not_a_number_for_none(held_out),
-        noise_um=document["stated_uncertainty_um"],
+        noise_um=noise_um,
         noise_name=NOISE_NAME,
         title=f"The error falls from {rms[0]:.2f} to {rms[-1]:.2f} µm",
     )
@@ -166,17 +166,30 @@ def _predicted(explanation: Explanation, text: str) -> tuple[Array, Array] | Non
     return None
 
 
-def history_figure(steps: list[Document], folder: Path) -> list[str]:
+def history_figures(steps: Sequence[MachineVersion | CurveVersion], folder: Path) -> list[str]:
     """Draw the error falling, version by version."""
     make_folder(folder)
     first, last = steps[0], steps[-1]
+    noise, noise_name = _noise_floor(last)
+    digits = ".4g" if isinstance(last, CurveVersion) else ".2f"
+    unit = "" if last.unit == "1" else last.unit
+    named_unit = "" if isinstance(last, CurveVersion) else f" {unit}"
     figure = error_falling(
-        [step["model"] if step["added"] is None else f"+ {step['added']}" for step in steps],
-        [step["rms_um"] for step in steps],
-        _not_a_number_for_none([step["heldout_rms_um"] for step in steps]),
-        noise_um=last["stated_uncertainty_um"],
-        noise_name=NOISE_NAME,
-        title=f"{last['model']} on {last['campaign']}: the error falls from {first['rms_um']:.2f} to "
-        f"{last['rms_um']:.2f} µm",
+        [step.model if step.added is None else f"+ {step.added}" for step in steps],
+        [step.rms for step in steps],
+        _not_a_number_for_none([step.heldout_rms for step in steps]),
+        noise_um=noise,
+        noise_name=noise_name,
+        unit=unit,
+        title=f"{last.model} on {last.campaign}: the error falls from {first.rms:{digits}} to "
+        f"{last.rms:{digits}}{named_unit}",
     )
     return save_figure(figure, folder, "error-falling")
+
+
+def _noise_floor(step: MachineVersion | CurveVersion) -> tuple[float, str]:
+    """The noise below which no error falls, and its name; 0 for a curve that states none and has no repeats."""
+    if isinstance(step, MachineVersion):
+        return step.stated_uncertainty_um, NOISE_NAME
+    floor = step.stated_uncertainty or step.repeatability
+    return (0.0, "no repeats") if floor is None else (floor, "stated uncertainty or repeatability")

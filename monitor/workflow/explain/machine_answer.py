@@ -67,10 +67,10 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
     return MachineMissing(
         rank=effect.rank,
         effect=effect.effect,
-        meaning=effect.words.meaning,
-        cause=effect.words.cause,
-        remedy=effect.words.remedy,
-        described_in=effect.words.described_in,
+        meaning=effect.description.meaning,
+        cause=effect.description.cause,
+        remedy=effect.description.remedy,
+        described_in=effect.description.described_in,
         amplitude=unit.to_display(effect.amplitude),
         u=unit.to_display(effect.u),
         unit=unit.name,
@@ -90,7 +90,7 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
             {f"{axis.lower()}_deg": round(DEGREE.to_display(angle), 6) for axis, angle in pose.items()}
             for pose in effect.separation.poses
         ),
-        standard_deviations_apart=DeviationsApart(effect.separation.now, effect.separation.then),
+        standard_deviations_apart=DeviationsApart(effect.separation.before, effect.separation.after),
         varies_from_run_to_run=effect.varies,
         searched=searched_value(effect),
     )

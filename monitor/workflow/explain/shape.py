@@ -5,41 +5,40 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery import Fit
 from monitor.methods.free_form.problem import FreeFormProblem
+from monitor.records import Array
 from monitor.reporting.figures.shape import raw_and_identified
-from monitor.reporting.figures.style import save
+from monitor.reporting.figures.style import Figure
 from monitor.units import DEGREE, MICROMETRE
+from monitor.workflow.figure_files import save_figure
 
 #: k of the drawn bars, as the figures of the method's source have it.
 K = 2.0
-ENDINGS = (".svg", ".png")
 
 
-def shape_figure(name: str, found: Fit, folder: Path) -> list[str]:
-    """The first run: what was read at every angle beside the identified shape; nothing for other methods."""
-    problem = found.problem
+def shape_figure(name: str, fit: Fit, folder: Path) -> list[str]:
+    """Draw the first run: what was read at every angle beside the identified shape; nothing for other methods."""
+    problem = fit.problem
     if not isinstance(problem, FreeFormProblem):
         return []
-    context, plane = problem.context, problem.plane
-    run = problem.runs[0]
+    return save_figure(_raw_and_identified(name, fit, problem), folder, "shape-raw-and-identified")
+
+
+def _raw_and_identified(name: str, fit: Fit, problem: FreeFormProblem) -> Figure:
+    context, plane, run = problem.context, problem.plane, problem.runs[0]
     rows = np.flatnonzero(context.run == run)
-    table = context.chain.index(plane.table.name)
-    sign = context.chain.joints[table].sign
-    degrees = np.round(sign * context.positions[rows, table] / DEGREE.factor, 6)
-    angles = list(dict.fromkeys(degrees.tolist()))
     points, first = np.unique(context.target[rows], return_index=True)
-    raw = np.full((len(points), len(angles)), np.nan)
-    at = np.searchsorted(points, context.target[rows])
-    raw[at, [angles.index(angle) for angle in degrees.tolist()]] = problem.as_read[rows, 0]
+    angles, raw = _readings(problem, rows)
     columns = [problem.local_names.index(f"shape({point})") for point in points]
-    free = found.solution.local_free[0, columns]
-    shape = np.where(free, found.solution.local[0, columns], np.nan)
-    variance = np.diag(found.solution.local_covariance[0])[columns]
+    free = fit.solution.local_free[0, columns]
+    shape = np.where(free, fit.solution.local[0, columns], np.nan)
+    variance = np.diag(fit.solution.local_covariance[0])[columns]
     in_plane = [int(np.argmax(np.abs(joint.direction))) for joint in (plane.u, plane.v)]
     um = MICROMETRE.to_display(1.0)
-    figure = raw_and_identified(
+    return raw_and_identified(
         context.nominal[rows[first]][:, in_plane],
         problem.normals[rows[first]][:, in_plane],
         raw * um,
@@ -50,4 +49,16 @@ def shape_figure(name: str, found: Fit, folder: Path) -> list[str]:
         f"U of the shape at most {K * um * float(np.sqrt(variance[free].max(initial=0.0))):.1f} µm",
         axes_names=(plane.u.name, plane.v.name),
     )
-    return [str(save(figure, folder / f"shape-raw-and-identified{ending}")) for ending in ENDINGS]
+
+
+def _readings(problem: FreeFormProblem, rows: npt.NDArray[np.int64]) -> tuple[list[float], Array]:
+    """The angles of the table in degrees and the readings (points, angles) in mm, NaN where there is none."""
+    context = problem.context
+    table = context.chain.index(problem.plane.table.name)
+    sign = context.chain.joints[table].sign
+    degrees = np.round(sign * context.positions[rows, table] / DEGREE.factor, 6).tolist()
+    angles = list(dict.fromkeys(degrees))
+    points, point = np.unique(context.target[rows], return_inverse=True)
+    raw = np.full((len(points), len(angles)), np.nan)
+    raw[point, [angles.index(angle) for angle in degrees]] = problem.as_read[rows, 0]
+    return angles, raw

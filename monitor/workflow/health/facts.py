@@ -1,9 +1,10 @@
-"""What stands on a machine's page of the health report, put together from stored documents and found changes."""
+"""What stands on a machine's page of the health report, put together from its past and from stored results."""
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
 
 import numpy as np
 
@@ -11,169 +12,161 @@ from monitor.reporting.health.records import (
     Change,
     ConditionRange,
     DataQuality,
-    Drift,
     History,
     ParameterHealth,
     RefusedImport,
 )
 from monitor.reporting.health.words import in_words
 from monitor.reporting.symbols import describe
-from monitor.statistics import Change as Found
-from monitor.store import Database, campaign_notes
+from monitor.statistics import Change as FoundChange
+from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
+from monitor.workflow.health.forecast import DriftForecast, stated_drift
+from monitor.workflow.health.stored import StatedUncertainty, StoredExplanation
 from monitor.workflow.health.weeks import Week
-from monitor.workflow.history.health_history import Event, PastRun
-from monitor.workflow.history.health_series import DriftFound, Series, moment
-from monitor.workflow.trend.parameter import SHORTEST_DAYS
-
-Document = dict[str, Any]
+from monitor.workflow.history.calendar import local_time
+from monitor.workflow.history.past import ParameterPast
+from monitor.workflow.history.series import Series
 
 
-def parameter_of(
-    one: Series,
-    evaluated: Document,
-    tolerance: float | None,
-    probability_out: float | None,
-    changes: list[Found],
-    drift: DriftFound | None,
-    origin: datetime,
+@dataclass(frozen=True)
+class Judgement:
+    """A parameter against its tolerance: the probability to be beyond it, and the drift foretold."""
+
+    tolerance: float | None
+    probability_out: float | None
+    ahead: DriftForecast | None
+
+
+def parameter_health(
+    past: ParameterPast,
+    starts: Sequence[datetime],
+    stated: StatedUncertainty,
+    judgement: Judgement,
     week: Week,
 ) -> ParameterHealth:
-    guf = evaluated["guf"]
+    """One parameter of the page; ``starts`` are the local starts of the runs that have it."""
+    series, tolerance = past.series, judgement.tolerance
+    name, values = series.name, series.values
     beyond = None
-    if tolerance is not None and abs(one.values[-1]) > tolerance:
-        inside = np.flatnonzero(np.abs(one.values) <= tolerance)
-        beyond = one.times[int(inside[-1]) + 1 if inside.size else 0]
+    if tolerance is not None and abs(values[-1]) > tolerance:
+        inside = np.flatnonzero(np.abs(values) <= tolerance)
+        beyond = starts[int(inside[-1]) + 1 if inside.size else 0]
     return ParameterHealth(
-        name=one.name,
-        description=describe(one.name),
-        unit=evaluated["units"][one.name],
-        estimate=float(guf["estimate"][one.name]),
-        u=float(guf["u"][one.name]),
-        expanded=float(guf["expanded"][one.name]),
+        name=name,
+        description=describe(name),
+        unit=stated.units[name],
+        estimate=stated.guf.estimate[name],
+        u=stated.guf.u[name],
+        expanded=stated.guf.expanded[name],
         tolerance=tolerance,
-        probability_out=probability_out,
+        probability_out=judgement.probability_out,
         out_since=beyond,
         history=History(
-            one.times,
-            tuple(one.values.tolist()),
-            tuple(one.u.tolist()),
-            tuple(week.holds(at) for at in one.times),
+            tuple(starts),
+            tuple(values.tolist()),
+            tuple(series.u.tolist()),
+            tuple(week.holds(start) for start in starts),
         ),
-        changed_at=tuple(origin + timedelta(days=change.at) for change in changes),
+        changed_at=tuple(moment_of(change.at, series) for change in past.search.changes),
         # Scatter of a few days, stated a year, would only mislead.
-        drift=None if drift is None or drift.horizon < SHORTEST_DAYS else _drift(drift, origin),
+        drift=stated_drift(past.drift, judgement.ahead),
     )
 
 
-def _drift(found: DriftFound, origin: datetime) -> Drift:
-    def day(days: float | None) -> Any:
-        at = None if days is None else moment(origin, days)
-        return None if at is None else at.date()
-
-    return Drift(
-        found.slope,
-        found.u_slope,
-        found.between,
-        found.p_value,
-        day(found.crosses),
-        (day(found.crosses_between[0]), day(found.crosses_between[1])),
-    )
+def moment_of(t: float, series: Series) -> datetime:
+    """A time of a series (days since 1970) by the shop's clock."""
+    moment = local_time(t, series.offset)
+    assert moment is not None
+    return moment
 
 
 def changes_noted(
-    found: dict[str, list[Found]],
-    series: dict[str, Series],
-    events: list[Event],
-    explained: Document | None,
-    runs: list[PastRun],
-    campaign: str,
-    origin: datetime,
+    past: Mapping[str, ParameterPast],
+    events: Sequence[MachineEvent],
+    explanation: StoredExplanation | None,
+    runs: Sequence[RecordedRun],
     week: Week,
 ) -> list[Change]:
-    """Everything that changed, the latest first."""
-    noted = [
-        Change(
-            "change",
-            origin + timedelta(days=one.interval[0]),
-            origin + timedelta(days=one.at),
-            _change_words(one, series[name].unit),
-            one.p_value,
-            week.holds(origin + timedelta(days=one.at)),
-        )
-        for name, every in found.items()
-        for one in every
-    ]
-    at = {run.run: run.at for run in runs if run.campaign == campaign}
-    for move in (explained or {}).get("changes", []):
-        if "target" in move and move["run"] in at:
-            words = f"ball {move['target']} moved by {move['size']:.1f} {move['unit']} (run {move['run']})"
-            moved = at[move["run"]]
-            noted.append(Change("change", None, moved, words, move["p_value"], week.holds(moved)))
+    """Everything that changed, the latest first; ``runs`` are those of the campaign that was explained."""
+    noted = []
+    for parameter in past.values():
+        for change in parameter.search.changes:
+            at = moment_of(change.at, parameter.series)
+            after = moment_of(change.interval[0], parameter.series)
+            sentence = _change_in_words(change, parameter.series.unit)
+            noted.append(Change("change", after, at, sentence, change.p_value, week.holds(at)))
+    starts = {run.run: run.local_start for run in runs}
+    for move in () if explanation is None else explanation.changes:
+        if move.target is not None and move.run in starts:
+            sentence = f"ball {move.target} moved by {move.size:.1f} {move.unit} (run {move.run})"
+            at = starts[move.run]
+            noted.append(Change("change", None, at, sentence, move.p_value, week.holds(at)))
     noted += [event_noted(event, week) for event in events]
-    return sorted(noted, key=lambda one: one.at, reverse=True)
+    return sorted(noted, key=lambda change: change.at, reverse=True)
 
 
-def event_noted(one: Event, week: Week) -> Change:
-    return Change("event", None, one.at, f"{one.kind}: {one.what}", None, week.holds(one.at))
+def event_noted(event: MachineEvent, week: Week) -> Change:
+    """An event as the page states it."""
+    at = event.at.replace(tzinfo=None)
+    return Change("event", None, at, f"{event.kind}: {event.description}", None, week.holds(at))
 
 
-def _change_words(one: Found, unit: str) -> str:
-    size, u = in_words(one.size, one.u, sign=True)
-    if one.kind == "step":
-        return f"{one.parameter} stepped by {size} {unit} (u = {u} {unit})"
-    if one.kind == "slope":
-        return f"{one.parameter} began to drift by {size} {unit} a day (u = {u} {unit} a day)"
-    return f"{one.parameter}: {one.kind} of {size} {unit} (u = {u} {unit})"
+def _change_in_words(change: FoundChange, unit: str) -> str:
+    size, u = in_words(change.size, change.u, sign=True)
+    if change.kind == "step":
+        return f"{change.parameter} stepped by {size} {unit} (u = {u} {unit})"
+    if change.kind == "slope":
+        return f"{change.parameter} began to drift by {size} {unit} a day (u = {u} {unit} a day)"
+    return f"{change.parameter}: {change.kind} of {size} {unit} (u = {u} {unit})"
 
 
-def conditions_of(here: list[PastRun]) -> tuple[ConditionRange, ...]:
-    names = sorted({name for run in here for name in run.conditions})
-    found = []
-    for name in names:
+def condition_ranges(runs: Sequence[RecordedRun]) -> tuple[ConditionRange, ...]:
+    """Every recorded condition over the runs of the week."""
+    ranges = []
+    for name in sorted({name for run in runs for name in run.conditions}):
         stem, _, suffix = name.rpartition("_")
         unit = COLUMN_UNITS.get(suffix) if stem else None
-        values = [run.conditions[name] for run in here if name in run.conditions]
-        words = (stem if unit else name).replace("_", " ")
-        found.append(
-            ConditionRange(words, unit.name if unit else "", min(values), float(np.mean(values)), max(values))
+        values = [run.conditions[name] for run in runs if name in run.conditions]
+        title = (stem if unit else name).replace("_", " ")
+        ranges.append(
+            ConditionRange(title, unit.name if unit else "", min(values), float(np.mean(values)), max(values))
         )
-    return tuple(found)
+    return tuple(ranges)
 
 
-def quality_of(
+def data_quality(
     db: Database,
-    here: list[PastRun],
-    explained: Document | None,
-    evaluated: Document | None,
+    runs: Sequence[RecordedRun],
+    explanation: StoredExplanation | None,
+    stated: StatedUncertainty | None,
     refused_imports: tuple[RefusedImport, ...],
-    remarks: list[str],
+    remarks: Sequence[str],
 ) -> DataQuality:
-    """What the data of the week's runs ``here`` are worth; without a result, what depends on it is empty."""
-    runs = {(run.campaign, run.run) for run in here}
-    counts = {
-        (campaign, run): count
-        for name in {run.campaign for run in here}
-        for campaign, run, count in db.rows(
-            "SELECT campaign, run, count(*) FROM v_probings WHERE campaign = ? GROUP BY ALL", [name]
+    """What the data of the week's ``runs`` are worth; without a result, what depends on it is empty."""
+    campaigns = sorted({run.campaign for run in runs})
+    counts = {name: probing_counts(db, name) for name in campaigns}
+    noticed = [note for name in campaigns for note in campaign_notes(db, name)]
+    measured = {(run.campaign, run.run) for run in runs}
+    suspect = (
+        ()
+        if explanation is None
+        else tuple(
+            f"run {point.run}, touch {point.sequence}, ball {point.target}: "
+            f"{point.axis} is off by {point.size_um:.1f} µm"
+            for point in explanation.suspect_data
+            if (explanation.campaign, point.run) in measured
         )
-    }
-    noticed = [note for name in sorted({run.campaign for run in here}) for note in campaign_notes(db, name)]
-    suspect = tuple(
-        f"run {one['run']}, touch {one['sequence']}, ball {one['target']}: "
-        f"{one['axis']} is off by {one['size_um']:.1f} µm"
-        for one in (explained or {}).get("suspect_data", [])
-        if ((explained or {}).get("campaign"), one["run"]) in runs
     )
     return DataQuality(
-        runs=len(here),
-        probings=sum(counts.get(one, 0) for one in runs),
-        warm_up_runs=sum(run.warm_up for run in here),
+        runs=len(runs),
+        probings=sum(counts[campaign].get(run, 0) for campaign, run in measured),
+        warm_up_runs=sum(run.warm_up for run in runs),
         suspect=suspect,
-        refused=tuple(
-            (", ".join(one["parameters"]), one["why"]) for one in (evaluated or {}).get("refused", [])
-        ),
-        blind_spots=tuple((explained or {}).get("blind_spots", [])),
+        refused=()
+        if stated is None
+        else tuple((", ".join(group.parameters), group.why) for group in stated.refused),
+        blind_spots=() if explanation is None else explanation.blind_spots,
         remarks=(*noticed, *remarks),
         refused_imports=refused_imports,
     )

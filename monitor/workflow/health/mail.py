@@ -9,7 +9,7 @@ from __future__ import annotations
 import smtplib
 import ssl
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from email.message import EmailMessage
 from email.utils import formatdate, make_msgid
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
+from monitor.workflow.health.request import ReportAnswer
 
 #: Port that goes with each kind of security (RFC 8314 section 3.3; RFC 6409; RFC 5321 section 4.5.4.2).
 PORTS = {"tls": 465, "starttls": 587, "none": 25}
@@ -34,6 +35,8 @@ _KEYS = {
     "to": list,
     "only_on_alarm": bool,
 }
+#: The section of the configuration file as TOML has it.
+Table = Mapping[str, Any]
 _LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
@@ -60,91 +63,109 @@ def read_mail_settings(path: Path) -> MailSettings:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path} is not TOML in UTF-8: {error}") from error
-    found = tables.get("mail")
-    if not isinstance(found, dict):
+    table = tables.get("mail")
+    if not isinstance(table, dict):
         raise InputError(f"{path} has no section [mail]")
-    faults = _faults(found)
+    faults = _faults(table)
     if faults:
         raise InputError("\n  ".join([f"{path} was refused:", *faults]))
-    security = found.get("security", "starttls")
-
-    def beside(key: str) -> Path | None:
-        """A file named in the configuration, which has to be there before the work and not only after it."""
-        if key not in found:
-            return None
-        place = path.parent / str(found[key])
-        try:
-            place.read_bytes()
-        except OSError as error:
-            raise InputError(f"{key} of {path}: {place} cannot be read: {error.strerror or error}") from error
-        return place
-
+    security = table.get("security", "starttls")
     return MailSettings(
-        server=found["server"],
-        port=found.get("port", PORTS[security]),
+        server=table["server"],
+        port=table.get("port", PORTS[security]),
         security=security,
-        user=found.get("user"),
-        password_file=beside("password_file"),
-        ca_file=beside("ca_file"),
-        sender=found["from"],
-        recipients=tuple(found["to"]),
-        only_on_alarm=found.get("only_on_alarm", False),
+        user=table.get("user"),
+        password_file=_file_beside(path, table, "password_file"),
+        ca_file=_file_beside(path, table, "ca_file"),
+        sender=table["from"],
+        recipients=tuple(table["to"]),
+        only_on_alarm=table.get("only_on_alarm", False),
     )
 
 
-def _faults(found: dict[str, Any]) -> list[str]:
-    faults = [f"[mail] has no key {key}; it has {', '.join(_KEYS)}" for key in found if key not in _KEYS]
-    faults += [f"[mail] lacks {key}" for key in ("server", "from", "to") if key not in found]
+def _file_beside(path: Path, table: Table, key: str) -> Path | None:
+    """A file named in the configuration, which has to be there before the work and not only after it."""
+    if key not in table:
+        return None
+    file = path.parent / str(table[key])
+    try:
+        file.read_bytes()
+    except OSError as error:
+        raise InputError(f"{key} of {path}: {file} cannot be read: {error.strerror or error}") from error
+    return file
+
+
+def _faults(table: Table) -> list[str]:
+    """Everything that is wrong or missing, each in words."""
+    faults = [f"[mail] has no key {key}; it has {', '.join(_KEYS)}" for key in table if key not in _KEYS]
+    faults += [f"[mail] lacks {key}" for key in ("server", "from", "to") if key not in table]
     for key, kind in _KEYS.items():
-        if key in found and (not isinstance(found[key], kind) or (kind is int and found[key] is True)):
-            faults.append(f"{key} must be a {kind.__name__}, but is {found[key]!r}")
-    if found.get("security", "starttls") not in PORTS:
-        faults.append(f"security is one of {', '.join(PORTS)}, not {found['security']!r}")
-    if isinstance(found.get("port"), int) and not 1 <= found["port"] <= 65535:
-        faults.append(f"port is a number from 1 to 65535, not {found['port']}")
-    lines = [(key, found.get(key)) for key in ("server", "from", "user")]
-    lines += [("to", one) for one in found["to"]] if isinstance(found.get("to"), list) else []
-    for key, line in lines:
-        # A line feed in an address would begin another line of the message's head.
-        if isinstance(line, str) and not (line.strip() and line.isprintable()):
-            faults.append(f"{key} is one line of visible letters, not {line!r}")
-    addresses = found.get("to")
+        if key in table and (not isinstance(table[key], kind) or (kind is int and table[key] is True)):
+            faults.append(f"{key} must be a {kind.__name__}, but is {table[key]!r}")
+    return [*faults, *_faults_of_connection(table), *_faults_of_lines(table), *_faults_of_password(table)]
+
+
+def _faults_of_connection(table: Table) -> list[str]:
+    faults = []
+    if table.get("security", "starttls") not in PORTS:
+        faults.append(f"security is one of {', '.join(PORTS)}, not {table['security']!r}")
+    if isinstance(table.get("port"), int) and not 1 <= table["port"] <= 65535:
+        faults.append(f"port is a number from 1 to 65535, not {table['port']}")
+    return faults
+
+
+def _faults_of_lines(table: Table) -> list[str]:
+    """What is wrong with the texts that stand in the head of a message."""
+    addresses = table.get("to")
+    lines = [(key, table.get(key)) for key in ("server", "from", "user")]
+    lines += [("to", address) for address in addresses] if isinstance(addresses, list) else []
+    # A line feed in an address would begin another line of the message's head.
+    faults = [
+        f"{key} is one line of visible letters, not {line!r}"
+        for key, line in lines
+        if isinstance(line, str) and not (line.strip() and line.isprintable())
+    ]
     if isinstance(addresses, list) and not (
-        addresses and all(isinstance(one, str) and "@" in one for one in addresses)
+        addresses and all(isinstance(address, str) and "@" in address for address in addresses)
     ):
         faults.append('to is a list of addresses, for example ["maintenance@example.org"]')
-    if ("user" in found) != ("password_file" in found):
+    return faults
+
+
+def _faults_of_password(table: Table) -> list[str]:
+    faults = []
+    if ("user" in table) != ("password_file" in table):
         faults.append("user and password_file go together")
-    if "user" in found and found.get("security") == "none" and found.get("server") not in _LOOPBACK:
+    if "user" in table and table.get("security") == "none" and table.get("server") not in _LOOPBACK:
         faults.append("a password is not sent unencrypted: set security to tls or starttls")
     return faults
 
 
-def message_of(settings: MailSettings, report: dict[str, Any]) -> EmailMessage:
+def message_of(settings: MailSettings, report: ReportAnswer) -> EmailMessage:
     """The e-mail of a report's document: the fleet table as text, the PDF files attached."""
-    alarms = report["alarms"]
+    alarms = report.alarms
     message = EmailMessage()
-    quiet = "no alarm" if report["measured"] else "no machine was measured"
-    message["Subject"] = f"Machine health {report['week']}: " + (
+    quiet = "no alarm" if report.measured else "no machine was measured"
+    message["Subject"] = f"Machine health {report.week}: " + (
         f"{len(alarms)} alarm{'s' if len(alarms) != 1 else ''}" if alarms else quiet
     )
     message["From"] = settings.sender
     message["To"] = ", ".join(settings.recipients)
     message["Date"] = formatdate()
     message["Message-ID"] = make_msgid(domain=settings.sender.rpartition("@")[2].rstrip(">") or None)
-    lines = [f"Week {report['week']}, {report['from']} to {report['to']}", ""]
-    for one in report["machines"]:
-        p = one["probability_out"]
+    lines = [f"Week {report.week}, {report.from_} to {report.to}", ""]
+    for row in report.machines:
+        p = row.probability_out
         out = "" if p is None else f", probability out of tolerance {p:.2g}"
         lines += [
-            f"{one['machine']}: {one['state']}{out}",
-            f"  {one['changed']}; next check {one['next_check']}",
+            f"{row.machine}: {row.state}{out}",
+            f"  {row.changed}; next check {row.next_check}",
         ]
-    if report["message"]:
-        lines += ["", report["message"]]
+    if report.message:
+        lines += ["", report.message]
     room = LARGEST_BYTES
     attached: list[tuple[str, bytes]] = []
-    for file in (Path(name) for name in report["files"] if name.endswith(".pdf")):
+    for file in (Path(name) for name in report.files if name.endswith(".pdf")):
         size = file.stat().st_size
         if size <= room:
             room -= size
@@ -159,7 +180,7 @@ def message_of(settings: MailSettings, report: dict[str, Any]) -> EmailMessage:
 
 def send(settings: MailSettings, message: EmailMessage) -> Sequence[str]:
     """Hand a message to the server; the addresses that it took. Raises InputError saying what the server said."""
-    place = f"{settings.server}:{settings.port}"
+    address = f"{settings.server}:{settings.port}"
     try:
         context = ssl.create_default_context(cafile=settings.ca_file)
         if settings.security == "tls":
@@ -175,27 +196,31 @@ def send(settings: MailSettings, message: EmailMessage) -> Sequence[str]:
                 server.login(settings.user, settings.password_file.read_text(encoding="utf-8").strip())
             refused = server.send_message(message)
     except smtplib.SMTPResponseException as error:
-        said = (
+        reply = (
             error.smtp_error.decode(errors="replace")
             if isinstance(error.smtp_error, bytes)
             else error.smtp_error
         )
-        raise InputError(f"the mail server {place} refused the message: {error.smtp_code} {said}") from error
+        raise InputError(
+            f"the mail server {address} refused the message: {error.smtp_code} {reply}"
+        ) from error
     except smtplib.SMTPRecipientsRefused as error:
-        raise InputError(f"the mail server {place} took none of {', '.join(error.recipients)}") from error
+        raise InputError(f"the mail server {address} took none of {', '.join(error.recipients)}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"the password file {settings.password_file} is not UTF-8; save it so") from error
     except (smtplib.SMTPException, OSError, UnicodeError) as error:
         why = getattr(error, "strerror", None) or error
-        raise InputError(f"the mail server {place} could not be used: {why}") from error
+        raise InputError(f"the mail server {address} could not be used: {why}") from error
     if refused:
-        raise InputError(f"the mail server {place} refused {', '.join(refused)}; the others have the message")
+        raise InputError(
+            f"the mail server {address} refused {', '.join(refused)}; the others have the message"
+        )
     return settings.recipients
 
 
-def mail_report(path: Path, report: dict[str, Any]) -> list[str]:
+def mail_report(path: Path, report: ReportAnswer) -> tuple[str, ...]:
     """Send a report as a configuration file says; the addresses it went to (none where only alarms are sent)."""
     settings = read_mail_settings(path)
-    if settings.only_on_alarm and not report["alarms"]:
-        return []
-    return list(send(settings, message_of(settings, report)))
+    if settings.only_on_alarm and not report.alarms:
+        return ()
+    return tuple(send(settings, message_of(settings, report)))

@@ -2,81 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
 
-from monitor.documents import from_document
-from monitor.reporting.health.comparison import (
-    ErrorStep,
-    MissingEffect,
-    ModelHealth,
-    ResidualAgainst,
-    ResidualMap,
-)
-from monitor.workflow.history.health_history import Span, plain
+import numpy as np
 
-Document = dict[str, Any]
+from monitor.reporting.health.comparison import ErrorStep, MissingEffect, ModelHealth
+from monitor.workflow.health.runs import Span
+from monitor.workflow.health.stored import StoredExplanation, VersionError
 
 
-def model_of(explained: Document | None, history: list[Document], span: Span) -> ModelHealth | None:
+def model_health(
+    explanation: StoredExplanation | None, versions: Sequence[VersionError], span: Span
+) -> ModelHealth | None:
     """The comparison, which is of the runs of ``span``: their number and days are said with it.
 
-    ``history`` has the versions of the model (empty where there is one only).
+    ``versions`` of the model are empty where there is one only.
     """
-    if explained is None:
+    if explanation is None:
         return None
     return ModelHealth(
-        campaign=explained["campaign"],
-        runs=_runs_in_words(explained["campaign"], span),
-        model=explained["model"],
-        verdict=explained["verdict"],
-        answer=explained["answer"],
-        rms_um=explained["rms_um"],
-        repeatability_um=plain(explained["repeatability_um"]),
-        lack_of_fit_f=plain(explained["lack_of_fit"]["f"]),
-        lack_of_fit_p=plain(explained["lack_of_fit"]["p"]),
+        campaign=explanation.campaign,
+        runs=_runs_in_words(explanation.campaign, span),
+        model=explanation.model,
+        verdict=explanation.verdict,
+        answer=explanation.answer,
+        rms_um=explanation.rms_um,
+        repeatability_um=_finite(explanation.repeatability_um),
+        lack_of_fit_f=_finite(explanation.lack_of_fit.f),
+        lack_of_fit_p=_finite(explanation.lack_of_fit.p),
         missing=tuple(
             MissingEffect(
-                one["effect"],
-                one["meaning"],
-                one["cause"],
-                one["remedy"],
-                plain(one["peak_um"]),
-                plain(one["rms_before_um"]),
-                plain(one["rms_after_um"]),
-                tuple(one["indistinguishable_from"]),
+                effect.effect,
+                effect.meaning,
+                effect.cause,
+                effect.remedy,
+                _finite(effect.peak_um),
+                _finite(effect.rms_before_um),
+                _finite(effect.rms_after_um),
+                effect.indistinguishable_from,
             )
-            for one in explained["missing"]
+            for effect in explanation.missing
         ),
-        stated_um=explained["stated_uncertainty_um"],
-        where=None
-        if explained["residual_map"] is None
-        else from_document(ResidualMap, explained["residual_map"]),
-        against=_against(explained["residual_against"]),
-        steps=tuple(_steps(explained, history)),
+        stated_um=explanation.stated_uncertainty_um,
+        where=explanation.residual_map,
+        against=explanation.residual_against,
+        steps=tuple(_steps(explanation, versions)),
     )
 
 
-def _against(found: Document | None) -> ResidualAgainst | None:
-    return None if found is None else from_document(ResidualAgainst, found)
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)
 
 
-def _steps(explained: Document, history: list[Document]) -> Iterator[ErrorStep]:
+def _steps(explanation: StoredExplanation, versions: Sequence[VersionError]) -> Iterator[ErrorStep]:
     """The error from the method's own model on: what was added, and what adding the missing effects would give."""
-    for one in history:
-        changed = [f"+ {text}" for text in (one["added"] or "").split(" + ") if text]
-        changed += [f"\N{MINUS SIGN} {text}" for text in (one["removed"] or "").split(" + ") if text]
+    for version in versions:
+        changed = [f"+ {text}" for text in (version.added or "").split(" + ") if text]
+        changed += [f"\N{MINUS SIGN} {text}" for text in (version.removed or "").split(" + ") if text]
         yield ErrorStep(
-            f"{one['model']}: {' '.join(changed) or 'as it is'}", one["rms_um"], one["heldout_rms_um"], False
+            f"{version.model}: {' '.join(changed) or 'as it is'}",
+            version.rms_um,
+            version.heldout_rms_um,
+            proposed=False,
         )
-    missing = explained["missing"]
-    if missing and not history:
+    missing = explanation.missing
+    if missing and not versions:
         first = missing[0]
         yield ErrorStep(
-            f"{explained['model']}: as it is", first["rms_before_um"], first["heldout_before_um"], False
+            f"{explanation.model}: as it is", first.rms_before_um, first.heldout_before_um, proposed=False
         )
-    for one in missing:
-        yield ErrorStep(f"+ {one['effect']}", one["rms_after_um"], one["heldout_after_um"], True)
+    for effect in missing:
+        yield ErrorStep(f"+ {effect.effect}", effect.rms_after_um, effect.heldout_after_um, proposed=True)
 
 
 def _runs_in_words(campaign: str, span: Span) -> str:

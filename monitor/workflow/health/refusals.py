@@ -11,15 +11,22 @@ from monitor.workflow.health.weeks import Week
 
 def refused_of(db: Database, machine: str, week: Week) -> tuple[RefusedImport, ...]:
     """What was refused of one machine in a week."""
-    return tuple(_told(one) for one in refusals(db, week.begins, week.ends) if one.machine == machine)
+    return tuple(
+        _stated(refusal) for refusal in refusals(db, week.begins, week.ends) if refusal.machine == machine
+    )
 
 
 def refused_elsewhere(db: Database, machines: Collection[str], week: Week) -> tuple[RefusedImport, ...]:
     """What was refused in a week of none of the ``machines`` that the database knows."""
-    return tuple(_told(one) for one in refusals(db, week.begins, week.ends) if one.machine not in machines)
-
-
-def _told(one: StoredRefusal) -> RefusedImport:
-    return RefusedImport(
-        one.at, one.folder, one.campaign, one.machine, one.fault_count, one.faults, one.cleared_at
+    return tuple(
+        _stated(refusal)
+        for refusal in refusals(db, week.begins, week.ends)
+        if refusal.machine not in machines
     )
+
+
+def _stated(refusal: StoredRefusal) -> RefusedImport:
+    return RefusedImport(
+        refusal.at, refusal.folder, refusal.campaign, refusal.machine, refusal.fault_count, refusal.faults,
+        refusal.cleared_at,
+    )  # fmt: skip

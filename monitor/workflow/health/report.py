@@ -1,7 +1,7 @@
 """The weekly health report: the state of every machine is found and stored, then HTML and PDF are written from that.
 
 A few machines are held at a time: a record is stored as it is found, and read again when its page is written. What is
-to be computed, and the PDF, may be spread over processes (``health_work``); this one alone has the database.
+to be computed, and the PDF, may be spread over processes (``task``); this one alone has the database.
 """
 
 from __future__ import annotations
@@ -14,26 +14,31 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from datetime import UTC, date, datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from monitor import __version__
 from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
 from monitor.reporting.health.records import ALARMS, Fleet, FleetRow, MachineHealth, by_urgency, fleet_row
 from monitor.reporting.health.render import MACHINES_A_PART, health_html, health_pdf
-from monitor.store import Database, list_machines, save_analysis
+from monitor.store import (
+    Database,
+    analysis_text,
+    campaign_machines,
+    check_campaigns,
+    machine_descriptions,
+    save_analysis,
+)
 from monitor.store.catalogue import check_machine
 from monitor.uncertainty.engine import Engine, Here, in_order
 from monitor.uncertainty.processes import processes
 from monitor.workflow.certificate.files import why_not
-from monitor.workflow.health.machine import Begun, Settings, begun, machine_health
+from monitor.workflow.health.machine import MachineName, MachineWeek, machine_health, read_week
 from monitor.workflow.health.refusals import refused_elsewhere
+from monitor.workflow.health.request import ReportAnswer, ReportRequest
+from monitor.workflow.health.task import Task, computed
 from monitor.workflow.health.weeks import Week, week_before, week_named
-from monitor.workflow.health.work import Work, computed
-from monitor.workflow.history.health_history import check_campaigns, makers
-from monitor.workflow.intake.campaigns import records
 
-Document = dict[str, Any]
 KIND = "health"
 #: Processes by default: at most so many (each needs up to 0.7 GB while it writes a part of the PDF), and one for so
 #: many machines, since a process starts in the time in which a machine or two are computed.
@@ -42,115 +47,112 @@ MACHINES_A_WORKER = 4
 
 
 def report(
-    db: Database,
-    week: str | None = None,
-    machine: str | None = None,
-    out: Path | None = None,
-    *,
-    settings: Settings | None = None,
-    made_at: datetime | None = None,
-    progress: Callable[[str], None] = lambda name: None,
-    workers: int | None = None,
-) -> Document:
+    db: Database, request: ReportRequest, *, progress: Callable[[str], None] = lambda name: None
+) -> ReportAnswer:
     """Find, store and write the state of one machine or of all at the end of a week.
 
-    ``week`` like ``2026-W10``, by default the last that has ended. Files go to ``out`` (made where there is
-    none, by default the working directory). ``workers`` processes compute, by default as many as there are cores and
-    the fleet occupies; the results do not depend on it. Raises InputError for a week that is none, NotFoundError for a
-    machine or campaign that is not there.
+    ``progress`` is told the name of every machine that is done. Raises InputError for a week that is none,
+    NotFoundError for a machine or campaign that is not there.
     """
+    made_at, options = request.made_at, request.options
     today = date.today() if made_at is None else made_at.date()
-    chosen = week_named(week) if week else week_before(today)
-    if chosen.first > today:
+    week = week_named(request.week) if request.week else week_before(today)
+    if week.first > today:
         raise InputError(
-            f"--week {chosen.name} begins on {chosen.first}, and today is {today}: nothing can be said of it"
+            f"--week {week.name} begins on {week.first}, and today is {today}: nothing can be said of it"
         )
-    own = settings or Settings()
-    if not 0.0 < own.risk < 1.0:
-        raise InputError(f"the probability that alarms must lie between 0 and 1, not {own.risk}")
+    every = _machines(db)
+    machines = _selected(db, every, request)
+    try:
+        request.out.mkdir(parents=True, exist_ok=True)  # before minutes of computing
+    except OSError as error:
+        raise InputError(
+            f"the report cannot be written to {request.out}: {why_not(request.out, error)}"
+        ) from error
+    moment = (made_at or datetime.now(UTC)).replace(tzinfo=None, microsecond=0)
+    with _engine(request.workers, len(machines)) as engine:
+        rows = _reported(db, machines, week, request, engine, progress)
+        fleet = Fleet(
+            week.name, week.first, week.last, moment, f"machine-health-monitor {__version__}", options.risk,
+            tuple(row for row, _ in rows),
+            refused_elsewhere(db, {name.machine for name in every}, week),
+            ended=today > week.last,
+        )  # fmt: skip
+        files = _write(db, fleet, [number for _, number in rows], request, engine)
+    return _answer(fleet, week, files)
+
+
+def _machines(db: Database) -> list[MachineName]:
+    """Every machine that counts, by name."""
+    machines = []
+    for machine in machine_descriptions(db):
+        maker = " ".join(text for text in (machine.manufacturer, machine.model) if text)
+        serial = f"serial number {machine.serial_number}" if machine.serial_number else ""
+        description = ", ".join(part for part in (maker, serial, f"chain {machine.topology}") if part)
+        machines.append(MachineName(machine.machine, description, machine.location))
+    return machines
+
+
+def _selected(db: Database, every: list[MachineName], request: ReportRequest) -> list[MachineName]:
+    """The machines of the report. Raises NotFoundError and InputError for names that do not go together."""
+    machine, campaigns = request.machine, request.options.campaigns
     if machine is not None:
         check_machine(db, machine)
-    check_campaigns(db, own.campaigns)
-    measured_by = makers(db, own.campaigns)
-    if machine is not None and measured_by is not None and machine not in measured_by:
+    check_campaigns(db, campaigns)
+    if not campaigns:
+        return [name for name in every if machine in (None, name.machine)]
+    machine_of = campaign_machines(db)
+    measured = {machine_of[campaign] for campaign in campaigns}
+    if machine is not None and machine not in measured:
         raise InputError(
-            f"machine {machine} has none of the campaigns chosen ({', '.join(own.campaigns)}); "
-            f"they are of {', '.join(sorted(measured_by))}"
+            f"machine {machine} has none of the campaigns chosen ({', '.join(campaigns)}); "
+            f"they are of {', '.join(sorted(measured))}"
         )
-    chosen_machines = [
-        known
-        for known in records(list_machines(db))
-        if machine in (None, str(known["machine"]))
-        and (measured_by is None or str(known["machine"]) in measured_by)
-    ]
-    try:
-        (out or Path()).mkdir(parents=True, exist_ok=True)  # before minutes of computing
-    except OSError as error:
-        raise InputError(f"the report cannot be written to {out}: {why_not(out or Path(), error)}") from error
-    now = (made_at or datetime.now(UTC)).replace(tzinfo=None, microsecond=0)
-    with _engine(workers, len(chosen_machines)) as engine:
-        rows = _found(db, chosen_machines, chosen, own, engine, progress)
-        fleet = Fleet(
-            chosen.name, chosen.first, chosen.last, now, f"machine-health-monitor {__version__}", own.risk,
-            tuple(row for row, _ in rows),
-            refused_elsewhere(db, {str(known["machine"]) for known in records(list_machines(db))}, chosen),
-            ended=today > chosen.last,
-        )  # fmt: skip
-        files = _write(db, fleet, [number for _, number in rows], out or Path(), machine, engine)
-    return _document(fleet, chosen, files)
+    return [name for name in every if machine in (None, name.machine) and name.machine in measured]
 
 
 def _engine(workers: int | None, machines: int) -> AbstractContextManager[Engine]:
     """Where to compute: no more processes than machines, and none beside this one where it would be the only one."""
-    if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers}: at least one worker is needed")
     if workers is None:
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         workers = min(cores, MOST_WORKERS, machines // MACHINES_A_WORKER)
-    wanted = min(workers, machines)
-    return nullcontext(Here()) if wanted <= 1 else processes(wanted)
+    count = min(workers, machines)
+    return nullcontext(Here()) if count <= 1 else processes(count)
 
 
-def _found(
+def _reported(
     db: Database,
-    machines: list[Document],
+    machines: list[MachineName],
     week: Week,
-    settings: Settings,
+    request: ReportRequest,
     engine: Engine,
     progress: Callable[[str], None],
 ) -> list[tuple[FleetRow, int]]:
     """The machines' lines by urgency, each with the number of its stored record."""
-    in_hand: deque[Begun] = deque()
+    in_hand: deque[MachineWeek] = deque()
 
-    def works() -> Iterator[tuple[Work | None]]:
-        for known in machines:
-            one = begun(
-                db, str(known["machine"]), _description(known), str(known["location"] or ""), week, settings
-            )
-            in_hand.append(one)
-            yield (one.work,)
+    def tasks() -> Iterator[tuple[Task | None]]:
+        for name in machines:
+            past = read_week(db, name, week, request.options)
+            in_hand.append(past)
+            yield (past.task,)
 
     rows = []
-    for done in in_order(engine, computed, works()):
+    for result in in_order(engine, computed, tasks()):
         past = in_hand.popleft()
-        progress(past.machine)
-        found = machine_health(db, past, done)
+        progress(past.name.machine)
+        health = machine_health(db, past, result)
         number = save_analysis(
-            db, KIND, to_document(found), method=f"{week.name}, alarm above {settings.risk:g}",
-            machine=past.machine,
+            db, KIND, to_document(health), method=f"{week.name}, alarm above {request.options.risk:g}",
+            machine=past.name.machine,
         )  # fmt: skip
-        rows.append((fleet_row(found), number))
+        rows.append((fleet_row(health), number))
     return sorted(rows, key=lambda row: by_urgency(row[0]))
 
 
 def stored_health(db: Database, number: int) -> MachineHealth:
     """The record of a machine as it was stored."""
-    return _record(_text(db, number))
-
-
-def _text(db: Database, number: int) -> str:
-    ((text,),) = db.rows("SELECT document FROM v_analyses WHERE analysis_id = ?", [number])
-    return str(text)
+    return _record(analysis_text(db, number))
 
 
 def _record(text: str) -> MachineHealth:
@@ -163,26 +165,28 @@ def _pdf(fleet: Fleet, texts: list[str], part: int, parts: int) -> bytes:
 
 
 def _write(
-    db: Database, fleet: Fleet, numbers: list[int], out: Path, machine: str | None, engine: Engine
+    db: Database, fleet: Fleet, numbers: list[int], request: ReportRequest, engine: Engine
 ) -> list[str]:
-    stem = f"health-{fleet.week}" + (
-        "" if machine is None else "-" + "".join(sign if sign.isalnum() or sign in "-_." else "_" for sign in machine)
-    )  # fmt: skip
+    """Write HTML and PDF, the latter in parts; the files."""
+    out = request.out
+    stem = f"health-{fleet.week}"
+    if request.machine is not None:
+        stem += "-" + "".join(sign if sign.isalnum() or sign in "-_." else "_" for sign in request.machine)
     page = out / f"{stem}.html"
     parts = max(1, -(-len(numbers) // MACHINES_A_PART))
     files = [page]
     try:
         with _becoming(page) as stream:
-            for piece in health_html(fleet, _stored(db, numbers)):
+            for piece in health_html(fleet, (stored_health(db, number) for number in numbers)):
                 stream.write(piece.encode("utf-8"))
         # Of nearly the same length, so that no worker waits for another.
-        ends = [len(numbers) * place // parts for place in range(parts + 1)]
+        ends = [len(numbers) * part // parts for part in range(parts + 1)]
         tasks = (
-            (fleet, [_text(db, number) for number in numbers[first:end]], place, parts)
-            for place, (first, end) in enumerate(pairwise(ends), start=1)
+            (fleet, [analysis_text(db, number) for number in numbers[first:end]], part, parts)
+            for part, (first, end) in enumerate(pairwise(ends), start=1)
         )
-        for place, pdf in enumerate(in_order(engine, _pdf, tasks), start=1):
-            path = out / (f"{stem}.pdf" if parts == 1 else f"{stem}-part-{place}-of-{parts}.pdf")
+        for part, pdf in enumerate(in_order(engine, _pdf, tasks), start=1):
+            path = out / (f"{stem}.pdf" if parts == 1 else f"{stem}-part-{part}-of-{parts}.pdf")
             with _becoming(path) as stream:
                 stream.write(pdf)
             files.append(path)
@@ -205,30 +209,19 @@ def _becoming(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
-def _stored(db: Database, numbers: list[int]) -> Iterator[MachineHealth]:
-    for number in numbers:
-        yield stored_health(db, number)
-
-
-def _description(known: Document) -> str:
-    maker = " ".join(str(known[key]) for key in ("manufacturer", "machine_model") if known[key])
-    serial = f"serial number {known['serial_number']}" if known["serial_number"] else ""
-    return ", ".join(part for part in (maker, serial, f"chain {known['topology']}") if part)
-
-
-def _document(fleet: Fleet, week: Week, files: list[str]) -> Document:
+def _answer(fleet: Fleet, week: Week, files: list[str]) -> ReportAnswer:
     measured = sum(row.state != "not measured" for row in fleet.rows)
-    return {
-        "week": week.name,
-        "from": week.first.isoformat(),
-        "to": week.last.isoformat(),
-        "machines": [to_document(row) for row in fleet.rows],
-        "measured": measured,
-        "ended": fleet.ended,
-        "alarms": [row.machine for row in fleet.rows if row.state in ALARMS],
-        "refused_imports": [to_document(one) for one in fleet.refused_imports],
-        "message": ""
+    return ReportAnswer(
+        week=week.name,
+        from_=week.first.isoformat(),
+        to=week.last.isoformat(),
+        machines=fleet.rows,
+        measured=measured,
+        ended=fleet.ended,
+        alarms=tuple(row.machine for row in fleet.rows if row.state in ALARMS),
+        refused_imports=fleet.refused_imports,
+        message=""
         if measured
         else f"No machine was measured in week {week.name} ({week.first} to {week.last}).",
-        "files": files,
-    }
+        files=tuple(files),
+    )

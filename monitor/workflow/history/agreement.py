@@ -7,136 +7,165 @@ campaign before a recorded event with the first after it, of the same method.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from enum import Enum
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from monitor.documents import OMITTED
 from monitor.statistics.normalised_error import K, normalised_error, result_of_runs
-from monitor.store import Database, MachineHistory, latest_documents
-
-Document = dict[str, Any]
+from monitor.store import Database, MachineEvent, MachineHistory, latest_documents
 
 
-@dataclass(frozen=True)
-class Moment:
-    """A recorded event: ``at`` in seconds since 1970."""
+class PairKind(Enum):
+    """Why two results are compared."""
 
-    at: float
-    kind: str
-    description: str
+    METHODS = "methods"
+    EVENT = "event"
 
 
 @dataclass(frozen=True)
-class _Pair:
-    """Two campaigns to be compared, with what is said of them; ``before`` and ``after`` (n,) choose their runs."""
+class ParameterAgreement:
+    """A parameter of two results, in ``unit``: their difference, its expanded uncertainty, and E_n."""
 
-    first: str
-    second: str
-    head: Document
+    unit: str
+    first: float
+    u_first: float
+    second: float
+    u_second: float
+    difference: float
+    expanded: float
+    k: float
+    e_n: float
+    agree: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgreementPair:
+    """Two results with E_n of every parameter that both have; ``disagree`` names those beyond their uncertainties.
+
+    Two ``methods``; or one ``method`` before and after an ``event``.
+    """
+
+    kind: PairKind
+    methods: tuple[str, str] | None = field(default=None, metadata=OMITTED)
+    event: str | None = field(default=None, metadata=OMITTED)
+    description: str | None = field(default=None, metadata=OMITTED)
+    method: str | None = field(default=None, metadata=OMITTED)
+    campaigns: tuple[str, str]
+    parameters: Mapping[str, ParameterAgreement]
+    disagree: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """A pair without its numbers; ``before`` and ``after`` (n,) select the runs of its campaigns."""
+
+    pair: AgreementPair
     before: npt.NDArray[np.bool_] | None = None
     after: npt.NDArray[np.bool_] | None = None
 
 
-def agreement(db: Database, history: MachineHistory, events: Sequence[Moment]) -> list[Document]:
-    """The pairs of results of a machine, each with E_n of every parameter that both have.
+def agreement(
+    db: Database, history: MachineHistory, events: Sequence[MachineEvent]
+) -> tuple[AgreementPair, ...]:
+    """Compare the results of a machine that should agree, or should not.
 
     The uncertainty of a result is that of its identification or, where it is larger, the one that was evaluated for
     its campaign (the latest `monitor uncertainty`), and the scatter of its runs.
     """
-    every = list(_pairs(history, events))
+    comparisons = list(_comparisons(history, events))
     # Of years of campaigns few are compared: only their results are read.
-    compared = {name for one in every for name in (one.first, one.second)}
-    history = _with(history, _evaluated(db, history, compared))
-    found = [_pair(history, one) for one in every]
-    return [one for one in found if one["parameters"]]
+    names = {name for comparison in comparisons for name in comparison.pair.campaigns}
+    history = _with_stated(history, _stated_uncertainties(db, history, names))
+    pairs = [_compared(history, comparison) for comparison in comparisons]
+    return tuple(pair for pair in pairs if pair.parameters)
 
 
-def _pairs(history: MachineHistory, events: Sequence[Moment]) -> Iterator[_Pair]:
+def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Iterator[_Comparison]:
     latest: dict[str, str] = {}
     for campaign, method in zip(history.campaign.tolist(), history.method.tolist(), strict=True):
         latest[method] = campaign  # runs are in the order of time
     for first, second in combinations(latest, 2):
-        yield _Pair(latest[first], latest[second], {"kind": "methods", "methods": [first, second]})
+        yield _Comparison(
+            AgreementPair(
+                kind=PairKind.METHODS, methods=(first, second), campaigns=(latest[first], latest[second]),
+                parameters={}, disagree=(),
+            )
+        )  # fmt: skip
     seconds = history.seconds
     for event in events:
         for method in latest:
-            own = history.method == method
-            before, after = own & (seconds < event.at), own & (seconds >= event.at)
+            of_method = history.method == method
+            before = of_method & (seconds < event.at.timestamp())
+            after = of_method & (seconds >= event.at.timestamp())
             if before.any() and after.any():
-                head = {
-                    "kind": "event",
-                    "event": event.kind,
-                    "description": event.description,
-                    "method": method,
-                }
                 # A campaign that the event cuts in two is compared with itself: its runs before, its runs after.
-                first, second = history.campaign[before][-1], history.campaign[after][0]
-                yield _Pair(first, second, head, before, after)
+                campaigns = (str(history.campaign[before][-1]), str(history.campaign[after][0]))
+                pair = AgreementPair(
+                    kind=PairKind.EVENT, event=event.kind, description=event.description, method=method,
+                    campaigns=campaigns, parameters={}, disagree=(),
+                )  # fmt: skip
+                yield _Comparison(pair, before, after)
 
 
-def _evaluated(
+def _stated_uncertainties(
     db: Database, history: MachineHistory, campaigns: Collection[str]
 ) -> Mapping[str, Mapping[str, float]]:
     """Standard uncertainties, in display units, of the latest `monitor uncertainty` of the campaigns that have one."""
-    wanted = {number: name for number, name in history.campaigns.items() if name in campaigns}
-    found = latest_documents(db, "uncertainty", wanted)
-    return {campaign: document["guf"]["u"] for campaign, document in found.items()}
+    numbers = {number: name for number, name in history.campaigns.items() if name in campaigns}
+    stored = latest_documents(db, "uncertainty", numbers)
+    return {campaign: document["guf"]["u"] for campaign, document in stored.items()}
 
 
-def _with(history: MachineHistory, stated: Mapping[str, Mapping[str, float]]) -> MachineHistory:
+def _with_stated(history: MachineHistory, stated: Mapping[str, Mapping[str, float]]) -> MachineHistory:
     u = history.u.copy()
-    for campaign, of in stated.items():
+    for campaign, of_parameter in stated.items():
         rows = history.campaign == campaign
-        for place, name in enumerate(history.parameters):
-            u[rows, place] = np.fmax(u[rows, place], of.get(name, np.nan))
+        for column, name in enumerate(history.parameters):
+            u[rows, column] = np.fmax(u[rows, column], of_parameter.get(name, np.nan))
     return replace(history, u=u)
 
 
-def _pair(history: MachineHistory, pair: _Pair) -> Document:
-    parameters: Document = {}
-    for place, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
+def _compared(history: MachineHistory, comparison: _Comparison) -> AgreementPair:
+    first, second = comparison.pair.campaigns
+    parameters = {}
+    for column, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
         results = []
-        for campaign, side in ((pair.first, pair.before), (pair.second, pair.after)):
-            rows = (history.campaign == campaign) & np.isfinite(history.values[:, place])
-            rows &= np.isfinite(history.u[:, place])
+        for campaign, side in ((first, comparison.before), (second, comparison.after)):
+            rows = (history.campaign == campaign) & np.isfinite(history.values[:, column])
+            rows &= np.isfinite(history.u[:, column])
             if side is not None:
                 rows &= side
             if rows.any():
-                results.append(result_of_runs(history.values[rows, place], history.u[rows, place]))
+                results.append(result_of_runs(history.values[rows, column], history.u[rows, column]))
         if len(results) < 2 or results[0][1] + results[1][1] == 0.0:
             continue
         (x1, u1), (x2, u2) = results
-        one = normalised_error(x1, u1, x2, u2)
-        parameters[name] = {
-            "unit": unit, "first": x1, "u_first": u1, "second": x2, "u_second": u2,
-            "difference": float(one.difference[0]), "expanded": float(one.expanded[0]), "k": K,
-            "e_n": float(one.e_n[0]), "agree": bool(one.agree[0]),
-        }  # fmt: skip
-    return {
-        **pair.head,
-        "campaigns": [pair.first, pair.second],
-        "parameters": parameters,
-        "disagree": [name for name, one in parameters.items() if not one["agree"]],
-    }
+        error = normalised_error(x1, u1, x2, u2)
+        parameters[name] = ParameterAgreement(
+            unit, x1, u1, x2, u2, float(error.difference[0]), float(error.expanded[0]), K, float(error.e_n[0]),
+            bool(error.agree[0]),
+        )  # fmt: skip
+    disagree = tuple(name for name, result in parameters.items() if not result.agree)
+    return replace(comparison.pair, parameters=parameters, disagree=disagree)
 
 
-def sentence(pair: Document) -> str:
+def sentence(pair: AgreementPair) -> str:
     """A pair as a line for people."""
-    first, second = pair["campaigns"]
-    worst = max(pair["parameters"].items(), key=lambda one: abs(one[1]["e_n"]))
-    number = f"largest |E_n| {abs(worst[1]['e_n']):.2g} ({worst[0]})"
-    if pair["kind"] == "methods":
-        what = f"{pair['methods'][0]} ({first}) and {pair['methods'][1]} ({second})"
-        if not pair["disagree"]:
-            return f"{what} agree within their uncertainties in {', '.join(pair['parameters'])}: {number}"
-        return f"{what} disagree in {', '.join(pair['disagree'])}: {number}"
-    what = f"before and after the {pair['event']} ({first}, {second}; {pair['method']})"
+    first, second = pair.campaigns
+    worst, result = max(pair.parameters.items(), key=lambda named: abs(named[1].e_n))
+    number = f"largest |E_n| {abs(result.e_n):.2g} ({worst})"
+    if pair.methods is not None:
+        subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
+        if not pair.disagree:
+            return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}: {number}"
+        return f"{subject} disagree in {', '.join(pair.disagree)}: {number}"
     moved = ", ".join(
-        f"{name} {pair['parameters'][name]['first']:.3g} -> {pair['parameters'][name]['second']:.3g} "
-        f"{pair['parameters'][name]['unit']}"
-        for name in pair["disagree"]
+        f"{name} {pair.parameters[name].first:.3g} -> {pair.parameters[name].second:.3g} {pair.parameters[name].unit}"
+        for name in pair.disagree
     )
-    return f"{what}: {moved or 'nothing moved beyond the uncertainties'}; {number}"
+    subject = f"before and after the {pair.event} ({first}, {second}; {pair.method})"
+    return f"{subject}: {moved or 'nothing moved beyond the uncertainties'}; {number}"

@@ -1,69 +1,97 @@
-"""The history of a machine as series of its parameters, in the order of time: parts of `monitor trend`."""
+"""The history of a machine as a series for each parameter, in the order of time."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from datetime import timedelta
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from monitor.statistics import History
+from monitor.records import Array
 from monitor.store import MachineHistory
-from monitor.workflow.history.change_search import DAYS_FOR_MEANS
-from monitor.workflow.trend.control import Points
-from monitor.workflow.trend.parameter import Series
+from monitor.workflow.history.calendar import SECONDS_PER_DAY
 
-SECONDS_PER_DAY = 86400.0
+#: So many runs have to remain for those of a warming machine to be left out: fewer are not searched for changes.
+FEWEST_STEADY = 6
 
 
-def _days(history: MachineHistory) -> npt.NDArray[np.int64]:
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One parameter of one machine in the order of time.
+
+    ``values`` and ``u`` (n,) in ``unit``, ``t`` (n,) in days since 1970 (UTC), ``days`` (n,) numbers of the machine's
+    days, ``hour`` (n,) of the shop's clock, ``warm_up`` (n,) whether the machine was warming up; ``offset`` of the
+    shop's clock from UTC, that of the machine's last run.
+    """
+
+    name: str
+    unit: str
+    values: Array
+    u: Array
+    t: Array
+    days: npt.NDArray[np.int64]
+    hour: Array
+    warm_up: npt.NDArray[np.bool_]
+    offset: timedelta
+
+    def part(self, mask: npt.NDArray[np.bool_]) -> Series:
+        """The runs of a mask (n,)."""
+        if mask.all():
+            return self
+        return Series(
+            self.name, self.unit, self.values[mask], self.u[mask], self.t[mask], self.days[mask], self.hour[mask],
+            self.warm_up[mask], self.offset,
+        )  # fmt: skip
+
+    @cached_property
+    def day_count(self) -> int:
+        """Number of different days; their numbers mostly come in order."""
+        rises = np.diff(self.days)
+        if (rises < 0).any() or not len(self.days):
+            return len(np.unique(self.days))
+        return 1 + int((rises > 0).sum())
+
+    @cached_property
+    def steady(self) -> Series:
+        """The runs that are not marked warm_up, where enough are not: a warming machine is another matter."""
+        return self.part(_steady(self.warm_up))
+
+    def weights(self) -> Array | None:
+        """The uncertainties of the runs, None where a run has none (then all count alike)."""
+        return self.u if bool(np.isfinite(self.u).all() and (self.u > 0.0).all()) else None
+
+
+def _steady(warm_up: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Mask (n,) of the runs that count in the long view: not warming up, or all where few others remain."""
+    return ~warm_up if (~warm_up).sum() >= FEWEST_STEADY else np.ones(len(warm_up), dtype=np.bool_)
+
+
+def steady_runs(history: MachineHistory) -> npt.NDArray[np.bool_]:
+    """Mask (n,) of the runs of a machine that are not marked warm_up, all where few others remain."""
+    return _steady(history.warm_up)
+
+
+def day_numbers(history: MachineHistory) -> npt.NDArray[np.int64]:
     """Number (n,) of each run's day of its campaign, from 0 in the order of time."""
     numbers: dict[tuple[str, int], int] = {}
     pairs = zip(history.campaign.tolist(), history.day.tolist(), strict=True)
     return np.array([numbers.setdefault(pair, len(numbers)) for pair in pairs], dtype=np.int64)
 
 
-def all_series(history: MachineHistory) -> list[tuple[Series, npt.NDArray[np.bool_]]]:
-    """Each parameter with the runs that have it."""
+def parameter_series(history: MachineHistory) -> dict[str, tuple[Series, npt.NDArray[np.bool_]]]:
+    """Each parameter that a run has, with the mask (n,) of the runs that have it."""
     t = history.seconds / SECONDS_PER_DAY
-    days = _days(history)
+    days = day_numbers(history)
     hour = np.array([at.hour + at.minute / 60.0 for at in history.started_at])
     offset = (history.started_at[-1].utcoffset() if history.started_at else None) or timedelta()
-    found = []
+    series = {}
     for j, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
-        own = np.isfinite(history.values[:, j])
-        whole = Series(name, unit, history.values[:, j], history.u[:, j], t, days, hour, offset)
-        found.append((whole.part(own), own))
-    return found
-
-
-def piece_begins(series: Series, found: History | None, events: list[float]) -> float:
-    """When the present piece of history began: at the last event or change."""
-    moments = [at for at in events if at <= series.t[-1]]
-    moments += [one.at for one in found.changes] if found is not None else []
-    return max(moments, default=-np.inf)
-
-
-def steady_runs(series: Series, warm: npt.NDArray[np.bool_]) -> Series:
-    """The runs that are not marked warm_up, where six or more are not: a warming machine is another matter."""
-    return series.part(~warm) if (~warm).sum() >= 6 else series
-
-
-def points_of(history: MachineHistory, series: list[tuple[Series, npt.NDArray[np.bool_]]]) -> Points:
-    """Points of the charts: runs, or day means where there are enough days; runs of a warming machine left out."""
-    t = history.seconds / SECONDS_PER_DAY
-    offset = series[0][0].offset
-    keep = ~history.warm_up if (~history.warm_up).sum() >= 6 else np.ones(len(t), dtype=np.bool_)
-    labels = _days(history)[keep]
-    distinct, first, index = np.unique(labels, return_index=True, return_inverse=True)
-    if len(distinct) < DAYS_FOR_MEANS:
-        return Points(history.values[keep], t[keep], "runs", offset)
-    values = history.values[keep]
-    here = np.isfinite(values)
-    sums, counts = np.zeros((len(distinct), values.shape[1])), np.zeros((len(distinct), values.shape[1]))
-    np.add.at(sums, index, np.where(here, values, 0.0))
-    np.add.at(counts, index, here)
-    means = sums / np.where(counts > 0, counts, np.nan)
-    order = np.argsort(first, kind="stable")
-    moments = np.bincount(index, t[keep]) / np.bincount(index)
-    return Points(means[order], moments[order], "days", offset)
+        mask = np.isfinite(history.values[:, j])
+        whole = Series(
+            name, unit, history.values[:, j], history.u[:, j], t, days, hour, history.warm_up, offset
+        )
+        if mask.any():
+            series[name] = (whole.part(mask), mask)
+    return series

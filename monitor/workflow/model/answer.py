@@ -8,7 +8,7 @@ from datetime import datetime
 
 from monitor.documents import IN_UTC, INLINED
 from monitor.store import StoredModel
-from monitor.workflow.explain.versions import CurveVersion, MachineVersion
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 from monitor.workflow.models import label, label_of
 
 

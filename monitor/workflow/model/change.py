@@ -5,7 +5,8 @@ from __future__ import annotations
 from monitor.exceptions import InputError, NotFoundError
 from monitor.store import Database, StoredModel, list_models, save_model
 from monitor.workflow.explain.request import HistoryRequest
-from monitor.workflow.explain.versions import CurveVersion, MachineVersion, history
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.explain.versions import history
 from monitor.workflow.model.answer import ChangeModelAnswer
 from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest
 from monitor.workflow.model.show import shown

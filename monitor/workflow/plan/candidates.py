@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery import fit
 from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods import campaign_method
-from monitor.methods.chain.expected import candidate_touches, planned_context
-from monitor.methods.chain.planning import Candidates, Choice, TimeModel, more_balls, pose_grid
 from monitor.methods.chain.touch import TouchProblem
+from monitor.methods.planning.candidates import Candidates, Choice, TimeModel, more_balls, pose_grid
+from monitor.methods.planning.touches import candidate_touches, planned_context
 from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.workflow.models import as_model
@@ -25,9 +26,9 @@ STRETCH = 1.25
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedCampaign:
     """What a campaign's machine and artefact allow: everything that could be touched, and the ``present`` plan, that
-    of the first run. ``problem`` is one run, ``places`` (T, 3) mm where the targets are."""
+    of the first run. ``problem`` is one run, ``places`` (T, 3) mm are the nominal centres of the targets."""
 
     campaign: Campaign
     problem: TouchProblem
@@ -42,14 +43,14 @@ def strokes_of(
     """Positions that axes may take: of the rotary axes with a stroke in the file, and of all linear ones."""
     rotary: dict[str, tuple[float, float]] = {}
     linear: dict[str, tuple[float, float]] = {}
-    for place, joint in enumerate(chain.joints):
+    for index, joint in enumerate(chain.joints):
         settings = campaign.machine.axes.get(joint.name)
         stroke = None if settings is None else settings.stroke
         if stroke is not None:
             ends = sorted((joint.sign * stroke[0], joint.sign * stroke[1]))
             (rotary if joint.turns else linear)[joint.name] = (ends[0], ends[1])
         elif not joint.turns:
-            low, high = float(positions[:, place].min()), float(positions[:, place].max())
+            low, high = float(positions[:, index].min()), float(positions[:, index].max())
             middle, half = (low + high) / 2.0, (high - low) / 2.0 * STRETCH
             linear[joint.name] = (middle - half, middle + half)
     return rotary, linear
@@ -66,7 +67,7 @@ def _time_model(problem: TouchProblem, pose: Array) -> TimeModel:
     return TimeModel(probing, max(0.0, float(np.median(between)) - probing), "the times of this campaign")
 
 
-def _with_found_tip(problem: TouchProblem) -> TouchProblem:
+def _with_identified_tip(problem: TouchProblem) -> TouchProblem:
     """The problem with the stylus tip where the campaign's own readings put it, as far as they determine it."""
     solution = fit(problem).solution
     tips = np.where(solution.local_free[:, -3:].all(axis=0), solution.local[:, -3:].mean(axis=0), problem.tip)
@@ -74,54 +75,66 @@ def _with_found_tip(problem: TouchProblem) -> TouchProblem:
     return replace(problem, tip=(x, y, z))
 
 
-def planned(loaded: Campaign, stored: StoredModel, most_balls: int) -> Planned:
+def _first_run(problem: TouchProblem) -> TouchProblem:
+    """The problem of the first run alone."""
+    context = problem.context
+    first = context.run == problem.runs[0]
+    planned = planned_context(
+        context, context.positions[first], context.target[first].tolist(), context.nominal[first],
+        np.zeros(int(first.sum()), dtype=np.int64),
+    )  # fmt: skip
+    return replace(
+        problem,
+        context=replace(planned, time=context.time[first]),
+        sigma=problem.sigma[first],
+        distances=tuple(replace(distance, length=distance.length[:1]) for distance in problem.distances),
+    )
+
+
+def _indexations(problem: TouchProblem) -> tuple[Array, npt.NDArray[np.int64]]:
+    """The different indexations (P, J) of a run, linear axes at zero, and that of every row (n,)."""
+    context = problem.context
+    turning = np.array([joint.turns for joint in context.chain.joints])
+    rotary = np.round(np.where(turning, context.positions, 0.0), 6)
+    poses, pose = np.unique(rotary, axis=0, return_inverse=True)
+    return np.asarray(poses, dtype=np.float64), np.asarray(pose.ravel(), dtype=np.int64)
+
+
+def planned(campaign: Campaign, model: StoredModel, most_balls: int) -> PlannedCampaign:
     """The candidates of a campaign; where it has fewer than ``most_balls`` balls, places for more are added."""
-    problem = campaign_method(loaded).problem_of(loaded, as_model(stored))
-    if not isinstance(problem, TouchProblem):
+    whole = campaign_method(campaign).problem_of(campaign, as_model(model))
+    if not isinstance(whole, TouchProblem):
         raise DataError(
-            f"plan weighs where balls are touched, and campaign {loaded.name} was measured by {loaded.method}; what"
+            f"plan weighs where balls are touched, and campaign {campaign.name} was measured by {campaign.method}; what"
             " its plan cannot tell apart, identify names with what to do"
         )
-    problem = _with_found_tip(problem)
-    first = problem.context.run == problem.runs[0]
-    one = replace(
-        problem,
-        context=planned_context(
-            problem.context, problem.context.positions[first], problem.context.target[first].tolist(),
-            problem.context.nominal[first], np.zeros(int(first.sum()), dtype=np.int64),
-        ),
-        sigma=problem.sigma[first],
-        distances=tuple(replace(d, length=d.length[:1]) for d in problem.distances),
-    )  # fmt: skip
-    one = replace(one, context=replace(one.context, time=problem.context.time[first]))
-    context, chain = one.context, one.context.chain
-    turning = np.array([joint.turns for joint in chain.joints])
-    own, pose = np.unique(np.round(np.where(turning, context.positions, 0.0), 6), axis=0, return_inverse=True)
-    pose = pose.ravel()
-    targets = list(one.targets)
+    whole = _with_identified_tip(whole)
+    problem = _first_run(whole)
+    context, chain = problem.context, problem.context.chain
+    visited, pose = _indexations(problem)
+    targets = list(problem.targets)
     places = np.array([context.nominal[np.flatnonzero(context.target == name)[0]] for name in targets])
-    ends = {name for distance in one.distances for name in distance.between}
+    ends = {name for distance in problem.distances for name in distance.between}
     balls = [name for name in targets if name not in ends]
     if most_balls > len(balls):
         new = more_balls(places[[targets.index(name) for name in balls]], most_balls - len(balls))
         targets += [f"new {number + 1}" for number in range(len(new))]
         places = np.concatenate([places, new])
-    rotary, linear = strokes_of(loaded, chain, problem.context.positions)
-    poses = np.unique(np.round(np.concatenate([own, pose_grid(chain, context.positions, rotary)]), 6), axis=0)
-    touches = candidate_touches(one, poses, targets, places, linear)
-    place_of = np.array([int(np.flatnonzero((poses == row).all(axis=1))[0]) for row in own])
+    rotary, linear = strokes_of(campaign, chain, whole.context.positions)
+    grid = pose_grid(chain, context.positions, rotary)
+    poses = np.unique(np.round(np.concatenate([visited, grid]), 6), axis=0)
+    pose_index = np.array([int(np.flatnonzero((poses == row).all(axis=1))[0]) for row in visited])
+    touches = candidate_touches(problem, poses, targets, places, linear)
     touched = np.zeros(touches.reachable.shape, dtype=bool)
-    for row, target in enumerate(context.target):
-        touched[place_of[pose[row]], targets.index(str(target))] = True
-    touches = replace(touches, reachable=touches.reachable | touched)
+    touched[pose_index[pose], [targets.index(str(target)) for target in context.target]] = True
     bar_columns = [targets.index(name) for name in sorted(ends)]
     candidates = Candidates(
-        touches,
-        balls=tuple(place for place, name in enumerate(targets) if name not in ends),
+        replace(touches, reachable=touches.reachable | touched),
+        balls=tuple(index for index, name in enumerate(targets) if name not in ends),
         bar_poses=tuple(map(int, np.flatnonzero(touched[:, bar_columns].any(axis=1)))),
-        time=_time_model(one, pose.astype(float)),
+        time=_time_model(problem, pose.astype(float)),
     )
     present = candidates.choice(
-        tuple(map(int, np.unique(place_of))), tuple(targets.index(name) for name in balls), touched
+        tuple(map(int, np.unique(pose_index))), tuple(targets.index(name) for name in balls), touched
     )
-    return Planned(loaded, one, candidates, present, places)
+    return PlannedCampaign(campaign, problem, candidates, present, places)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.methods import Unable, campaign_method
+from monitor.methods import Unable, campaign_method, require
 from monitor.records import Array, Campaign
 from monitor.statistics import Homogeneity, Pooling, homogeneity, pool
 from monitor.store import (
@@ -164,6 +164,7 @@ def stats(
     that the runs do not have, DataError for fewer than two runs.
     """
     loaded = load_campaign(db, campaign)
+    require(campaign_method(loaded).statistics, loaded, "stats")
     labels = _groups(db, loaded, by)
     keep = _chosen(db, loaded, where, select)
     runs = [run.run for run, kept in zip(loaded.runs, keep, strict=True) if kept]

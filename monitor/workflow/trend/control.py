@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,14 +22,30 @@ from monitor.statistics import (
     reference_period,
     t_squared_chart,
 )
-from monitor.workflow.trend.parameter import date
-
-Document = dict[str, Any]
+from monitor.store import MachineHistory
+from monitor.workflow.history.calendar import SECONDS_PER_DAY, date
+from monitor.workflow.history.changes import DAYS_FOR_MEANS
+from monitor.workflow.history.series import day_numbers, steady_runs
+from monitor.workflow.trend.answer import (
+    CusumState,
+    EwmaState,
+    ParameterCharts,
+    ReferencePeriod,
+    ShewhartState,
+    VectorCharts,
+    VectorState,
+)
 
 #: Average number of points to a false alarm of each chart: that of the three-sigma chart, rounded.
 RUN_LENGTH = 370.0
-#: Without a chosen reference period: the first points, a third of all, at least 8 and at most 30.
+#: The same of MEWMA, whose limit is simulated with so many trials.
+VECTOR_RUN_LENGTH, VECTOR_TRIALS = 200.0, 1000
+#: Weight of the latest point in EWMA (Lucas and Saccucci, Technometrics 32 (1990) 1).
+EWMA_WEIGHT = 0.2
+#: Without a named reference period: the first points, a third of all, at least 8 and at most 30.
 SHARE, FEWEST, MOST = 3, 8, 30
+#: A parameter takes part in the charts of the vector where it has more than this share of the points.
+COMPLETE = 0.9
 
 
 @dataclass(frozen=True)
@@ -39,14 +54,32 @@ class Points:
 
     values: Array
     t: Array
-    what: str
+    kind: str
     offset: timedelta
 
 
-def reference_rows(points: Points, chosen: tuple[float, float] | None) -> npt.NDArray[np.bool_]:
-    """Which points (m,) are the reference period: those between two times, or the first ones."""
-    if chosen is not None:
-        return (points.t >= chosen[0]) & (points.t < chosen[1])
+def points_of(history: MachineHistory, offset: timedelta) -> Points:
+    """Points of the charts: runs, or day means where there are enough days; runs of a warming machine left out."""
+    t = history.seconds / SECONDS_PER_DAY
+    steady = steady_runs(history)
+    labels, values = day_numbers(history)[steady], history.values[steady]
+    distinct, first, index = np.unique(labels, return_index=True, return_inverse=True)
+    if len(distinct) < DAYS_FOR_MEANS:
+        return Points(values, t[steady], "runs", offset)
+    finite = np.isfinite(values)
+    sums, counts = np.zeros((len(distinct), values.shape[1])), np.zeros((len(distinct), values.shape[1]))
+    np.add.at(sums, index, np.where(finite, values, 0.0))
+    np.add.at(counts, index, finite)
+    means = sums / np.where(counts > 0, counts, np.nan)
+    order = np.argsort(first, kind="stable")
+    moments = np.bincount(index, t[steady]) / np.bincount(index)
+    return Points(means[order], moments[order], "days", offset)
+
+
+def reference_points(points: Points, reference: tuple[float, float] | None) -> npt.NDArray[np.bool_]:
+    """Mask (m,) of the reference period: the points between two times, or the first ones."""
+    if reference is not None:
+        return (points.t >= reference[0]) & (points.t < reference[1])
     count = int(np.clip(len(points.t) // SHARE, FEWEST, MOST))
     return np.asarray(np.arange(len(points.t)) < count)
 
@@ -54,87 +87,89 @@ def reference_rows(points: Points, chosen: tuple[float, float] | None) -> npt.ND
 class Charts:
     """All charts of a machine about one reference period."""
 
-    def __init__(self, points: Points, chosen: tuple[float, float] | None) -> None:
+    def __init__(self, points: Points, reference: tuple[float, float] | None) -> None:
         self.points = points
-        self.inside = reference_rows(points, chosen)
+        self.inside = reference_points(points, reference)
 
-    def period(self) -> Document:
+    def period(self) -> ReferencePeriod:
         """The reference period in words and dates."""
         times = self.points.t[self.inside]
-        return {
-            "points": self.points.what,
-            "reference_points": len(times),
-            "reference_from": date(float(times[0]), self.points.offset) if len(times) else None,
-            "reference_to": date(float(times[-1]), self.points.offset) if len(times) else None,
-            "average_run_length": RUN_LENGTH,
-        }
+        first, last = (self._date(times[index]) if len(times) else None for index in (0, -1))
+        return ReferencePeriod(self.points.kind, len(times), first, last, RUN_LENGTH)
 
-    def of(self, column: int) -> Document:
+    def of(self, column: int) -> ParameterCharts:
         """Shewhart, EWMA and CUSUM of one parameter: state, limits, and the alarms after the reference period."""
-        own = np.isfinite(self.points.values[:, column])
-        known = self.points.values[own & self.inside, column]
-        new = own & ~self.inside
-        values, t = self.points.values[new, column], self.points.t[new]
-        if not len(known):
-            return {"why": "no chart: no run of the history lies in the reference period"}
+        finite = np.isfinite(self.points.values[:, column])
+        before = self.points.values[finite & self.inside, column]
+        after = finite & ~self.inside
+        values, t = self.points.values[after, column], self.points.t[after]
+        if not len(before):
+            return ParameterCharts("no chart: no run of the history lies in the reference period")
         try:
-            reference = reference_period(known)
+            reference = reference_period(before)
         except DataError as error:
-            return {"why": f"no chart: {error}"}
+            return ParameterCharts(f"no chart: {error}")
         if not len(values):
-            return {"why": f"no chart: all {len(known)} {self.points.what} are the reference period"}
+            return ParameterCharts(f"no chart: all {len(before)} {self.points.kind} are the reference period")
         plain = individuals_chart(values, reference, arl=RUN_LENGTH)
         path = ewma_chart(values, reference, arl=RUN_LENGTH)
         sums = cusum_chart(values, reference, arl=RUN_LENGTH)
-        return {
-            "why": None, "centre": reference.centre, "sd": reference.sd,
-            "shewhart": self._state(plain.alarms, t) | {
-                "lower": float(plain.lower[-1]), "upper": float(plain.upper[-1])},
-            "ewma": self._state(path.alarms, t) | {
-                "value": float(path.statistic[-1]), "lower": float(path.lower[-1]), "upper": float(path.upper[-1]),
-                "weight": 0.2},
-            "cusum": self._state(sums.alarms, t) | {
-                "high": float(sums.high[-1]), "low": float(sums.low[-1]), "limit": sums.limit,
-                "since": None if sums.started is None else date(float(t[sums.started]), self.points.offset)},
-        }  # fmt: skip
+        return ParameterCharts(
+            None,
+            reference.centre,
+            reference.sd,
+            ShewhartState(*self._state(plain.alarms, t), float(plain.lower[-1]), float(plain.upper[-1])),
+            EwmaState(
+                *self._state(path.alarms, t), float(path.statistic[-1]), float(path.lower[-1]),
+                float(path.upper[-1]), EWMA_WEIGHT,
+            ),
+            CusumState(
+                *self._state(sums.alarms, t), float(sums.high[-1]), float(sums.low[-1]), sums.limit,
+                None if sums.started is None else self._date(t[sums.started]),
+            ),
+        )  # fmt: skip
 
-    def of_vector(self, names: tuple[str, ...], rng: np.random.Generator) -> Document:
+    def of_vector(self, names: tuple[str, ...], rng: np.random.Generator) -> VectorCharts:
         """T² and MEWMA of all parameters together; the shares say which of them raise the latest point."""
-        whole = np.isfinite(self.points.values)
-        kept = whole.mean(axis=0) > 0.9
+        finite = np.isfinite(self.points.values)
+        columns = finite.mean(axis=0) > COMPLETE
         # What never varies in the reference period has no limits, and no part in the vector.
-        known = np.where(whole & self.inside[:, np.newaxis], self.points.values, np.nan)
-        kept &= np.nanmax(known, axis=0, initial=-np.inf) > np.nanmin(known, axis=0, initial=np.inf)
-        rows = whole[:, kept].all(axis=1)
-        used = [name for name, keep in zip(names, kept, strict=True) if keep]
-        values = self.points.values[:, kept]
-        known, new = values[rows & self.inside], values[rows & ~self.inside]
-        if len(new) == 0 or len(known) < len(used) + 2:
-            return {
-                "why": f"no chart of the vector: {len(known)} {self.points.what} in the reference period and "
-                f"{len(new)} after it for {len(used)} parameters; at least {len(used) + 2} and one are needed "
+        before = np.where(finite & self.inside[:, np.newaxis], self.points.values, np.nan)
+        columns &= np.nanmax(before, axis=0, initial=-np.inf) > np.nanmin(before, axis=0, initial=np.inf)
+        rows = finite[:, columns].all(axis=1)
+        used = tuple(name for name, takes_part in zip(names, columns, strict=True) if takes_part)
+        values = self.points.values[:, columns]
+        before, after = values[rows & self.inside], values[rows & ~self.inside]
+        if len(after) == 0 or len(before) < len(used) + 2:
+            return VectorCharts(
+                f"no chart of the vector: {len(before)} {self.points.kind} in the reference period and "
+                f"{len(after)} after it for {len(used)} parameters; at least {len(used) + 2} and one are needed "
                 "(--reference FROM..TO)"
-            }  # fmt: skip
+            )
         t = self.points.t[rows & ~self.inside]
         try:
-            single = t_squared_chart(new, known, arl=RUN_LENGTH)
-            path = mewma_chart(new, known, rng=rng, arl=200.0, trials=1000)
+            single = t_squared_chart(after, before, arl=RUN_LENGTH)
+            path = mewma_chart(after, before, rng=rng, arl=VECTOR_RUN_LENGTH, trials=VECTOR_TRIALS)
         except DataError as error:
-            return {"why": f"no chart of the vector: {error}"}
-        return {
-            "why": None, "parameters": used,
-            "t_squared": self._state(single.alarms, t) | {
-                "value": float(single.statistic[-1]), "limit": single.limit,
-                "shares": dict(zip(used, map(float, single.shares[-1]), strict=True))},
-            "mewma": self._state(path.alarms, t) | {
-                "value": float(path.statistic[-1]), "limit": path.limit, "average_run_length": 200.0,
-                "shares": dict(zip(used, map(float, path.shares[-1]), strict=True))},
-        }  # fmt: skip
+            return VectorCharts(f"no chart of the vector: {error}")
+        shares, path_shares = (
+            dict(zip(used, map(float, chart.shares[-1]), strict=True)) for chart in (single, path)
+        )
+        return VectorCharts(
+            None,
+            used,
+            VectorState(*self._state(single.alarms, t), float(single.statistic[-1]), single.limit, shares),
+            VectorState(
+                *self._state(path.alarms, t), float(path.statistic[-1]), path.limit, path_shares,
+                average_run_length=VECTOR_RUN_LENGTH,
+            ),
+        )  # fmt: skip
 
-    def _state(self, alarms: npt.NDArray[np.int64], t: Array) -> Document:
-        return {
-            "state": "alarm" if len(alarms) and int(alarms[-1]) == len(t) - 1 else "in control",
-            "alarms": len(alarms),
-            "first_alarm_at": None if not len(alarms) else date(float(t[alarms[0]]), self.points.offset),
-            "last_alarm_at": None if not len(alarms) else date(float(t[alarms[-1]]), self.points.offset),
-        }
+    def _state(self, alarms: npt.NDArray[np.int64], t: Array) -> tuple[str, int, str | None, str | None]:
+        """The fields of a ``ChartState``."""
+        state = "alarm" if len(alarms) and int(alarms[-1]) == len(t) - 1 else "in control"
+        first, last = (self._date(t[alarms[index]]) if len(alarms) else None for index in (0, -1))
+        return state, len(alarms), first, last
+
+    def _date(self, t: float) -> str | None:
+        return date(float(t), self.points.offset)

@@ -1,7 +1,8 @@
-"""Figures of `monitor trend`, drawn from its result into a folder."""
+"""Figures of `monitor trend`, drawn from its answer into a folder."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 
@@ -13,50 +14,49 @@ from monitor.reporting.figures.trend import parameter_over_time
 from monitor.reporting.health.words import in_words
 from monitor.statistics import predict
 from monitor.workflow.figure_files import ENDINGS, make_folder
-from monitor.workflow.history.series import SECONDS_PER_DAY
-from monitor.workflow.trend.parameter import Document
-from monitor.workflow.trend.trends import Trends
+from monitor.workflow.history.calendar import SECONDS_PER_DAY, days_since_1970
+from monitor.workflow.history.past import ParameterPast
+from monitor.workflow.trend.answer import ParameterTrend, TrendAnswer
+
+#: Below this p-value a drift is stated as one.
+MOVING = 0.05
 
 
-def _day(text: str) -> float:
-    return datetime.fromisoformat(text).timestamp() / SECONDS_PER_DAY
-
-
-def headline(name: str, one: Document) -> str:
+def headline(name: str, parameter: ParameterTrend) -> str:
     """What one parameter's history says, in one line."""
-    if one["changes"]:
-        last = one["changes"][-1]
-        size, u = in_words(last["size"], last["u"], sign=True)
-        return f"{name}: changed by {size} {last['unit']} (u = {u} {last['unit']}) on {last['at'][:10]}"
-    if one["slope_per_year"] is None:
+    if parameter.changes:
+        last = parameter.changes[-1]
+        size, u = in_words(last.size, last.u, sign=True)
+        return f"{name}: changed by {size} {last.unit} (u = {u} {last.unit}) on {(last.at or '')[:10]}"
+    drift, unit = parameter.drift, parameter.unit
+    if drift.slope_per_year is None or drift.u_slope is None:
         return f"{name}: too little history for a drift"
-    moving = one["p_value"] is not None and one["p_value"] < 0.05
-    slope, u = in_words(one["slope_per_year"], one["u_slope"], sign=True)
-    said = f"{name}: {slope} {one['unit']} a year (u = {u} {one['unit']} a year)"
-    return said if moving else f"{said}, no drift seen"
+    slope, u = in_words(drift.slope_per_year, drift.u_slope, sign=True)
+    sentence = f"{name}: {slope} {unit} a year (u = {u} {unit} a year)"
+    moving = drift.p_value is not None and drift.p_value < MOVING
+    return sentence if moving else f"{sentence}, no drift seen"
 
 
-def trend_figures(found: Trends, folder: Path) -> list[str]:
-    """One figure a parameter: the runs, the drift since the last change with its band, changes, events, limits."""
+def trend_figures(answer: TrendAnswer, past: Mapping[str, ParameterPast], folder: Path) -> tuple[str, ...]:
+    """Draw one figure a parameter: the runs, the drift since the last change with its band, changes, events, limits."""
     make_folder(folder)
     files = []
-    events = {_day(one["at"]): one["kind"] for one in found.document.get("events", [])}
-    for series in found.series:
-        one = found.document["parameters"].get(series.name)
-        if one is None:
-            continue
-        line, fit = None, found.lines.get(series.name)
-        if fit is not None:
-            t = np.linspace(_day(one["since"]), float(series.t[-1]), 60)
-            level, u, _ = predict(fit, t)
-            line = (t, level, scipy.stats.t.isf((1.0 - fit.confidence) / 2.0, fit.dof) * u)
-        u_run = np.where(np.isfinite(series.u), series.u, 0.0)
+    events = {days_since_1970(datetime.fromisoformat(event.at)): event.kind for event in answer.events}
+    for name, parameter in answer.parameters.items():
+        series, drift = past[name].series, past[name].drift
         shift = series.offset.total_seconds() / SECONDS_PER_DAY
+        line = None
+        if drift.stated is not None:
+            t = np.linspace(float(drift.piece.t[0]), float(series.t[-1]), 60)
+            level, u, _ = predict(drift.stated, t)
+            factor = scipy.stats.t.isf((1.0 - drift.stated.confidence) / 2.0, drift.stated.dof)
+            line = (t + shift, level, factor * u)
+        u_run = np.where(np.isfinite(series.u), series.u, 0.0)
         figure = parameter_over_time(
-            series.t + shift, series.values, 2.0 * u_run, unit=series.unit, title=headline(series.name, one),
-            line=None if line is None else (line[0] + shift, line[1], line[2]), limit=one["limit"],
-            changes=[_day(change["at"]) + shift for change in one["changes"]],
-            events={at + shift: words for at, words in events.items()},
+            series.t + shift, series.values, 2.0 * u_run, unit=series.unit, title=headline(name, parameter),
+            line=line, limit=parameter.forecast.limit,
+            changes=[change.at + shift for change in past[name].search.changes],
+            events={at + shift: kind for at, kind in events.items()},
         )  # fmt: skip
-        files += [str(save(figure, folder / f"trend-{series.name}{ending}")) for ending in ENDINGS]
-    return files
+        files += [str(save(figure, folder / f"trend-{name}{ending}")) for ending in ENDINGS]
+    return tuple(files)

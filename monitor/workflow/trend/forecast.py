@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
 from monitor.exceptions import DataError
-from monitor.statistics import Forecast, Trend, backtest, forecast
-from monitor.workflow.trend.parameter import DAYS_PER_YEAR, SHORTEST_DAYS, Document, Series, date
+from monitor.statistics import Trend, backtest, forecast
+from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
+from monitor.workflow.history.series import Series
+from monitor.workflow.trend.answer import Between, ForecastTest, LimitForecast
 
 #: Days from which on forecasts are looked at: five to fit a line, and one to foretell.
 BACKTEST_DAYS = 6
@@ -14,43 +17,40 @@ BACKTEST_DAYS = 6
 HORIZON_YEARS = 20.0
 
 
-def prediction(
+def limit_forecast(
     series: Series, line: Trend | None, limit: float | None, check: float, reliability: float
-) -> tuple[Document, Forecast | None]:
+) -> LimitForecast:
     """When the drift reaches the limit, and how likely the parameter is in tolerance at the next ``check``."""
-    document: Document = {
-        "limit": limit, "crosses_limit_at": None, "crosses_limit_interval": None, "in_tolerance_at_next_check": None,
-        "next_check": date(check, series.offset), "recommended_interval_days": None, "recommended_by": None,
-        "why_no_forecast": None,
-    }  # fmt: skip
+    none = LimitForecast(limit, None, None, None, date(check, series.offset), None, None, None)
     if limit is None:
-        return {
-            **document,
-            "why_no_forecast": "no forecast: the machine file states no tolerance for it",
-        }, None
+        return replace(none, why_no_forecast="no forecast: the machine file states no tolerance for it")
     if line is None:
-        return {**document, "why_no_forecast": "no forecast: there is no drift to extrapolate"}, None
+        return replace(none, why_no_forecast="no forecast: there is no drift to extrapolate")
     now = float(series.t[-1])
     horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
-    found = forecast(line, (-limit, limit), now, [max(check, now)], reliability=reliability, horizon=horizon)
-    crossing, offset = found.crossing, series.offset
-    low, high = (date(x, offset) if x < horizon else None for x in crossing.interval)
-    document |= {
-        "crosses_limit_at": None if crossing.at is None else date(crossing.at, offset),
-        # An open end says that the drift may never get there (within the horizon).
-        "crosses_limit_interval": None if low is None and high is None else [low, high],
-        "in_tolerance_at_next_check": float(found.probability[0]),
-        "recommended_interval_days": float(min(found.recommended_interval, horizon - now)),
-        "recommended_by": f"{found.method}: {reliability:g}",
-    }
-    return document, found
+    ahead = forecast(line, (-limit, limit), now, [max(check, now)], reliability=reliability, horizon=horizon)
+    crossing, offset = ahead.crossing, series.offset
+    low, high = (date(t, offset) if t < horizon else None for t in crossing.interval)
+    return replace(
+        none,
+        crosses_limit_at=None if crossing.at is None else date(crossing.at, offset),
+        crosses_limit_interval=interval_or_none(low, high),
+        in_tolerance_at_next_check=float(ahead.probability[0]),
+        recommended_interval_days=float(min(ahead.recommended_interval, horizon - now)),
+        recommended_by=f"{ahead.method}: {reliability:g}",
+    )
 
 
-def backtested(series: Series, since: float) -> tuple[Document | None, str | None]:
-    """How good forecasts of the piece since ``since`` were: every day foretold by the days before it."""
-    piece = series.part(series.t >= since)
+def interval_or_none(low: str | None, high: str | None) -> Between | None:
+    """The ends of a crossing. An open end says that the drift may never get there (within the horizon)."""
+    return None if low is None and high is None else (low, high)
+
+
+def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, str | None]:
+    """How good forecasts of the present piece were: every day foretold by the days before it."""
+    piece = drift.piece
     days = piece.day_count
-    if not len(piece.t) or np.ptp(piece.t) < SHORTEST_DAYS:
+    if drift.span < SHORTEST_DAYS:
         return None, "no backtest: there is no drift whose forecasts could be looked at"
     if days < BACKTEST_DAYS:
         return None, (
@@ -58,11 +58,11 @@ def backtested(series: Series, since: float) -> tuple[Document | None, str | Non
             f"{BACKTEST_DAYS} are needed"
         )
     try:
-        found = backtest(piece.values, piece.t, u=piece.weights(), days=piece.days, first=BACKTEST_DAYS - 1)
+        test = backtest(piece.values, piece.t, u=piece.weights(), days=piece.days, first=BACKTEST_DAYS - 1)
     except DataError as error:
         return None, f"no backtest: {error}"
-    return {
-        "made": found.forecasts, "inside": found.covered, "share_inside": found.coverage, "level": found.level,
-        "bias": found.bias, "rms": found.rms, "unit": series.unit,
-        "method": "every day foretold by the days before it since the last change; its first run counts",
-    }, None  # fmt: skip
+    return ForecastTest(
+        made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
+        bias=test.bias, rms=test.rms, unit=piece.unit,
+        method="every day foretold by the days before it since the last change; its first run counts",
+    ), None  # fmt: skip

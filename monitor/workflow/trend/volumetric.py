@@ -7,9 +7,7 @@ plan, the workpiece set to zero in the middle. Its vectors follow the parameters
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from datetime import timedelta
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -31,10 +29,11 @@ from monitor.statistics import (
 )
 from monitor.store import Database, MachineHistory, load_campaign
 from monitor.units import MICROMETRE
-from monitor.workflow.trend.forecast import HORIZON_YEARS
-from monitor.workflow.trend.parameter import DAYS_PER_YEAR, Series, date
-
-Document = dict[str, Any]
+from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.workflow.history.drift import PieceDrift
+from monitor.workflow.history.series import Series
+from monitor.workflow.trend.answer import VolumetricForecast, VolumetricTest
+from monitor.workflow.trend.forecast import HORIZON_YEARS, interval_or_none
 
 #: The tolerance of the machine file that is no parameter's.
 VOLUMETRIC = "volumetric"
@@ -44,12 +43,28 @@ METHOD = (
 )
 
 
-class Followed(NamedTuple):
-    """A parameter with its steady runs, the beginning of the present piece (days since 1970), and its line."""
+@dataclass(frozen=True)
+class LimitQuestion:
+    """What is asked of the volumetric error: its limit in µm, the next ``check`` (days since 1970), the model."""
 
-    series: Series
-    begins: float
-    line: Trend | None
+    limit_um: float | None
+    check: float
+    reliability: float
+    model: str | None
+
+
+@dataclass(frozen=True)
+class _Extrapolated:
+    """The parameters that take part: drift and line of each, over the times ``t`` (n,) and ``days`` (n,) of all."""
+
+    drifts: Mapping[str, PieceDrift]
+    lines: Mapping[str, Trend]
+    t: Array
+    days: npt.NDArray[np.int64]
+
+    def row_of(self, name: str) -> npt.NDArray[np.intp]:
+        """Where the runs of a parameter stand among the times of all."""
+        return np.searchsorted(self.t, self.drifts[name].piece.t)
 
 
 @dataclass(frozen=True)
@@ -66,12 +81,11 @@ class _Vectors:
     points: int
 
 
-def _held(series: Series, begins: float) -> Trend:
+def _held(piece: Series) -> Trend:
     """A parameter without a drift: its mean since the last change, without slope; at least two runs."""
-    piece = series.part(series.t >= begins)
     n = len(piece.t)
     if n < 2:
-        raise DataError(f"{series.name} has one run since its last change")
+        raise DataError(f"{piece.name} has one run since its last change")
     sd = float(piece.values.std(ddof=1))
     at = float(piece.t.mean())
     return Trend(
@@ -95,8 +109,8 @@ def _vectors(
     from monitor.workflow.volumetric.volumetric import POINTS, poses_of, ranges_of
 
     campaign = load_campaign(db, str(history.campaign[-1]))
-    found = fit(machine_problem(campaign, resolve(db, model, campaign.method)))
-    problem, run = found.problem, int(history.run[-1])
+    fitted = fit(machine_problem(campaign, resolve(db, model, campaign.method)))
+    problem, run = fitted.problem, int(history.run[-1])
     effects = [
         effect
         for effect in problem.base
@@ -112,147 +126,133 @@ def _vectors(
     unit_of = {name: effect.unit for effect in effects for name in effect.parameters(problem.context)}
     factors = np.array([unit_of[name].factor for name in names])
     estimate = np.array([levels[name] for name in names]) * factors
-    known = GeometricErrors(
+    errors = GeometricErrors(
         effects=tuple(effects), names=names, estimate=estimate, covariance=np.zeros((len(names), len(names))),
         context=problem.context, run=run,
-        tip=found.solution.local[int(np.flatnonzero(problem.runs == run)[0]), tip : tip + 3],
+        tip=fitted.solution.local[int(np.flatnonzero(problem.runs == run)[0]), tip : tip + 3],
     )  # fmt: skip
-    ranges, _ = ranges_of(campaign, known.chain)
-    poses = poses_of(known.chain, known.context.positions)
-    error = volumetric_error(known, grid(known.chain, ranges, POINTS, poses), middle(known.chain, ranges))
+    ranges, _ = ranges_of(campaign, errors.chain)
+    poses = poses_of(errors.chain, errors.context.positions)
+    error = volumetric_error(errors, grid(errors.chain, ranges, POINTS, poses), middle(errors.chain, ranges))
     um = MICROMETRE.factor
     sensitivity = error.sensitivity * factors / um
     at_zero = (error.vectors - error.sensitivity @ estimate) / um
     # With axes that run straight only the corners of the strokes are left, of 343 points at each pose 8.
     long = max(float(error.lengths.max()) / um, 1.0)
-    kept = may_be_longest(sensitivity, at_zero, (len(poses), *[POINTS] * len(ranges)), long)
+    candidates = may_be_longest(sensitivity, at_zero, (len(poses), *[POINTS] * len(ranges)), long)
     return _Vectors(
-        names, sensitivity[kept], at_zero[kept], tuple(sorted(set(levels) - set(names))), len(at_zero)
+        names,
+        sensitivity[candidates],
+        at_zero[candidates],
+        tuple(sorted(set(levels) - set(names))),
+        len(at_zero),
     )
 
 
-def _residuals(lines: Mapping[str, Trend], followed: Mapping[str, Followed], t: Array) -> Array:
-    """Value less line (n, p) of the runs that began at ``t`` (n,), NaN where a parameter has none since its change."""
-    found = np.full((len(t), len(lines)), np.nan)
-    for column, (name, line) in enumerate(lines.items()):
-        piece = followed[name].series.part(followed[name].series.t >= followed[name].begins)
-        place = np.searchsorted(t, piece.t)
-        found[place, column] = piece.values - predict(line, piece.t)[0]
-    return found
+def _together(drifts: Mapping[str, PieceDrift], lines: Mapping[str, Trend]) -> _Extrapolated:
+    """The parameters with a line, over all times at which one of them was measured."""
+    series = [drifts[name].whole for name in lines]
+    t = np.unique(np.concatenate([steady.t for steady in series]))
+    day_of = {at: day for steady in series for at, day in zip(steady.t, steady.days, strict=True)}
+    return _Extrapolated(drifts, lines, t, np.array([day_of[at] for at in t], dtype=np.int64))
+
+
+def _residuals(parameters: _Extrapolated) -> Array:
+    """Value less line (n, p) of the runs, NaN where a parameter has none since its last change."""
+    residuals = np.full((len(parameters.t), len(parameters.lines)), np.nan)
+    for column, (name, line) in enumerate(parameters.lines.items()):
+        piece = parameters.drifts[name].piece
+        residuals[parameters.row_of(name), column] = piece.values - predict(line, piece.t)[0]
+    return residuals
 
 
 def _backtest(
-    lines: Mapping[str, Trend],
-    followed: Mapping[str, Followed],
-    t: Array,
-    days: npt.NDArray[np.int64],
-    vectors: _Vectors,
-    rng: np.random.Generator,
-) -> tuple[Document | None, str | None]:
+    parameters: _Extrapolated, vectors: _Vectors, rng: np.random.Generator
+) -> tuple[VolumetricTest | None, str | None]:
     """Days since the last change foretold by those before them; a parameter that is held now was held then."""
-    names = list(lines)
+    names, t, days = list(parameters.lines), parameters.t, parameters.days
     values, u = np.full((len(t), len(names)), np.nan), np.full((len(t), len(names)), np.nan)
-    weighed = []
     for column, name in enumerate(names):
-        piece = followed[name].series.part(followed[name].series.t >= followed[name].begins)
-        place = np.searchsorted(t, piece.t)
-        values[place, column], u[place, column] = piece.values, piece.u
-        weighed.append(piece.weights() is not None)
+        piece, rows = parameters.drifts[name].piece, parameters.row_of(name)
+        values[rows, column], u[rows, column] = piece.values, piece.u
+    weighed = [parameters.drifts[name].piece.weights() is not None for name in names]
 
-    def fit(column: int, keep: npt.NDArray[np.bool_]) -> Trend:
-        one = followed[names[column]]
-        if one.line is None:
-            own = one.series.part(np.isin(one.series.t, t[keep]))
-            return _held(own, -np.inf)
-        own_u = u[keep, column] if weighed[column] else None
-        return trend(values[keep, column], t[keep], u=own_u, days=days[keep], robust=False)
+    def fit(column: int, mask: npt.NDArray[np.bool_]) -> Trend:
+        drift = parameters.drifts[names[column]]
+        if drift.stated is None:
+            return _held(drift.whole.part(np.isin(drift.whole.t, t[mask])))
+        weights = u[mask, column] if weighed[column] else None
+        return trend(values[mask, column], t[mask], u=weights, days=days[mask], robust=False)
 
     try:
-        found = backtest_longest(
-            JointSeries(values, t, days), fit, ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng
-        )
+        series = JointSeries(values, t, days)
+        test = backtest_longest(series, fit, ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng)
     except DataError as error:
         return None, f"no backtest of the volumetric error: {error}"
-    return {
-        "made": found.forecasts, "inside": found.covered, "share_inside": found.coverage, "level": found.level,
-        "bias_um": found.bias, "rms_um": found.rms,
-    }, None  # fmt: skip
+    return VolumetricTest(
+        made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
+        bias_um=test.bias, rms_um=test.rms,
+    ), None  # fmt: skip
 
 
 def volumetric_forecast(
     db: Database,
     history: MachineHistory,
-    followed: Mapping[str, Followed],
-    check: float,
-    *,
-    model: str | None,
-    limit_um: float | None,
-    reliability: float,
+    drifts: Mapping[str, PieceDrift],
+    question: LimitQuestion,
     rng: np.random.Generator,
-    offset: timedelta,
-) -> Document:
-    """When the volumetric error reaches its limit, and how likely it is in tolerance at the next ``check`` (days).
+) -> VolumetricForecast:
+    """When the volumetric error reaches its limit, and how likely it is in tolerance at the next check.
 
-    The limit is ``limit_um`` or that of the machine file (``volumetric`` among the tolerances). Where there is none,
+    The limit is the asked one or that of the machine file (``volumetric`` among the tolerances). Where there is none,
     or no parameter drifts over long enough a history, ``why`` says so and nothing is computed.
     """
-    limit = history.tolerances.get(VOLUMETRIC) if limit_um is None else limit_um
-    empty: Document = {
-        "limit_um": limit, "latest_um": None, "crosses_limit_at": None, "crosses_limit_interval": None,
-        "next_check": date(check, offset), "predicted_um": None, "predicted_interval_um": None,
-        "in_tolerance_at_next_check": None, "recommended_interval_days": None, "held": [], "left_out": [],
-        "correlation_shrunk_by": None, "method": METHOD, "backtest": None, "why_no_backtest": None,
-    }  # fmt: skip
-    if limit is None:
-        why = (
-            "no forecast of the volumetric error: no limit is stated (volumetric in the machine's tolerances)"
-        )
-        return {**empty, "why": why}
-    if not any(one.line is not None for one in followed.values()):
-        return {
-            **empty,
-            "why": "no forecast of the volumetric error: no parameter has a drift to extrapolate",
-        }
-    try:
-        lines = {name: one.line or _held(one.series, one.begins) for name, one in followed.items()}
-        now = max(float(one.series.t[-1]) for one in followed.values())
-        levels = {name: float(predict(line, now)[0]) for name, line in lines.items()}
-        vectors = _vectors(db, history, model, levels)
-    except DataError as error:
-        return {**empty, "why": f"no forecast of the volumetric error: {error}"}
-    kept = {name: lines[name] for name in vectors.names}
-    t = np.unique(np.concatenate([followed[name].series.t for name in kept]))
-    day_of = dict(
-        pair
-        for name in kept
-        for pair in zip(followed[name].series.t, followed[name].series.days, strict=True)
+    limit = history.tolerances.get(VOLUMETRIC) if question.limit_um is None else question.limit_um
+    offset = next(iter(drifts.values())).piece.offset
+    none = VolumetricForecast(
+        limit_um=limit, next_check=date(question.check, offset), method=METHOD, why=None
     )
-    days = np.array([day_of[at] for at in t], dtype=np.int64)
-    correlation, shrunk, _ = residual_correlation(_residuals(kept, followed, t), days)
+    if limit is None:
+        return replace(
+            none,
+            why="no forecast of the volumetric error: no limit is stated (volumetric in the machine's tolerances)",
+        )
+    if not any(drift.stated is not None for drift in drifts.values()):
+        return replace(
+            none, why="no forecast of the volumetric error: no parameter has a drift to extrapolate"
+        )
+    try:
+        lines = {name: drift.stated or _held(drift.piece) for name, drift in drifts.items()}
+        now = max(float(drift.whole.t[-1]) for drift in drifts.values())
+        levels = {name: float(predict(line, now)[0]) for name, line in lines.items()}
+        vectors = _vectors(db, history, question.model, levels)
+    except DataError as error:
+        return replace(none, why=f"no forecast of the volumetric error: {error}")
+    parameters = _together(drifts, {name: lines[name] for name in vectors.names})
+    correlation, shrunk, _ = residual_correlation(_residuals(parameters), parameters.days)
     horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
-    found = forecast_longest(
-        JointLines(list(kept.values()), correlation),
+    ahead = forecast_longest(
+        JointLines(list(parameters.lines.values()), correlation),
         ErrorVectors(vectors.sensitivity, vectors.at_zero),
-        LengthQuestion(limit, now, [max(check, now)], horizon, reliability),
+        LengthQuestion(limit, now, [max(question.check, now)], horizon, question.reliability),
         rng=rng,
     )
-    tested, why_untested = _backtest(kept, followed, t, days, vectors, rng)
-    low, high = (date(x, offset) if x < horizon else None for x in found.crossing.interval)
-    return {
-        **empty,
-        "latest_um": found.latest,
-        "crosses_limit_at": None if found.crossing.at is None else date(found.crossing.at, offset),
-        "crosses_limit_interval": None if low is None and high is None else [low, high],
-        "predicted_um": float(found.predicted[0]),
-        "predicted_interval_um": found.interval[0].tolist(),
-        "in_tolerance_at_next_check": float(found.probability[0]),
-        "recommended_interval_days": float(min(found.recommended_interval, horizon - now)),
+    test, why_no_test = _backtest(parameters, vectors, rng)
+    low, high = (date(t, offset) if t < horizon else None for t in ahead.crossing.interval)
+    return replace(
+        none,
+        latest_um=ahead.latest,
+        crosses_limit_at=None if ahead.crossing.at is None else date(ahead.crossing.at, offset),
+        crosses_limit_interval=interval_or_none(low, high),
+        predicted_um=float(ahead.predicted[0]),
+        predicted_interval_um=tuple(ahead.interval[0].tolist()),
+        in_tolerance_at_next_check=float(ahead.probability[0]),
+        recommended_interval_days=float(min(ahead.recommended_interval, horizon - now)),
         # Parameters without a drift stay where they are; those that are no error of the chain take no part.
-        "held": [name for name in kept if followed[name].line is None],
-        "left_out": list(vectors.left_out),
-        "points": vectors.points,
-        "correlation_shrunk_by": shrunk,
-        "backtest": tested,
-        "why_no_backtest": why_untested,
-        "why": None,
-    }
+        held=tuple(name for name in parameters.lines if drifts[name].stated is None),
+        left_out=vectors.left_out,
+        points=vectors.points,
+        correlation_shrunk_by=shrunk,
+        backtest=test,
+        why_no_backtest=why_no_test,
+    )

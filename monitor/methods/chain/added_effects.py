@@ -1,4 +1,4 @@
-"""Time constants that nobody knows: unknowns of the fit like any other, shared by all runs.
+"""Added effects and their unknowns, shared by all runs; unknown time constants are unknowns of the fit like any other.
 
 An effect ``@warmup`` without a time constant has one more common unknown, the logarithm of that constant in
 seconds, so that it stays positive. Its derivative is taken numerically: the basis is a smooth function of it.
@@ -6,8 +6,9 @@ seconds, so that it stays positive. Its derivative is taken numerically: the bas
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -24,8 +25,8 @@ STEP = 1e-4
 
 
 def is_searched(effect: Effect) -> bool:
-    """Whether the effect's time constant has to be found."""
-    driver = getattr(effect, "driver", None)
+    """Whether the effect's time constant has to be estimated."""
+    driver = effect.driver if isinstance(effect, (ChainEffect, ArtefactEffect)) else None
     return isinstance(driver, WarmUp) and driver.time_constant_s is None
 
 
@@ -60,37 +61,41 @@ class Added:
 
     def displacement(self, unknowns: Array, by_error: Array) -> Array:
         """Derivatives (n, 3, unknowns) of the tip-to-target vector."""
-        own = self.basis(unknowns).displacement(by_error)
+        by_coefficient = self.basis(unknowns).displacement(by_error)
         if not self.searched:
-            return own
+            return by_coefficient
         high = self._at(float(unknowns[-1]) + STEP).displacement(by_error)
         low = self._at(float(unknowns[-1]) - STEP).displacement(by_error)
         slope = (high - low) @ unknowns[:-1] / (2.0 * STEP)
-        return np.concatenate([own, slope[..., None]], axis=-1)
+        return np.concatenate([by_coefficient, slope[..., None]], axis=-1)
 
 
 def added_in(effects: Sequence[Effect], context: Context) -> tuple[Added, ...]:
     """The added effects of a model in a context."""
-    found = []
+    added = []
     for effect in effects:
         searched = is_searched(effect)
         fixed = None if searched else effect.basis(context)
-        found.append(Added(effect, context, len(effect.parameters(context)), searched, fixed))
-    return tuple(found)
+        added.append(Added(effect, context, len(effect.parameters(context)), searched, fixed))
+    return tuple(added)
+
+
+def columns_of(sizes: Iterable[int]) -> tuple[slice, ...]:
+    """Where groups of unknowns of these sizes stand in a vector that holds them one after the other."""
+    ends = list(accumulate(sizes, initial=0))
+    return tuple(slice(start, stop) for start, stop in pairwise(ends))
 
 
 def resolved(added: Sequence[Added], common: Array) -> tuple[tuple[Effect, ...], Array]:
     """The same effects with their time constants fixed at ``common`` (c,), and the coefficients alone."""
     effects: list[Effect] = []
     coefficients: list[Array] = []
-    place = 0
-    for one in added:
-        own = common[place : place + one.unknowns]
-        place += one.unknowns
-        coefficients.append(own[: one.size])
-        if one.searched:
-            assert isinstance(one.effect, (ChainEffect, ArtefactEffect))
-            effects.append(with_time_constant(one.effect, float(np.exp(own[-1]))))
+    for term, columns in zip(added, columns_of(term.unknowns for term in added), strict=True):
+        unknowns = common[columns]
+        coefficients.append(unknowns[: term.size])
+        if term.searched:
+            assert isinstance(term.effect, (ChainEffect, ArtefactEffect))
+            effects.append(with_time_constant(term.effect, float(np.exp(unknowns[-1]))))
         else:
-            effects.append(one.effect)
+            effects.append(term.effect)
     return tuple(effects), np.concatenate([np.zeros(0), *coefficients])

@@ -1,6 +1,6 @@
 """What a machine's page lacks, computed without the database, so that any process can do it.
 
-The model is fitted once to the runs that were known by the week's end: identification (where the campaign has no
+The model is fitted once to the runs that were measured by the week's end: identification (where the campaign has no
 later runs), uncertainty, explanation and map all rest on that fit, uncertainty and map on one evaluation.
 """
 
@@ -14,14 +14,15 @@ from typing import Any, TypeVar
 from threadpoolctl import threadpool_limits
 
 from monitor.discovery import Fit, fit
-from monitor.documents import to_document
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
 from monitor.workflow.explain.explain import explanation_of
+from monitor.workflow.explain.explain_answer import ExplainAnswer
 from monitor.workflow.explain.machine_answer import explain_answer
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 from monitor.workflow.explain.versions import error_steps
 from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
@@ -30,23 +31,24 @@ from monitor.workflow.uncertainty.evaluation import Evaluated, evaluate_fit
 from monitor.workflow.uncertainty.evaluations import COVERAGE, Evaluation, evaluation_of
 from monitor.workflow.volumetric.volumetric import map_document, map_of
 
-Document = dict[str, Any]
+#: A result as it is stored and read again, made by the question that it answers.
+ComputedDocument = dict[str, Any]
 Result = TypeVar("Result")
 METHOD = "guf"
 
 
 @dataclass(frozen=True)
-class Work:
+class Task:
     """What is to be computed for one machine under ``model``.
 
-    ``identify`` are the campaigns with runs that are not identified yet. ``known`` are the runs of the last campaign
-    up to the week's end, ``whole`` where it has no later ones; of its ``run`` the uncertainty and the map are wanted,
+    ``identify`` are the campaigns with runs that are not identified yet. ``past`` are the runs of the last campaign
+    up to the week's end, ``whole`` where it has no later ones; of its ``run`` the uncertainty and the map are asked,
     of all of them the explanation, and the errors of ``versions`` of the model.
     """
 
     model: StoredModel
     identify: tuple[Campaign, ...]
-    known: Campaign
+    past: Campaign
     whole: bool
     run: int
     uncertainty: bool
@@ -56,18 +58,18 @@ class Work:
 
 
 @dataclass(frozen=True)
-class Done:
-    """What was computed; None for what was not wanted or could not be, the latter with a remark that says why."""
+class TaskResult:
+    """What was computed; None for what was not asked or could not be, the latter with a remark that says why."""
 
     identified: tuple[StoredIdentification, ...] = ()
-    uncertainty: Document | None = None
-    explanation: Document | None = None
-    map: Document | None = None
-    history: tuple[Document, ...] | None = None
+    uncertainty: ComputedDocument | None = None
+    explanation: ExplainAnswer | None = None
+    map: ComputedDocument | None = None
+    versions: tuple[MachineVersion | CurveVersion, ...] | None = None
     remarks: tuple[str, ...] = ()
 
 
-def kept(step: Callable[[], Result], failure: str, remarks: list[str]) -> Result | None:
+def attempted(step: Callable[[], Result], failure: str, remarks: list[str]) -> Result | None:
     """The result of a step, or a remark that says why there is none: one machine does not stop the fleet's report."""
     try:
         return step()
@@ -76,79 +78,79 @@ def kept(step: Callable[[], Result], failure: str, remarks: list[str]) -> Result
         return None
 
 
-def computed(work: Work | None) -> Done:
+def computed(task: Task | None) -> TaskResult:
     """Everything that is lacking for a machine; nothing for one that was not measured (None).
 
     One thread of linear algebra, in whatever process: with several it may round otherwise.
     """
-    if work is None:
-        return Done()
+    if task is None:
+        return TaskResult()
     with threadpool_limits(1, "blas"):
-        return _computed(work, _Fitted(work))
+        return _computed(task, _Fitted(task))
 
 
 class _Fitted:
-    """The model fitted to the known runs, and the evaluation of the run: each made when it is first asked for."""
+    """The model fitted to the past runs, and the evaluation of the run: each made when it is first asked for."""
 
-    def __init__(self, work: Work) -> None:
-        self._work = work
+    def __init__(self, task: Task) -> None:
+        self._task = task
 
     @cached_property
     def fit(self) -> Fit:
-        known = self._work.known
-        return fit(campaign_method(known).problem_of(known, as_model(self._work.model)))
+        past = self._task.past
+        return fit(campaign_method(past).problem_of(past, as_model(self._task.model)))
 
     @cached_property
     def evaluated(self) -> Evaluated:
-        work = self._work
-        return evaluate_fit(work.known, work.model, self.fit, work.run, method=METHOD, p=COVERAGE)
+        task = self._task
+        return evaluate_fit(task.past, task.model, self.fit, task.run, method=METHOD, p=COVERAGE)
 
     @cached_property
-    def uncertainty(self) -> Document:
+    def uncertainty(self) -> ComputedDocument:
         return document(self.evaluated)
 
     @property
     def evaluation(self) -> Evaluation:
-        return evaluation_of(self.uncertainty, self._work.known, self._work.model)
+        return evaluation_of(self.uncertainty, self._task.past, self._task.model)
 
 
-def _computed(work: Work, fitted: _Fitted) -> Done:
+def _computed(task: Task, fitted: _Fitted) -> TaskResult:
     remarks: list[str] = []
     runs = []
-    for campaign in work.identify:
-        same = work.whole and campaign.name == work.known.name
+    for campaign in task.identify:
+        same = task.whole and campaign.name == task.past.name
         solve = (lambda problem: fitted.fit.solution) if same else solve_problem
-        found = kept(
-            lambda one=campaign, solve=solve: identified(one, work.model, solve)[1],  # type: ignore[misc]
+        identification = attempted(
+            lambda campaign=campaign, solve=solve: identified(campaign, task.model, solve)[1],  # type: ignore[misc]
             f"campaign {campaign.name} could not be identified",
             remarks,
         )
-        if found is not None:
-            runs.append(found)
-    uncertainty = explanation = mapped = history = None
-    if work.uncertainty:
-        uncertainty = kept(
+        if identification is not None:
+            runs.append(identification)
+    uncertainty = explanation = mapped = versions = None
+    if task.uncertainty:
+        uncertainty = attempted(
             lambda: fitted.uncertainty,
             "the uncertainty of the last run could not be evaluated",
             remarks,
         )
-    if work.explanation:
-        explanation = kept(
-            lambda: to_document(explain_answer(explanation_of(work.known, work.model, fitted.fit))),
+    if task.explanation:
+        explanation = attempted(
+            lambda: explain_answer(explanation_of(task.past, task.model, fitted.fit)),
             "model and measurement could not be compared",
             remarks,
         )
     # Without an uncertainty there is no map, and its remark says why.
-    if work.map and (uncertainty is not None or not work.uncertainty):
-        mapped = kept(
+    if task.map and (uncertainty is not None or not task.uncertainty):
+        mapped = attempted(
             lambda: map_document(map_of(fitted.evaluation, fitted.fit), COVERAGE),
             "the volumetric error could not be mapped",
             remarks,
         )
-    if work.versions:
-        history = kept(
-            lambda: tuple(to_document(step) for step in error_steps(work.known, work.versions)),
+    if task.versions:
+        versions = attempted(
+            lambda: error_steps(task.past, task.versions),
             "the versions of the model could not be compared",
             remarks,
         )
-    return Done(tuple(runs), uncertainty, explanation, mapped, history, tuple(remarks))
+    return TaskResult(tuple(runs), uncertainty, explanation, mapped, versions, tuple(remarks))

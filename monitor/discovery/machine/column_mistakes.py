@@ -1,0 +1,146 @@
+"""Mistakes of whole columns, and of the names of targets throughout: what each is, and what undoes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from monitor.methods import campaign_method
+from monitor.records import Array, Campaign
+
+#: Every target is tried at every row up to so many; a part with a hundred points has a name for each.
+MOST_TARGETS = 12
+MEASURED = ("tracker_", "plane_", "paraboloid_")
+#: Columns of a sensor of two spots, and the columns of its spots.
+SPOTS = (("plane_u_um", "plane_v_um"), ("paraboloid_u_um", "paraboloid_v_um"))
+ACROSS = (("plane_u_um", "paraboloid_u_um"), ("plane_v_um", "paraboloid_v_um"))
+
+#: A campaign with a mistake undone.
+Undo = Callable[[Campaign], Campaign]
+#: Columns with a mistake undone.
+Change = Callable[[Mapping[str, Array]], dict[str, Array]]
+#: A mistake in words, and what undoes it.
+Trial = tuple[str, Undo]
+
+
+def column_mistakes(campaign: Campaign) -> Iterator[Trial]:
+    """Every mistake that is tried of whole columns and of names throughout."""
+    machine, readings = campaign.machine, campaign.probings.readings
+    linear = [axis for axis in readings if machine.is_linear(axis)]
+    turning = [axis for axis in readings if not machine.is_linear(axis) and np.ptp(readings[axis]) > 0]
+    measured = [name for name in campaign.probings.channels if name.startswith(MEASURED)]
+    yield from _exchanged_axes(linear, turning)
+    yield from _turned_axes(linear, turning)
+    yield from _exchanged_channels(measured)
+    for name in measured:
+        yield f"the sign of {name} were the other way round", _of_channels(_scaled((name,), -1.0))
+    yield from _axes_in_other_units(linear, turning)
+    if measured and measured[0].startswith("tracker_"):
+        yield f"{', '.join(measured)} were in metres", _of_channels(_scaled(measured, 1e3))
+    yield from _exchanged_targets(campaign)
+
+
+def target_word(campaign: Campaign) -> str:
+    """The noun for a target of the campaign."""
+    return campaign_method(campaign).nouns.target
+
+
+def _column(axis: str, linear: Sequence[str]) -> str:
+    return f"{axis.lower()}_{'mm' if axis in linear else 'deg'}"
+
+
+def _exchanged_axes(linear: Sequence[str], turning: Sequence[str]) -> Iterator[Trial]:
+    for group in (linear, turning):
+        for first, second in combinations(group, 2):
+            columns = f"the columns {_column(first, linear)} and {_column(second, linear)}"
+            yield f"{columns} were exchanged", _of_readings(_exchanged([(first, second)]))
+
+
+def _turned_axes(linear: Sequence[str], turning: Sequence[str]) -> Iterator[Trial]:
+    for axis in turning:
+        hint = f" (`sign` of {axis} in campaign.toml)"
+        yield f"the sign of {axis} were the other way round{hint}", _of_readings(_scaled((axis,), -1.0))
+    for axis in linear:
+        yield f"the sign of {axis} were the other way round", _of_readings(_scaled((axis,), -1.0))
+
+
+def _exchanged_channels(measured: Sequence[str]) -> Iterator[Trial]:
+    for first, second in combinations(measured, 2):
+        yield f"the columns {first} and {second} were exchanged", _of_channels(_exchanged([(first, second)]))
+    if all(name in measured for pair in SPOTS for name in pair):
+        yield "u and v of the sensor were exchanged in both pairs of columns", _of_channels(_exchanged(SPOTS))
+        yield "the columns of plane and paraboloid were exchanged", _of_channels(_exchanged(ACROSS))
+
+
+def _axes_in_other_units(linear: Sequence[str], turning: Sequence[str]) -> Iterator[Trial]:
+    for axes, unit, factor in (
+        (linear, "in metres", 1e3),
+        (linear, "in inches", 25.4),
+        (turning, "in radians", 180.0 / np.pi),
+    ):
+        together = [tuple(axes)] if len(axes) > 1 else []
+        for group in (*together, *((axis,) for axis in axes)):
+            columns = ", ".join(_column(axis, linear) for axis in group)
+            verb = "was" if len(group) == 1 else "were"
+            yield f"{columns} {verb} {unit}", _of_readings(_scaled(group, factor))
+
+
+def _exchanged_targets(campaign: Campaign) -> Iterator[Trial]:
+    names = [str(name) for name in np.unique(campaign.probings.target)]
+    if len(names) > MOST_TARGETS:
+        return
+    identified = _identified_targets(campaign)
+    for first, second in combinations(names, 2):
+        if identified.intersection((first, second)):
+            what = f"{target_word(campaign)}s {first} and {second} were exchanged throughout"
+            yield what, _with_targets_exchanged(first, second)
+
+
+def _identified_targets(campaign: Campaign) -> set[str]:
+    """Targets that are more than a name: exchanged throughout, others only get each other's unknown position."""
+    artefact = campaign.artefact
+    if artefact.l_shape is not None:
+        return {module.id for module in artefact.l_shape.modules}
+    fixed = {reflector.id for reflector in artefact.reflectors if reflector.fixed}
+    return fixed | set(() if artefact.scale_bar is None else artefact.scale_bar.balls)
+
+
+def _of_readings(change: Change) -> Undo:
+    def undo(campaign: Campaign) -> Campaign:
+        probings = campaign.probings
+        return replace(campaign, probings=replace(probings, readings=change(probings.readings)))
+
+    return undo
+
+
+def _of_channels(change: Change) -> Undo:
+    def undo(campaign: Campaign) -> Campaign:
+        probings = campaign.probings
+        return replace(campaign, probings=replace(probings, channels=change(probings.channels)))
+
+    return undo
+
+
+def _exchanged(pairs: Sequence[tuple[str, str]]) -> Change:
+    """Exchange pairs of columns."""
+    source = dict(pairs) | {second: first for first, second in pairs}
+    return lambda columns: {name: columns[source.get(name, name)] for name in columns}
+
+
+def _scaled(names: Sequence[str], factor: float) -> Change:
+    """Multiply some columns."""
+    return lambda columns: {
+        name: values * (factor if name in names else 1.0) for name, values in columns.items()
+    }
+
+
+def _with_targets_exchanged(first: str, second: str) -> Undo:
+    def undo(campaign: Campaign) -> Campaign:
+        target = campaign.probings.target
+        swapped = np.where(target == first, second, np.where(target == second, first, target))
+        return replace(campaign, probings=replace(campaign.probings, target=swapped))
+
+    return undo

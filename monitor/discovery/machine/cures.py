@@ -1,0 +1,57 @@
+"""The test of a mistake of the file: undone, it lets the residual fall to the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.discovery.machine.fit import Fit
+from monitor.exceptions import MonitorError
+from monitor.methods.chain.problem import ChainProblem, solve_problem
+from monitor.records import Campaign
+
+#: Undone, a mistake leaves less than this part of the residual, and no more than so many standard uncertainties:
+#: beside the mistake a machine still has its effects.
+CURED_SHARE, CURED_TIMES = 0.05, 20.0
+#: What is left at the noise is a cure as well, where the residual was little more to begin with.
+NOISE_TIMES, WORTH_SHARE = 1.3, 0.5
+#: Readings that fit converge in some eight steps; a trial that does not is none.
+MOST_STEPS = 15
+
+#: Makes the problem of a campaign.
+Maker = Callable[[Campaign], ChainProblem]
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A likely mistake of the file: ``what`` in words, and the RMS of all coordinates in mm with it and without."""
+
+    what: str
+    rms_as_recorded: float
+    rms_undone: float
+
+
+def fitted(campaign: Campaign, problem_of: Maker) -> Fit | None:
+    """The fit of a corrected campaign; None where it does not converge within few steps."""
+    try:
+        with np.errstate(all="ignore"):
+            problem = problem_of(campaign)
+            solution = solve_problem(problem, most=MOST_STEPS)
+            return Fit(problem, solution, np.zeros(len(problem.context), dtype=bool))
+    except (MonitorError, np.linalg.LinAlgError):
+        # This is no machine of that file either.
+        return None
+
+
+def cured_rms(campaign: Campaign, problem_of: Maker, before: float) -> float | None:
+    """The residual of a corrected campaign in mm, None where it is still too large."""
+    fit = fitted(campaign, problem_of)
+    return fit.rms if fit is not None and np.isfinite(fit.rms) and is_cure(fit, before) else None
+
+
+def is_cure(fit: Fit, before: float) -> bool:
+    """Whether a fit leaves next to nothing of the residual before, in mm."""
+    enough = max(CURED_SHARE * before, min(NOISE_TIMES * fit.sigma, WORTH_SHARE * before))
+    return fit.rms < min(enough, CURED_TIMES * fit.sigma)

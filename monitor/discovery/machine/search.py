@@ -1,0 +1,35 @@
+"""The scan of a chain: with gears where some stand out of what it leaves, with tables instead of several shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from monitor.discovery.machine.acceptance import ChainAcceptance
+from monitor.discovery.machine.gears import gear_variants
+from monitor.discovery.machine.missing import standing_out
+from monitor.discovery.machine.scene import ChainScene, scene_of
+from monitor.discovery.machine.tables import ChainScan, with_tables
+from monitor.discovery.search.scan import scan
+
+# More orders of gears than this are noise that no order explains.
+MOST_GEARS = 12
+
+
+def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tuple[ChainScene, ChainScan]:
+    """Scan a scene; where gears stand out of what it leaves, once more with them; at last with tables instead of
+    several shapes. Return the scene with the candidates that were added."""
+
+    def scanned(scene: ChainScene) -> ChainScan:
+        return scan(scene, ChainAcceptance(scene, drivers, rate), rate=rate)
+
+    gears: set[str] = set()
+    while True:
+        result = standing_out(scene, scanned(scene))
+        variants = gear_variants(scene, result.candidates, rate)
+        new = [variant for variant in variants if variant.effect.text not in gears]
+        if not new or len(gears) > MOST_GEARS:
+            scene, result = with_tables(scene, result, scanned)
+            return scene, standing_out(scene, result)
+        gears |= {variant.effect.text for variant in new}
+        scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))

@@ -1,0 +1,206 @@
+"""Evidence for effects: how much of the residual each explains, given the effects already selected.
+
+For every candidate the part of the residual's sum of squares that its visible columns explain is tested by F
+against what stays, and ranked by the logarithm of the likelihood ratio less the price of its coefficients
+(Schwarz's criterion), which stays finite where p-values underflow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic
+
+import numpy as np
+import numpy.typing as npt
+from scipy import special
+
+from monitor.discovery.search.candidate import Candidate
+from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.scene import CandidateT, Scene
+from monitor.records import Array
+
+# A direction of which the selected effects leave less than this part (squared) has nothing to say.
+SMALLEST_REMAINDER = 1e-8
+# Effects that would have to be larger than a machine in use hides (an angle of 1 mrad with hardly a lever) are
+# weighed with odds of 1 to 400: their p-values are multiplied by it (weighted false discovery rate: Genovese,
+# Roeder and Wasserman, Biometrika 93 (2006) 509) and their scores lose twice its logarithm.
+ODDS_OF_TOO_LARGE = 400.0
+# What would have to be a hundred times as large (0.1 rad, 5 mm) is no error but another machine; so far the
+# linearised columns do not reach. A scale that shrinks the whole machine explains any residual.
+BEYOND = 100.0
+# So many standard deviations of a coefficient are put down to noise before its size is judged.
+STANDS_OUT = 3.0
+
+
+@dataclass(frozen=True)
+class Evidence(Generic[CandidateT]):
+    """The evidence for one candidate: F with ``rank`` degrees of freedom in its numerator, its p-value and score.
+
+    ``too_large`` says that it would need coefficients beyond what a machine in use is likely to have.
+    """
+
+    candidate: CandidateT
+    explained: float
+    rank: int
+    f: float
+    p_value: float
+    score: float
+    too_large: bool = False
+
+    @property
+    def likelihood(self) -> float:
+        """The score without the odds beforehand: what the data alone say."""
+        odds = self.candidate.variant.odds * (ODDS_OF_TOO_LARGE if self.too_large else 1.0)
+        return self.score + 2.0 * float(np.log(odds))
+
+
+@dataclass(frozen=True)
+class Pool(Generic[CandidateT]):
+    """Candidates to be weighed together, again and again: their columns side by side."""
+
+    candidates: tuple[CandidateT, ...]
+
+    @cached_property
+    def rows(self) -> Array:
+        """All columns (K, M), one row each."""
+        return np.concatenate([candidate.columns.T for candidate in self.candidates])
+
+    @cached_property
+    def by_size(self) -> dict[int, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]:
+        """By number of coefficients k: indices (n,) of the candidates, and (n, k) of their rows."""
+        sizes = np.array([candidate.columns.shape[1] for candidate in self.candidates])
+        first = np.cumsum(sizes) - sizes
+        return {
+            int(size): (members := np.flatnonzero(sizes == size), first[members][:, None] + np.arange(size))
+            for size in np.unique(sizes)
+        }
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Length (K,) of every column; 1 where there is nothing."""
+        length = np.sqrt(np.einsum("km,km->k", self.rows, self.rows))
+        return np.where(length == 0, 1.0, length)
+
+    @cached_property
+    def grams(self) -> dict[int, Array]:
+        """By number of coefficients: products (n, k, k) of the columns scaled to unit length."""
+        grams = {}
+        for size, (_, rows) in self.by_size.items():
+            part = self.rows[rows] / self.lengths[rows][..., None]
+            grams[size] = part @ np.swapaxes(part, -1, -2)
+        return grams
+
+    @cached_property
+    def tries(self) -> Array:
+        """The number of variants of each candidate that are searched."""
+        return np.array([float(candidate.variant.tries) for candidate in self.candidates])
+
+    @cached_property
+    def odds(self) -> Array:
+        """The odds against each candidate beforehand."""
+        return np.array([candidate.variant.odds for candidate in self.candidates])
+
+    @cached_property
+    def largest(self) -> Array:
+        """The largest coefficients that are likely."""
+        return np.array([candidate.largest for candidate in self.candidates])
+
+    def with_more(self, more: Sequence[CandidateT]) -> Pool[CandidateT]:
+        """The pool and further candidates of families that it lacks."""
+        families = {candidate.family for candidate in self.candidates}
+        return Pool(
+            (*self.candidates, *(candidate for candidate in more if candidate.family not in families))
+        )
+
+
+def weigh(
+    candidates: Sequence[CandidateT] | Pool[CandidateT],
+    residual: Array,
+    selected: Array,
+    degrees_of_freedom: int,
+) -> list[Evidence[CandidateT]]:
+    """Weigh every candidate, given the selected columns (M, c); the most convincing first.
+
+    ``degrees_of_freedom`` are those of ``residual`` (M,) before the selected columns are taken out.
+    """
+    pool = candidates if isinstance(candidates, Pool) else Pool(tuple(candidates))
+    if not pool.candidates:
+        return []
+    basis = orthonormal(selected)
+    remainder = without(basis, residual[:, None])[:, 0]
+    total, dof = float(remainder @ remainder), degrees_of_freedom - basis.shape[1]
+    onto = (pool.rows @ remainder) / pool.lengths
+    overlap = (pool.rows @ basis) / pool.lengths[:, None]
+    explained = np.zeros(len(pool.candidates))
+    rank = np.zeros(len(pool.candidates), dtype=np.int64)
+    large = np.zeros(len(pool.candidates))
+    for size, (members, rows) in pool.by_size.items():
+        gram = pool.grams[size] - overlap[rows] @ np.swapaxes(overlap[rows], -1, -2)
+        explained[members], rank[members], coefficients = explained_by(gram, onto[rows], total, dof)
+        large[members] = np.sqrt(np.sum((coefficients / pool.lengths[rows]) ** 2, axis=-1))
+    rank[large > BEYOND * pool.largest] = 0
+    weighed = evidence_of(pool, explained, rank, (total, dof), large > pool.largest)
+    return sorted(weighed, key=lambda evidence: -evidence.score)
+
+
+def weigh_beside(
+    scene: Scene[CandidateT],
+    candidates: Sequence[CandidateT] | Pool[CandidateT],
+    selected: Sequence[Candidate[object]],
+) -> list[Evidence[CandidateT]]:
+    """Weigh every candidate beside the selected ones, the most convincing first."""
+    return weigh(candidates, scene.residual, scene.columns(selected), scene.degrees_of_freedom)
+
+
+def explained_by(
+    gram: Array, onto: Array, total: float = 0.0, dof: int = 1
+) -> tuple[Array, npt.NDArray[np.int64], Array]:
+    """Sum of squares (...) that columns with products ``gram`` (..., k, k) explain, their rank (...) and their
+    coefficients (..., k), as far as these stand out from the noise that ``total`` and ``dof`` show."""
+    values, vectors = np.linalg.eigh(gram)
+    keep = values > SMALLEST_REMAINDER
+    along = np.einsum("...ij,...i->...j", vectors, onto)
+    inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
+    explained: Array = np.sum(along**2 * inverse, axis=-1)
+    # A direction that the plan barely sees has a large coefficient from noise alone.
+    noise = np.maximum(total - explained, 0.0)[..., None] / max(dof, 1) * values
+    sure = along * np.sqrt(np.maximum(1.0 - STANDS_OUT**2 * noise / np.maximum(along**2, 1e-300), 0.0))
+    coefficients: Array = np.einsum("...ij,...j->...i", vectors, sure * inverse)
+    return explained, keep.sum(axis=-1), coefficients
+
+
+def evidence_of(
+    pool: Pool[CandidateT],
+    explained: Array,
+    rank: npt.NDArray[np.int64],
+    residual: tuple[float, int],
+    too_large: npt.NDArray[np.bool_],
+) -> list[Evidence[CandidateT]]:
+    """Evidence for the candidates of a pool that explain sums of squares (n,) with ranks (n,) of a ``residual`` with
+    this sum of squares and degrees of freedom."""
+    total, dof = residual
+    able = (rank > 0) & (dof > rank) & (total > 0)
+    number, other = np.where(able, rank, 1), np.where(able, dof - rank, 1)
+    stays = np.maximum(total - explained, 1e-300)
+    f = np.where(able, (explained / number) / (stays / other), 0.0)
+    odds = pool.tries * pool.odds * np.where(too_large, ODDS_OF_TOO_LARGE, 1.0)
+    p_value = np.where(able, np.minimum(1.0, special.fdtrc(number, other, f) * odds), 1.0)
+    price = rank * np.log(max(dof, 1)) + 2.0 * np.log(odds)
+    score = np.where(able, dof * np.log(max(total, 1e-300) / stays) - price, -np.inf)
+    return [
+        Evidence(
+            candidate, float(explained[index]) if able[index] else 0.0, int(rank[index]), float(f[index]),
+            float(p_value[index]), float(score[index]), bool(too_large[index]),
+        )
+        for index, candidate in enumerate(pool.candidates)
+    ]  # fmt: skip
+
+
+def best_of_families(weighed: Sequence[Evidence[CandidateT]]) -> list[Evidence[CandidateT]]:
+    """The best variant of every family, most convincing first."""
+    best: dict[str, Evidence[CandidateT]] = {}
+    for evidence in weighed:
+        best.setdefault(evidence.candidate.family, evidence)
+    return list(best.values())

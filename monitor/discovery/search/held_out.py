@@ -1,0 +1,58 @@
+"""Error on rows that took no part in the fit: folds of them left out in turn."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Array
+
+#: Rows are dealt into ten folds at random, always the same way.
+FOLDS, DEAL = 10, 20261121
+
+
+def folds_of(count: int) -> npt.NDArray[np.int64]:
+    """The fold (n,) of every row; below twenty rows each is one."""
+    if count < 2 * FOLDS:
+        return np.arange(count)
+    return np.random.default_rng(DEAL).permutation(count) % FOLDS
+
+
+def held_out_sum(residual: Array, columns: Array, row_fold: npt.NDArray[np.int64]) -> float:
+    """Sum of squares of whitened residuals (M,), each fold's with coefficients from all other folds.
+
+    ``columns`` (M, c) are the projected columns of the shared effects, ``row_fold`` (M,) the fold of each row, -1
+    where it is never left out.
+    The residual may stem from any values of the coefficients: only differences matter.
+    """
+    if columns.shape[1] == 0:
+        return float(residual @ residual)
+    scale = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(scale == 0, 1.0, scale)
+    folds = np.unique(row_fold)
+    grams = np.array([scaled[row_fold == fold].T @ scaled[row_fold == fold] for fold in folds])
+    ontos = np.array([scaled[row_fold == fold].T @ residual[row_fold == fold] for fold in folds])
+    total = 0.0
+    for index, fold in enumerate(folds):
+        if fold < 0:
+            continue
+        gram = grams.sum(axis=0) - grams[index]
+        onto = ontos.sum(axis=0) - ontos[index]
+        coefficients = -np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ onto
+        rows = row_fold == fold
+        remainder = residual[rows] + scaled[rows] @ coefficients
+        total += float(remainder @ remainder)
+    return total
+
+
+def held_out_rms(
+    residual: Array, columns: Array, row_fold: npt.NDArray[np.int64], degrees_of_freedom: int, sigma: float
+) -> float | None:
+    """Held-out root mean square per degree of freedom in the unit of ``sigma``; None with fewer than two folds.
+
+    ``degrees_of_freedom`` are those that the runs' own unknowns leave. Where the model is right the result
+    estimates the standard uncertainty of a coordinate, the noise floor.
+    """
+    if len(np.unique(row_fold)) < 2:
+        return None
+    return sigma * float(np.sqrt(held_out_sum(residual, columns, row_fold) / degrees_of_freedom))

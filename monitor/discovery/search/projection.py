@@ -1,0 +1,37 @@
+"""Columns projected onto, and out of, the span of others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from monitor.records import Array
+
+# Eigenvalues of a candidate's scaled normal matrix below this belong to directions without data.
+RELATIVE_RANK = 1e-9
+
+
+def orthonormal(columns: Array) -> Array:
+    """An orthonormal basis (M, rank) of what columns (M, k) span."""
+    if columns.shape[1] == 0:
+        return columns
+    scale = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(scale == 0, 1.0, scale)
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    keep = values > RELATIVE_RANK * max(float(values.max()), 1.0)
+    basis: Array = scaled @ (vectors[:, keep] / np.sqrt(values[keep]))
+    return basis
+
+
+def orthonormal_to_full_precision(columns: Array) -> Array:
+    """An orthonormal basis (m, r) of columns, to full precision: calendar years to the third power."""
+    scale = np.linalg.norm(columns, axis=0)
+    u, values, _ = np.linalg.svd(columns / np.where(scale == 0, 1.0, scale), full_matrices=False)
+    return np.asarray(u[:, values > 1e-12 * max(values.max(initial=0.0), 1e-300)])
+
+
+def without(basis: Array, columns: Array) -> Array:
+    """Columns with the span of an orthonormal basis taken out."""
+    if basis.shape[1] == 0:
+        return columns
+    remainder: Array = columns - basis @ (basis.T @ columns)
+    return remainder

@@ -1,0 +1,197 @@
+"""The search for missing effects: step by step, with the false discovery rate controlled over every scan.
+
+Each step weighs every candidate against what the effects selected so far leave over, selects the most convincing
+one if it stands the control, and then asks of each effect selected before whether, given the others, another
+candidate would do better: a mimic selected early is exchanged. The scan ends when nothing stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Generic
+
+from monitor.discovery.search.acceptance import Acceptance
+from monitor.discovery.search.evidence import Evidence, Pool, best_of_families, weigh_beside
+from monitor.discovery.search.scene import CandidateT, Scene, family_count
+from monitor.statistics import control_false_discoveries
+
+# More than this many effects hidden together in one campaign are beyond what a plan can separate.
+MOST_EFFECTS = 6
+# Effects that are merged and selected again in turn would go round for ever; a search that has not settled by then is
+# reported as it is.
+MOST_STEPS = 4 * MOST_EFFECTS
+# An exchange must be worth more than the noise of the comparison.
+WORTH_EXCHANGING = 1.0
+
+
+@dataclass(frozen=True)
+class Finding(Generic[CandidateT]):
+    """One effect that was found: the evidence for it given the others, its q-value, and its rivals.
+
+    ``rivals`` are all candidates with their evidence instead of it, most convincing first, itself included.
+    """
+
+    evidence: Evidence[CandidateT]
+    q_value: float
+    rivals: tuple[Evidence[CandidateT], ...]
+
+    @property
+    def candidate(self) -> CandidateT:
+        """The effect that was found."""
+        return self.evidence.candidate
+
+
+@dataclass(frozen=True)
+class ScanResult(Generic[CandidateT]):
+    """The findings of a scan, the most convincing first, and the evidence for all that remains."""
+
+    findings: tuple[Finding[CandidateT], ...]
+    remaining: tuple[Evidence[CandidateT], ...]
+
+    @property
+    def candidates(self) -> list[CandidateT]:
+        """The effects that were found."""
+        return [finding.candidate for finding in self.findings]
+
+
+def scan(
+    scene: Scene[CandidateT],
+    acceptance: Acceptance[CandidateT] | None = None,
+    *,
+    rate: float = 0.01,
+    most: int = MOST_EFFECTS,
+) -> ScanResult[CandidateT]:
+    """Search the missing effects among the candidates of which the data see anything.
+
+    ``rate`` is the false discovery rate over each scan; ``most`` how many effects at most; ``acceptance`` the rules
+    of the search, none where it is None.
+    """
+    steps = _Steps(scene, Acceptance() if acceptance is None else acceptance)
+    pool = _pool(scene)
+    selected: list[CandidateT] = []
+    for _ in range(MOST_STEPS):
+        weighed = best_of_families(steps.weighed(pool, selected))
+        if not weighed or len(selected) >= most:
+            break
+        best = steps.best(weighed, selected, rate)
+        if best is None:
+            break
+        selected.append(best)
+        selected[-1] = steps.rules.at_best_value(selected, len(selected) - 1)
+        pool = pool.with_more([other for other in steps.rules.alternatives(best) if other.visible])
+        selected = steps.exchanged(pool, selected)
+        selected = steps.merged(pool, selected)
+    return ScanResult(findings_of(scene, selected, pool, steps.rules), tuple(weighed))
+
+
+def _pool(scene: Scene[CandidateT]) -> Pool[CandidateT]:
+    return Pool(tuple(candidate for candidate in scene.candidates if candidate.visible))
+
+
+def findings_of(
+    scene: Scene[CandidateT],
+    selected: Sequence[CandidateT],
+    pool: Pool[CandidateT] | None = None,
+    rules: Acceptance[CandidateT] | None = None,
+) -> tuple[Finding[CandidateT], ...]:
+    """The selected effects with their evidence given the others and their rivals of ``pool`` (of all candidates where
+    there is none), most convincing first."""
+    steps = _Steps(scene, Acceptance() if rules is None else rules)
+    families = family_count(scene)
+    pool = _pool(scene) if pool is None else pool
+    findings = [steps.finding(pool, selected, index, families) for index in range(len(selected))]
+    return tuple(sorted(findings, key=lambda finding: -finding.evidence.score))
+
+
+@dataclass(frozen=True)
+class _Steps(Generic[CandidateT]):
+    """The steps of a scan of a scene under the rules of its search."""
+
+    scene: Scene[CandidateT]
+    rules: Acceptance[CandidateT]
+
+    def weighed(self, pool: Pool[CandidateT], selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
+        """Evidence for the candidates of a pool that can be separated from the selected ones, given these."""
+        return self.rules.separable(selected, weigh_beside(self.scene, pool, selected))
+
+    def best(
+        self, weighed: Sequence[Evidence[CandidateT]], selected: Sequence[CandidateT], rate: float
+    ) -> CandidateT | None:
+        """The most convincing candidate that stands the control and is accepted beside the selected ones."""
+        families = {candidate.family for candidate in selected}
+        q_values = control_false_discoveries([evidence.p_value for evidence in weighed], rate=rate).q_value
+        for evidence, q_value in zip(weighed, q_values, strict=True):
+            candidate = evidence.candidate
+            standing = q_value <= rate and candidate.family not in families
+            if standing and self.rules.accepts(selected, candidate):
+                return candidate
+        return None
+
+    def exchanged(self, pool: Pool[CandidateT], selected: Sequence[CandidateT]) -> list[CandidateT]:
+        """Exchange effects for better ones, given the others, until nothing improves."""
+        selected = list(selected)
+        for _ in range(MOST_EFFECTS):
+            changed = False
+            for index in range(len(selected)):
+                evidence, others = self.replaceable(pool, selected, index)
+                worth = others and others[0].score > evidence.score + WORTH_EXCHANGING
+                if worth and self.rules.outdoes(selected, others[0].candidate):
+                    selected[index] = others[0].candidate
+                    selected[index] = self.rules.at_best_value(selected, index)
+                    changed = True
+            if not changed:
+                break
+        return selected
+
+    def merged(self, pool: Pool[CandidateT], selected: list[CandidateT]) -> list[CandidateT]:
+        """Replace two effects by one where it explains as much at its price: growth of a whole artefact may first be
+        mistaken for that of two axes."""
+        families = {candidate.family for candidate in selected}
+        for first, second in combinations(range(len(selected)), 2):
+            others = [candidate for index, candidate in enumerate(selected) if index not in (first, second)]
+            weighed = [
+                evidence
+                for evidence in self.weighed(pool, others)
+                if evidence.candidate.family not in families
+            ]
+            pair = weigh_beside(self.scene, [selected[first]], others)[0].score
+            pair += weigh_beside(self.scene, [selected[second]], [*others, selected[first]])[0].score
+            if weighed and weighed[0].score > pair and self.rules.outdoes(selected, weighed[0].candidate):
+                return self.merged(pool, [*others, weighed[0].candidate])
+        return selected
+
+    def replaceable(
+        self, pool: Pool[CandidateT], selected: Sequence[CandidateT], index: int
+    ) -> tuple[Evidence[CandidateT], list[Evidence[CandidateT]]]:
+        """Evidence for the selected effect at an index, given the other selected ones, and for all not selected."""
+        others = except_for(selected, index)
+        families = {candidate.family for candidate in selected}
+        weighed = best_of_families(self.weighed(pool, others))
+        (evidence,) = weigh_beside(self.scene, [selected[index]], others)
+        return evidence, [other for other in weighed if other.candidate.family not in families]
+
+    def finding(
+        self, pool: Pool[CandidateT], selected: Sequence[CandidateT], index: int, families: int
+    ) -> Finding[CandidateT]:
+        """The selected effect at an index as a finding."""
+        evidence, others = self.replaceable(pool, selected, index)
+        # The smallest of m p-values times m bounds its q-value from above, whatever their dependence.
+        rivals = sorted([evidence, *others], key=lambda rival: -rival.score)
+        return Finding(evidence, min(1.0, evidence.p_value * families), tuple(rivals))
+
+
+def reduced(
+    result: ScanResult[CandidateT], weakest: Callable[[Sequence[Finding[CandidateT]]], int | None]
+) -> ScanResult[CandidateT]:
+    """Take out the ``weakest`` finding (its index), one after the other, until none is too weak."""
+    findings = list(result.findings)
+    while findings and (index := weakest(findings)) is not None:
+        del findings[index]
+    return replace(result, findings=tuple(findings))
+
+
+def except_for(selected: Sequence[CandidateT], index: int) -> list[CandidateT]:
+    """The selected candidates without that at an index."""
+    return [*selected[:index], *selected[index + 1 :]]

@@ -1,0 +1,1 @@
+"""Plans of touches before anyone measures, for methods whose problem is a ``TouchProblem``."""

@@ -1,0 +1,143 @@
+"""When did the parameters of a machine change? The one search that the trend page and the health report share.
+
+The same runs give the same changes, with the same p-values, whoever asks: one probability of a false alarm, one seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.statistics import Change, History, find_changes
+from monitor.workflow.history.series import Series
+
+#: Probability of any change where there is none, over all parameters and the whole history of a machine: a change that
+#: is none splits the history, and of a hundred machines that nobody touched one shows such a change, not five
+#: (docs/decisions.md; measured rates and the price in power: docs/trials-statistics.md).
+FALSE_ALARM = 0.01
+#: Seed of all that is simulated about a history (the null distributions of changes and of the warm-up, the limit of
+#: MEWMA), so that an answer can be computed again; stored with the result.
+SEED = 20260302
+#: From so many days on, changes are sought in the means of the days, which hide no day component.
+DAYS_FOR_MEANS = 15
+#: Uncertainties that differ by less than this factor weigh runs alike (it costs less than 1 % of the precision).
+ALIKE = 1.25
+#: Trials of the simulated null distribution at least; more where the level asks for it.
+TRIALS = 1999
+
+
+@dataclass(frozen=True)
+class ChangeSearch:
+    """Changes and drifts that a search of one parameter found, in the order of time; or why none were sought."""
+
+    changes: tuple[Change, ...] = ()
+    drifts: tuple[Change, ...] = ()
+    why_none: str | None = None
+
+
+def day_means(series: Series) -> tuple[Array, Array, Array | None, Array]:
+    """Times, means and relative uncertainties of the means by day, in order of time, and when each day's first run was.
+
+    The uncertainties are in units of the first, None where the days weigh alike.
+    """
+    _, first, index = np.unique(series.days, return_index=True, return_inverse=True)
+    weights = series.weights()
+    weight = np.ones_like(series.values) if weights is None else 1.0 / _relative(weights) ** 2
+    total = np.bincount(index, weight)
+    order = np.argsort(first, kind="stable")
+    # Of all runs alike: parameters that were measured together then share their times, and with them one search.
+    t = np.bincount(index, series.t) / np.bincount(index)
+    y = np.bincount(index, weight * series.values) / total
+    u = 1.0 / np.sqrt(total)
+    alike = u.max() <= ALIKE * u.min()
+    return t[order], y[order], None if alike else _relative(u[order]), series.t[first[order]]
+
+
+def _relative(u: Array) -> Array:
+    """Uncertainties in units of the first, to 9 digits.
+
+    Of the parameters that one plan determines they go together: their runs then weigh alike to the last bit, and one
+    search is theirs.
+    """
+    return np.asarray(np.round(u / u[0], 9))
+
+
+class _Plan(NamedTuple):
+    """What is searched at once; ``days`` are None where the values are means of days.
+
+    ``u`` are of the parameters whose runs weigh differently.
+    """
+
+    t: Array
+    begins: Array
+    days: npt.NDArray[Any] | None
+    values: dict[str, Array]
+    u: dict[str, Array]
+
+
+def search_changes(
+    series: Sequence[Series],
+    events: Sequence[float],
+    *,
+    false_alarm: float = FALSE_ALARM,
+    seed: int = SEED,
+) -> Mapping[str, ChangeSearch]:
+    """Steps, bends and transients of each parameter; or why none were sought.
+
+    ``events`` are times of known changes, in the unit of ``t``. Parameters measured at the same times share one
+    search, and those weighed alike the simulated null distribution. Which search a parameter is in does not change its
+    share of ``false_alarm``, the probability of any finding where there is nothing to find. The ``at`` of a
+    change is the start of its run, or of the first run of its day.
+    """
+    results: dict[str, ChangeSearch] = {}
+    for plan in _plans(series):
+        t = plan.t
+        pieces = len({0, *np.searchsorted(t, np.asarray(events, dtype=np.float64)).tolist()} - {len(t)})
+        try:
+            history = find_changes(
+                plan.values, t, rng=np.random.default_rng([seed, len(t)]), events=sorted(events),
+                u=plan.u, days=plan.days,
+                false_alarm=false_alarm * len(plan.values) / len(series),
+                # Five times as many trials as the level of one parameter in one piece needs at least.
+                trials=max(TRIALS, ceil(5 * len(series) * pieces / false_alarm)),
+            )  # fmt: skip
+        except DataError as error:
+            results |= dict.fromkeys(plan.values, ChangeSearch(why_none=f"no search for changes: {error}"))
+            continue
+        results |= {name: _of_parameter(history, name, plan.begins) for name in plan.values}
+    return results
+
+
+def _plans(series: Sequence[Series]) -> list[_Plan]:
+    """The parameters by what they share: times and days."""
+    plans: dict[tuple[bytes, ...], _Plan] = {}
+    for parameter in series:
+        days: npt.NDArray[Any] | None
+        if parameter.day_count >= DAYS_FOR_MEANS:
+            t, y, u, begins = day_means(parameter)
+            days = None
+        else:
+            t, y, begins, u = parameter.t, parameter.values, parameter.t, parameter.weights()
+            u = _relative(u) if u is not None and u.max() > ALIKE * u.min() else None
+            days = parameter.days
+        key = (t.tobytes(), b"" if days is None else days.tobytes())
+        plan = plans.setdefault(key, _Plan(t, begins, days, {}, {}))
+        plan.values[parameter.name] = y
+        if u is not None:
+            plan.u[parameter.name] = u
+    return list(plans.values())
+
+
+def _of_parameter(history: History, name: str, begins: Array) -> ChangeSearch:
+    changes, drifts = (
+        tuple(replace(change, at=float(begins[change.index])) for change in part if change.parameter == name)
+        for part in (history.changes, history.trends)
+    )
+    return ChangeSearch(changes, drifts)

@@ -1,0 +1,72 @@
+"""The drift of one parameter since its last change: the one line that the trend page and the health report state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from monitor.exceptions import DataError
+from monitor.statistics import Trend, trend
+from monitor.workflow.history.series import Series
+
+#: A slope a year is stated from so many days of history on. Over fewer, the scatter of a few days, multiplied by
+#: fifty and more, is no statement about a year; and where days differ much among themselves the weighted slope
+#: rests on the hours within the days, which a machine that warms up every morning fills with something else.
+SHORTEST_DAYS = 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class PieceDrift:
+    """The present piece of the steady runs ``whole``, since ``begins`` (days since 1970, -inf: all), and its line."""
+
+    whole: Series
+    begins: float
+
+    @cached_property
+    def piece(self) -> Series:
+        """The steady runs since the last change or event."""
+        return self.whole.part(self.whole.t >= self.begins)
+
+    @cached_property
+    def span(self) -> float:
+        """Days from the first run of the piece to its last."""
+        return float(np.ptp(self.piece.t)) if len(self.piece.t) else 0.0
+
+    @cached_property
+    def _fit(self) -> Trend | str:
+        piece = self.piece
+        if len(piece.t) and np.ptp(piece.values) == 0.0:
+            return f"no drift of {piece.name}: it has the same value in every run"
+        try:
+            return trend(piece.values, piece.t, u=piece.weights(), days=piece.days)
+        except DataError as error:
+            return f"no drift: {error}"
+
+    @property
+    def line(self) -> Trend | None:
+        """The line through the piece, however short; None with fewer than three days."""
+        return self._fit if isinstance(self._fit, Trend) else None
+
+    @property
+    def stated(self) -> Trend | None:
+        """The line where the piece is long enough for a slope a year."""
+        return self.line if self.span >= SHORTEST_DAYS else None
+
+    @property
+    def why_not_stated(self) -> str | None:
+        """Why no slope a year is stated; None where it is."""
+        if self.span < SHORTEST_DAYS:
+            return too_short(self.span, bool(np.isfinite(self.begins)))
+        return self._fit if isinstance(self._fit, str) else None
+
+
+def too_short(span: float, split: bool) -> str:
+    """The sentence for a history of ``span`` days; ``split`` where it begins at a change or an event."""
+    count = max(round(span), 1)
+    since = " since the last change or event" if split else ""
+    return (
+        f"{count} day{'s' if count > 1 else ''} of history{since} {'are' if count > 1 else 'is'} too short for a "
+        f"slope a year; at least {SHORTEST_DAYS:g} are needed"
+    )

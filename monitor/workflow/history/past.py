@@ -1,0 +1,54 @@
+"""The past of a machine: of every parameter its series, when it changed, and its drift since then.
+
+Trend page and health report read this one record; the same runs and events give the same past. The fleet table, which
+never reads the runs of a machine, computes its drift from sums in the database; what differs by definition is in
+docs/statistics.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.store import NOTE, MachineEvent, MachineHistory
+from monitor.workflow.history.calendar import days_since_1970
+from monitor.workflow.history.changes import ChangeSearch, search_changes
+from monitor.workflow.history.drift import PieceDrift
+from monitor.workflow.history.series import Series, parameter_series
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterPast:
+    """One parameter: its ``series`` of all runs that have it, ``mask`` (n,) of those among the runs of the machine.
+
+    ``search`` has its changes, ``drift`` the steady runs since the last of them, or since the last event.
+    """
+
+    series: Series
+    mask: npt.NDArray[np.bool_]
+    search: ChangeSearch
+    drift: PieceDrift
+
+
+def splitting_events(events: Sequence[MachineEvent]) -> list[float]:
+    """Times (days since 1970) of the events that may have changed the machine; a note changes nothing."""
+    return [days_since_1970(event.at) for event in events if event.kind != NOTE]
+
+
+def machine_past(history: MachineHistory, events: Sequence[float]) -> dict[str, ParameterPast]:
+    """The past of every parameter that a run has; ``events`` split it (days since 1970)."""
+    every = parameter_series(history)
+    searches = search_changes([series.steady for series, _ in every.values()], events)
+    return {
+        name: ParameterPast(series, mask, searches[name], _drift(series.steady, searches[name], events))
+        for name, (series, mask) in every.items()
+    }
+
+
+def _drift(steady: Series, search: ChangeSearch, events: Sequence[float]) -> PieceDrift:
+    """The present piece of history: since the last event or change."""
+    moments = [at for at in events if at <= steady.t[-1]] + [change.at for change in search.changes]
+    return PieceDrift(steady, max(moments, default=-np.inf))

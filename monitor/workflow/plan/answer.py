@@ -1,0 +1,160 @@
+"""The answers of `plan`: of balls at indexations, and of angles of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from monitor.documents import INLINED, OMITTED, named
+from monitor.workflow.explain.explain_answer import DeviationsApart
+
+#: Positions of rotary axes in degrees by the name of the column: ``a_deg``.
+Pose = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class TimeAnswer:
+    """Seconds for probing one target and for going to another indexation besides, and what they are taken from."""
+
+    seconds_a_probing: float
+    seconds_an_indexation: float
+    source: str = field(metadata=named("from"))
+
+
+@dataclass(frozen=True)
+class PlannedParameter:
+    """What a plan promises of a parameter, None where it gives no number.
+
+    ``figure_of_merit`` is what an hour of the plan says of the parameter, against the present plan; ``separation`` how
+    well it is told apart from the others (0 to 1).
+    """
+
+    u: float | None
+    expanded: float | None
+    unit: str
+    figure_of_merit: float | None
+    separation: float
+
+
+@dataclass(frozen=True)
+class BallPlan:
+    """Balls at indexations, what they cost and promise; ``k_q`` is the coverage factor of all parameters jointly."""
+
+    balls: tuple[str, ...]
+    ball_places_mm: Mapping[str, tuple[float, ...]]
+    poses: tuple[Pose, ...]
+    probings: int
+    seconds: float
+    k_q: float
+    parameters: Mapping[str, PlannedParameter]
+    refused: tuple[str, ...]
+    blind_spots: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class BallSubset:
+    """The best subset of its size of the campaign's own balls, and the standard uncertainties that it gives."""
+
+    balls: tuple[str, ...]
+    seconds: float
+    u: Mapping[str, float | None]
+
+
+class SeparationVerdict(Enum):
+    """Whether two effects can be told apart."""
+
+    IMPOSSIBLE = "no pose that this machine reaches tells them apart"
+    WITH_POSES = "probe at these poses too"
+    ALREADY = "this plan tells them apart already"
+
+
+@dataclass(frozen=True)
+class SeparationAnswer:
+    """Poses that tell two effects of size ``peak_um`` at the tip apart."""
+
+    effects: tuple[str, str]
+    peak_um: float
+    poses: tuple[Pose, ...]
+    standard_deviations_apart: DeviationsApart
+    verdict: SeparationVerdict
+
+
+@dataclass(frozen=True)
+class BallPlanAnswer:
+    """What the plan of a campaign's first run promises, and a proposed one; ``blind_spots`` leave nothing to see."""
+
+    campaign: str
+    machine: str
+    model: str
+    p: float
+    stated_uncertainty_um: float
+    time_model: TimeAnswer
+    present: BallPlan
+    by_balls: tuple[BallSubset, ...]
+    blind_spots: tuple[str, ...]
+    wanted: Mapping[str, float] | None = field(default=None, metadata=OMITTED)
+    proposed: BallPlan | None = field(default=None, metadata=OMITTED)
+    separate: SeparationAnswer | None = field(default=None, metadata=OMITTED)
+    figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class ShapeUncertainty:
+    """Expanded uncertainties of the points of a shape; None where no point has a number."""
+
+    largest_expanded_shape_um: float | None
+    median_expanded_shape_um: float | None
+    points_without_number: int
+    points_beyond_nodes: int
+
+
+@dataclass(frozen=True)
+class AngleParameter:
+    """The expected standard uncertainty of a parameter, None where it has no number."""
+
+    u: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class AnglesOfTable:
+    """A plan of angles of a table; ``unseen_dimensions`` are left open by it."""
+
+    angles_deg: tuple[float, ...]
+    probings: int
+    unseen_dimensions: int
+    shape: ShapeUncertainty = field(metadata=INLINED)
+    parameters: Mapping[str, AngleParameter]
+    refused: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class OneMoreAngle:
+    """The present plan with one more angle, which stands under the column's name: ``c_deg``."""
+
+    angle: Pose = field(metadata=INLINED)
+    shape: ShapeUncertainty = field(metadata=INLINED)
+    unseen_dimensions: int
+
+
+@dataclass(frozen=True)
+class AnglePlanAnswer:
+    """What the angles of a campaign's first run promise, the worth of one more, and the best next ones."""
+
+    campaign: str
+    machine: str
+    method: str
+    model: str
+    p: float
+    k: float
+    table: str
+    stated_uncertainty_um: float
+    conditions: Mapping[str, str]
+    present: AnglesOfTable
+    angles: tuple[OneMoreAngle, ...]
+    next_angles_deg: tuple[float, ...]
+    proposed: AnglesOfTable
+
+
+PlanAnswer = BallPlanAnswer | AnglePlanAnswer

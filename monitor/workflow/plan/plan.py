@@ -1,0 +1,83 @@
+"""Plans before anyone measures: expected uncertainties, blind spots, the best balls and indexations, next poses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from monitor.documents import to_document
+from monitor.methods import AnglePlan, campaign_method
+from monitor.methods.planning.candidates import Choice
+from monitor.methods.planning.search import best_plan, quickest_plan
+from monitor.records import Campaign
+from monitor.store import Database, StoredModel, load_campaign, save_analysis
+from monitor.units import MICROMETRE
+from monitor.workflow.models import label, resolve
+from monitor.workflow.plan.angles import plan_angles
+from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, PlanAnswer, TimeAnswer
+from monitor.workflow.plan.balls import ball_plan, best_subsets, blind_spots, parameter_units
+from monitor.workflow.plan.candidates import PlannedCampaign, planned
+from monitor.workflow.plan.request import PlanRequest
+from monitor.workflow.plan.separate import separation
+
+
+def plan(db: Database, request: PlanRequest) -> PlanAnswer:
+    """What a campaign's plan promises, and a better one where numbers or uncertainties are wanted; stored.
+
+    Raises InputError, DataError, NotFoundError, EffectError.
+    """
+    campaign = load_campaign(db, request.campaign)
+    model = resolve(db, request.model, campaign.method)
+    method = campaign_method(campaign).plan
+    answer: PlanAnswer = (
+        plan_angles(method, campaign, model, request)
+        if isinstance(method, AnglePlan)
+        else _plan_balls(campaign, model, request)
+    )
+    save_analysis(
+        db, "plan", to_document(answer), method=campaign.method, campaign=campaign.name,
+        model=model.name, model_version=model.version,
+    )  # fmt: skip
+    if request.figures is None or isinstance(answer, AnglePlanAnswer):
+        return answer
+    # Loaded here: drawing costs a second that a plan without figures need not wait.
+    from monitor.workflow.plan.figures import plan_figures
+
+    return replace(answer, figures=plan_figures(answer, request.figures))
+
+
+def _plan_balls(campaign: Campaign, model: StoredModel, request: PlanRequest) -> BallPlanAnswer:
+    """Balls at indexations."""
+    weighed = planned(campaign, model, request.balls or 1)
+    time = weighed.candidates.time
+    proposed = _proposed(weighed, request)
+    return BallPlanAnswer(
+        campaign=campaign.name,
+        machine=campaign.machine.id,
+        model=label(model),
+        p=request.p,
+        stated_uncertainty_um=MICROMETRE.to_display(weighed.candidates.touches.sigma),
+        time_model=TimeAnswer(time.probing_s, time.indexation_s, time.source),
+        present=ball_plan(weighed, weighed.present, request.p),
+        by_balls=best_subsets(weighed),
+        blind_spots=blind_spots(weighed, weighed.present),
+        wanted=dict(request.wanted) or None,
+        proposed=None
+        if proposed is None
+        else replace(ball_plan(weighed, proposed, request.p), blind_spots=blind_spots(weighed, proposed)),
+        separate=None if request.separate is None else separation(campaign, model, request.separate),
+    )
+
+
+def _proposed(weighed: PlannedCampaign, request: PlanRequest) -> Choice | None:
+    """The plan that is asked for: the quickest for wanted uncertainties, the best of so many balls and indexations."""
+    candidates = weighed.candidates
+    if request.wanted:
+        units = parameter_units(weighed)
+        wanted = {
+            name: units[name].to_internal(u) if name in units else u for name, u in request.wanted.items()
+        }
+        return quickest_plan(candidates, wanted, request.balls or len(candidates.balls))
+    if request.balls is None and request.poses is None:
+        return None
+    balls = len(candidates.balls) if request.balls is None else request.balls
+    return best_plan(candidates, balls, request.poses, present=weighed.present.poses)

@@ -1,0 +1,56 @@
+"""Poses that tell two effects apart which a plan may not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from monitor.discovery import fit
+from monitor.discovery.machine.separate import Separation, separating_poses
+from monitor.effects import parse_effect
+from monitor.methods import campaign_method
+from monitor.records import Campaign
+from monitor.store import StoredModel
+from monitor.units import DEGREE, MICROMETRE
+from monitor.workflow.explain.explain_answer import DeviationsApart
+from monitor.workflow.models import as_model
+from monitor.workflow.plan.answer import SeparationAnswer, SeparationVerdict
+from monitor.workflow.plan.candidates import strokes_of
+
+# The size for which effects are told apart, at the tip.
+SEPARATED_PEAK = MICROMETRE.to_internal(5.0)
+
+
+def separation(campaign: Campaign, model: StoredModel, texts: tuple[str, str]) -> SeparationAnswer:
+    """Poses to probe at besides the campaign's own, so that the first effect is not taken for the second.
+
+    Raises EffectError for an effect that the machine does not have.
+    """
+    fitted = fit(campaign_method(campaign).problem_of(campaign, as_model(model)))
+    context = fitted.problem.context
+    effect, rival = (parse_effect(text, context.chain) for text in texts)
+    basis = effect.basis(context)
+    displacement = fitted.moved_by(basis) @ np.ones(basis.size)
+    largest = float(np.linalg.norm(displacement, axis=1).max())
+    size = SEPARATED_PEAK / largest if largest > 0.0 else 1.0
+    rotary, linear = strokes_of(campaign, context.chain, context.positions)
+    poses = separating_poses(fitted, effect, np.full(basis.size, size), [rival], {**rotary, **linear})
+    return SeparationAnswer(
+        effects=(effect.text, rival.text),
+        peak_um=MICROMETRE.to_display(SEPARATED_PEAK),
+        poses=tuple(
+            {
+                f"{name.lower()}_deg": round(context.chain.joint(name).sign * DEGREE.to_display(angle), 4)
+                + 0.0
+                for name, angle in pose.items()
+            }
+            for pose in poses.poses
+        ),
+        standard_deviations_apart=DeviationsApart(poses.before, poses.after),
+        verdict=_verdict(poses),
+    )
+
+
+def _verdict(separation: Separation) -> SeparationVerdict:
+    if separation.together:
+        return SeparationVerdict.IMPOSSIBLE
+    return SeparationVerdict.WITH_POSES if separation.poses else SeparationVerdict.ALREADY

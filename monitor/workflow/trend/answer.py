@@ -1,0 +1,331 @@
+"""What `monitor trend` answers: ``TrendAnswer``. Its fields are the keys of its JSON document.
+
+Times are ISO 8601 by the shop's clock. Where the runs do not suffice for a number it is None, and a field ``why``
+beside it is the sentence that says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from monitor.documents import INLINED, OMITTED, named
+from monitor.workflow.history.agreement import AgreementPair
+
+#: The ends of an interval of time; None where open.
+Between = tuple[str | None, str | None]
+
+
+@dataclass(frozen=True)
+class RecordedEvent:
+    """What people recorded of the machine; ``at`` in UTC."""
+
+    at: str
+    kind: str
+    description: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriftStatement:
+    """The slope a year of the present piece of history, since the last change or event.
+
+    ``robust_slope_per_year`` by Theil and Sen, ``monotone_p`` by Mann and Kendall; ``between_days`` and
+    ``within_days`` are standard deviations about the line.
+    """
+
+    slope_per_year: float | None = None
+    u_slope: float | None = None
+    slope_interval: tuple[float, float] | None = None
+    p_value: float | None = None
+    robust_slope_per_year: float | None = None
+    robust_interval: tuple[float, float] | None = None
+    monotone_p: float | None = None
+    autocorrelation: float | None = None
+    between_days: float | None = None
+    within_days: float | None = None
+    since: str | None
+    n: int
+    days: int
+    span_days: float
+    why: str | None
+
+
+@dataclass(frozen=True)
+class LatestMean:
+    """The mean of the last day's runs; its uncertainty by their scatter, of a single run as stated."""
+
+    latest: float
+    latest_u: float | None
+    latest_runs: int
+    latest_at: str | None
+
+
+@dataclass(frozen=True)
+class DatedChange:
+    """A change of a parameter, between which times it lies, and its size; a slope is stated a day or a year."""
+
+    at: str | None
+    interval: Between
+    kind: str
+    size: float
+    u: float
+    unit: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class ConditionEffect:
+    """How a parameter goes with a recorded condition, which ran ``from_`` a value ``to`` another.
+
+    ``moves_with`` names conditions (or ``time``) that cannot be told apart from it.
+    """
+
+    channel: str
+    coefficient: float
+    u: float
+    interval: tuple[float, float]
+    unit: str
+    p_value: float | None
+    n: int
+    from_: float = field(metadata=named("from"))
+    to: float
+    moves_with: tuple[str, ...]
+    q_value: float | None
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A wave of a day or a year."""
+
+    cycle: str
+    period_days: float
+    amplitude: float
+    u: float
+    unit: str
+    peak_at: str | None
+    p_value: float | None
+
+
+@dataclass(frozen=True)
+class WarmUp:
+    """The warm-up of a campaign that was begun cold or hot: its time constant, and when the machine is stable."""
+
+    campaign: str
+    amplitude: float
+    u: float
+    unit: str
+    tau_h: float
+    tau_interval_h: tuple[float | None, float | None]
+    stable_after_h: float | None
+    stable_interval_h: tuple[float | None, float | None]
+    stable_within: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class LimitForecast:
+    """When the drift reaches the limit, and how likely the parameter is in tolerance at the next check."""
+
+    limit: float | None
+    crosses_limit_at: str | None
+    crosses_limit_interval: Between | None
+    in_tolerance_at_next_check: float | None
+    next_check: str | None
+    recommended_interval_days: float | None
+    recommended_by: str | None
+    why_no_forecast: str | None
+
+
+@dataclass(frozen=True)
+class ForecastTest:
+    """How good the forecasts of a parameter were: ``inside`` of ``made`` lay in their interval."""
+
+    made: int
+    inside: int
+    share_inside: float
+    level: float
+    bias: float
+    rms: float
+    unit: str
+    method: str
+
+
+@dataclass(frozen=True)
+class ChartState:
+    """A control chart after its reference period."""
+
+    state: str
+    alarms: int
+    first_alarm_at: str | None
+    last_alarm_at: str | None
+
+
+@dataclass(frozen=True)
+class ShewhartState(ChartState):
+    """The chart of the points, with its limits."""
+
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class EwmaState(ChartState):
+    """The chart of the exponentially weighted mean, with its limits at the latest point."""
+
+    value: float
+    lower: float
+    upper: float
+    weight: float
+
+
+@dataclass(frozen=True)
+class CusumState(ChartState):
+    """The chart of the cumulated sums; ``since`` says when the sum that raised the alarm began."""
+
+    high: float
+    low: float
+    limit: float
+    since: str | None
+
+
+@dataclass(frozen=True)
+class VectorState(ChartState):
+    """A chart of all parameters together; ``shares`` say which of them raise the latest point."""
+
+    value: float
+    limit: float
+    average_run_length: float | None = field(default=None, metadata=OMITTED, kw_only=True)
+    shares: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class ParameterCharts:
+    """The charts of one parameter, or ``why`` there are none."""
+
+    why: str | None
+    centre: float | None = field(default=None, metadata=OMITTED)
+    sd: float | None = field(default=None, metadata=OMITTED)
+    shewhart: ShewhartState | None = field(default=None, metadata=OMITTED)
+    ewma: EwmaState | None = field(default=None, metadata=OMITTED)
+    cusum: CusumState | None = field(default=None, metadata=OMITTED)
+
+    @property
+    def alarms(self) -> list[str]:
+        """The charts that raise an alarm at the latest point."""
+        charts = {"shewhart": self.shewhart, "ewma": self.ewma, "cusum": self.cusum}
+        return [name for name, chart in charts.items() if chart is not None and chart.state == "alarm"]
+
+
+@dataclass(frozen=True)
+class VectorCharts:
+    """The charts of all parameters together, or ``why`` there are none."""
+
+    why: str | None
+    parameters: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    t_squared: VectorState | None = field(default=None, metadata=OMITTED)
+    mewma: VectorState | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class ReferencePeriod:
+    """What the charts compare with: ``points`` are runs or days; a false alarm comes once in so many of them."""
+
+    points: str
+    reference_points: int
+    reference_from: str | None
+    reference_to: str | None
+    average_run_length: float
+
+
+@dataclass(frozen=True)
+class ControlCharts:
+    """The reference period of all charts, and those of the vector of all parameters."""
+
+    period: ReferencePeriod = field(metadata=INLINED)
+    vector: VectorCharts
+
+
+@dataclass(frozen=True)
+class ParameterTrend:
+    """The long view of one parameter."""
+
+    unit: str
+    drift: DriftStatement = field(metadata=INLINED)
+    mean: LatestMean = field(metadata=INLINED)
+    changes: tuple[DatedChange, ...]
+    drifts: tuple[DatedChange, ...]
+    why_no_changes: str | None
+    conditions: tuple[ConditionEffect, ...]
+    why_no_conditions: str | None
+    cycles: tuple[Cycle, ...]
+    why_no_cycles: str | None
+    warm_up: WarmUp | None
+    why_no_warm_up: str | None
+    forecast: LimitForecast = field(metadata=INLINED)
+    backtest: ForecastTest | None
+    why_no_backtest: str | None
+    control: ParameterCharts
+    q_value: float | None
+
+
+@dataclass(frozen=True)
+class VolumetricTest:
+    """How good the forecasts of the volumetric error were."""
+
+    made: int
+    inside: int
+    share_inside: float
+    level: float
+    bias_um: float
+    rms_um: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class VolumetricForecast:
+    """When the volumetric error reaches its limit; ``why`` says why that is not forecast.
+
+    ``held`` parameters have no drift and stay where they are; those ``left_out`` are no error of the chain.
+    """
+
+    limit_um: float | None
+    latest_um: float | None = None
+    crosses_limit_at: str | None = None
+    crosses_limit_interval: Between | None = None
+    next_check: str | None
+    predicted_um: float | None = None
+    predicted_interval_um: tuple[float, float] | None = None
+    in_tolerance_at_next_check: float | None = None
+    recommended_interval_days: float | None = None
+    held: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    correlation_shrunk_by: float | None = None
+    method: str
+    backtest: VolumetricTest | None = None
+    why_no_backtest: str | None = None
+    points: int | None = field(default=None, metadata=OMITTED)
+    why: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrendAnswer:
+    """The long view of a machine; ``why`` says why there are no parameters.
+
+    ``false_alarm`` is the probability of any change where there is none, ``seed`` that of everything simulated.
+    """
+
+    machine: str
+    since: str | None
+    runs: int
+    campaigns: tuple[str, ...]
+    methods: tuple[str, ...]
+    agreement: tuple[AgreementPair, ...]
+    events: tuple[RecordedEvent, ...]
+    notes: tuple[str, ...]
+    false_alarm: float
+    seed: int
+    why: str | None
+    next_check: str | None = field(default=None, metadata=OMITTED)
+    control: ControlCharts | None = field(default=None, metadata=OMITTED)
+    parameters: Mapping[str, ParameterTrend]
+    volumetric_error: VolumetricForecast | None = field(default=None, metadata=OMITTED)
+    figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -1,0 +1,48 @@
+"""What is asked of the long view of a machine: ``TrendRequest``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from monitor.exceptions import InputError
+
+
+@dataclass(frozen=True)
+class TrendRequest:
+    """Follow the parameters of a machine; moments have an offset from UTC.
+
+    ``parameter`` alone, runs from ``since`` on, of the ``campaigns`` (empty: all), under a ``model`` (by default the
+    method's own). The control charts compare with a ``reference`` period (by default the first third). ``reliability``
+    is the wanted probability of being in tolerance until the ``next_check``; ``volumetric_limit_um`` takes the place of
+    the machine file's. ``figures`` are drawn into a folder.
+    """
+
+    machine: str
+    parameter: str | None = None
+    since: datetime | None = None
+    next_check: datetime | None = None
+    reference: tuple[datetime, datetime] | None = None
+    reliability: float = 0.95
+    campaigns: tuple[str, ...] = ()
+    model: str | None = None
+    volumetric_limit_um: float | None = None
+    figures: Path | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.reliability < 1.0:
+            raise InputError(f"--reliability {self.reliability:g}: a probability lies between 0 and 1")
+        limit = self.volumetric_limit_um
+        if limit is not None and not 0.0 < limit < float("inf"):
+            raise InputError(f"--volumetric-limit {limit:g}: a limit in µm lies above zero")
+        if limit is not None and self.parameter is not None:
+            raise InputError("--volumetric-limit needs all parameters; leave out --parameter")
+        if self.reference is not None and self.reference[0] >= self.reference[1]:
+            first, last = (f"{moment:%Y-%m-%d}" for moment in self.reference)
+            raise InputError(f"--reference {first}..{last}: the first date must lie before the second")
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing but the machine was named: such an answer is stored."""
+        return replace(self, figures=None) == TrendRequest(self.machine)

@@ -1,0 +1,63 @@
+"""What compare, explain and identify answer is what they store, for machines and for curves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from monitor.discovery import Verdict
+from monitor.documents import from_document
+from monitor.exceptions import InputError
+from monitor.store import Database, load_analysis
+from monitor.workflow.explain.compare import compare
+from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachineComparison
+from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.explain_answer import CurveMissing, ExplainAnswer, MachineMissing
+from monitor.workflow.explain.request import CompareRequest, ExplainRequest
+from monitor.workflow.identify.answer import IdentifyAnswer
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.intake.campaigns import import_folders
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+KINDS = {
+    "load-cell": (CurveComparison, CurveMissing),
+    "hidden-reversal-x": (MachineComparison, MachineMissing),
+}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    with Database(tmp_path_factory.mktemp("answers") / "x.duckdb") as db:
+        import_folders(db, [EXAMPLES / name for name in KINDS])
+        yield db
+
+
+@pytest.mark.parametrize("campaign", KINDS)
+def test_a_comparison_is_restored_from_what_was_stored(measured: Database, campaign: str) -> None:
+    answer = compare(measured, CompareRequest(campaign))
+    stored = load_analysis(measured, "comparison", campaign=campaign)
+    assert from_document(CompareAnswer, stored.document) == answer
+    assert isinstance(answer.comparison, KINDS[campaign][0])
+    assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING
+
+
+@pytest.mark.parametrize("campaign", KINDS)
+def test_an_explanation_is_restored_from_what_was_stored(measured: Database, campaign: str) -> None:
+    answer = explain(measured, ExplainRequest(campaign))
+    stored = load_analysis(measured, "explanation", campaign=campaign)
+    assert from_document(ExplainAnswer, stored.document) == answer
+    assert isinstance(answer.missing[0], KINDS[campaign][1])
+
+
+def test_the_coefficients_of_a_curve_are_restored_from_what_was_stored(measured: Database) -> None:
+    answer = identify(measured, IdentifyRequest("load-cell"))
+    stored = load_analysis(measured, "identification", campaign="load-cell")
+    assert from_document(IdentifyAnswer, stored.document) == answer
+
+
+def test_a_rate_is_checked_with_the_request() -> None:
+    with pytest.raises(InputError, match="the false discovery rate must lie between 0 and 1, not 1"):
+        ExplainRequest("any", rate=1.0)
