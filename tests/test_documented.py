@@ -37,11 +37,9 @@ LIBRARY_METHODS = {"error"}
 
 #: Files with public names that lack such a docstring, to be emptied.
 LACKING: set[str] = {
-    "cli/trend_output.py",
-    "discovery/curve/acceptance.py",
-    "discovery/curve/search.py",
-    "discovery/machine/evidence.py",
+    "discovery/curve/noise_evidence.py",
     "discovery/machine/poses.py",
+    "discovery/machine/run_evidence.py",
     "discovery/search/comparison.py",
     "effects/artefact/ball.py",
     "effects/context.py",
@@ -76,9 +74,9 @@ LACKING: set[str] = {
     "uncertainty/tolerance.py",
     "uncertainty/volumetric.py",
     "workflow/certificate/files.py",
-    "workflow/health/facts.py",
-    "workflow/health/verdict.py",
-    "workflow/history/change_search.py",
+    "workflow/explain/compare_answer.py",
+    "workflow/explain/version_answer.py",
+    "workflow/health/forecast.py",
     "workflow/run_statistics/tests.py",
 }
 
