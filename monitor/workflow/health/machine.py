@@ -147,7 +147,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         run=_in_words(last),
         basis="" if stated is None else stated.input_covariance, factor=factor_in_words(stated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=condition_ranges(past.runs_of_week),
-        model=model_health(explanation, results.versions or (), measured.span), quality=quality,
+        model=model_health(explanation, results.versions, measured.span), quality=quality,
         map=stated_map(results.map),
     )  # fmt: skip
 
