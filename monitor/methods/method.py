@@ -108,7 +108,7 @@ class ExpectedAngles(Protocol):
 class AngleCandidates(Protocol):
     """Angles of a ``table`` (degrees) to choose from, with the ``present`` plan of the first run.
 
-    ``conditions`` are those of the plan in sentences, ``units`` the display units of the parameters.
+    ``conditions`` are those on the shape, ``units`` the display units of the parameters.
     """
 
     @property
