@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +25,7 @@ SMALLEST_MOVE_RAD = 50e-6
 
 @dataclass(frozen=True)
 class Context:
-    """n probings, as the effects need them.
+    """The n probings, as the effects need them.
 
     ``positions`` (n, J) physical displacements in mm and rad as read; ``expected`` (n, J) the same without each
     row's noise, where a method can compute it, for effects that follow fine steps; ``run`` (n,) the run's number;
@@ -58,6 +59,15 @@ class Context:
         fit the noise that it is to explain.
         """
         return self.positions if self.expected is None else self.expected
+
+    def taken(self, rows: npt.NDArray[np.int64]) -> Context:
+        """Return the chosen rows (any number of them), in that order, with repetitions."""
+        arrays: dict[str, Any] = {
+            field.name: values[rows]
+            for field in fields(self)
+            if isinstance(values := getattr(self, field.name), np.ndarray)
+        }
+        return replace(self, **arrays, columns={name: values[rows] for name, values in self.columns.items()})
 
     def expecting(self, expected: Array) -> Context:
         """Return the same probings with ``expected`` (n, J), in the columns of the axes' readings too."""

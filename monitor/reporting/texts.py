@@ -1,15 +1,12 @@
 """The words of a certificate by language: ``reports/certificate.LANGUAGE.toml``, one file a language.
 
 All files have the same keys, so another language is another file. What belongs to a language besides its words is in
-the file too: the decimal sign and how a day is written. The computation says a few things about itself in English
-sentences (why a parameter has no number, where the covariance of the readings is from): ``computed`` recognises them
-by their English wording, part by part, and says them in the language; one that it does not know stays as it is.
+the file too: the decimal sign and how a day is written.
 """
 
 from __future__ import annotations
 
 import re
-import string
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +22,6 @@ from monitor.reporting.resources import report_folder, report_text
 
 ENGLISH = "en"
 _FILE = re.compile(r"certificate\.([a-z]{2})\.toml")
-_NUMBER = re.compile(r"\d+\.\d+")
 
 
 @dataclass(frozen=True)
@@ -45,6 +41,7 @@ class Texts:
 
     @property
     def decimal_sign(self) -> str:
+        """The sign between whole and decimal digits."""
         return self.words["language.decimal_sign"]
 
     def day(self, day: date) -> str:
@@ -54,17 +51,6 @@ class Texts:
     def number(self, number: Decimal) -> str:
         """A decimal number with a true minus sign and the language's decimal sign."""
         return written(number, self.decimal_sign)
-
-    def computed(self, sentence: str) -> str:
-        """A sentence of the computation in this language."""
-        if self.language == ENGLISH:
-            return sentence
-        for key, pattern in _patterns():
-            if match := pattern.fullmatch(sentence):
-                return self(key, **{name: self.computed(part) for name, part in match.groupdict().items()})
-        if _NUMBER.fullmatch(sentence):
-            return sentence.replace(".", self.decimal_sign)
-        return ", ".join(map(self.computed, sentence.split(", "))) if ", " in sentence else sentence
 
 
 @cache
@@ -82,17 +68,3 @@ def texts_of(language: str = ENGLISH) -> Texts:
     tables = tomllib.loads(report_text(f"certificate.{language}.toml"))
     sentences = {f"{section}.{key}": text for section, table in tables.items() for key, text in table.items()}
     return Texts(language, sentences)
-
-
-@cache
-def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """The English sentences of the computation as patterns, in the order of their file."""
-    patterns = []
-    for key, text in texts_of(ENGLISH).words.items():
-        if key.startswith("sentences."):
-            parts = [
-                re.escape(literal) + (f"(?P<{name}>.+?)" if name else "")
-                for literal, name, _, _ in string.Formatter().parse(text)
-            ]
-            patterns.append((key, re.compile("".join(parts))))
-    return tuple(patterns)

@@ -70,7 +70,7 @@ class _Identified:
 
 @dataclass(frozen=True)
 class MachineHistory:
-    """n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
+    """The n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
 
     ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
     are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of

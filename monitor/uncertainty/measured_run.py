@@ -7,13 +7,12 @@ the function that chooses.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields, replace
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from monitor.effects import Context
 from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Linearisation, solve
 from monitor.methods.chain.problem import ChainProblem
@@ -118,17 +117,6 @@ class MeasuredRun(ABC):
 
         begin = np.tile(start, (inputs.shape[1], 1))
         return np.asarray(solve(linearise, begin, fixed).local.T)
-
-
-def rows_of(context: Context, rows: npt.NDArray[np.int64]) -> Context:
-    """A context of the chosen rows (any number of them), in that order, with repetitions."""
-    columns: dict[str, Any] = {
-        field.name: value[rows]
-        for field in fields(Context)
-        if isinstance(value := getattr(context, field.name), np.ndarray)
-    }
-    columns["columns"] = {name: value[rows] for name, value in context.columns.items()}
-    return replace(context, **columns)
 
 
 def same_plan(first: ChainProblem, other: ChainProblem) -> bool:

@@ -7,39 +7,18 @@ the residual by the same to products of a deviation with an error of the machine
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Linearisation
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
-from monitor.uncertainty.measured_run import MeasuredRun, rows_of, same_plan
+from monitor.uncertainty.measured_run import MeasuredRun, same_plan
 from monitor.uncertainty.touched_run import touch_run
-
-
-def taken(problem: ChainProblem, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> ChainProblem:
-    """The problem of chosen rows (k,), with repetitions, that belong to the runs ``run`` (k,).
-
-    Every array of the problem with one entry a row is taken along. A method with other arrays of its own (one entry
-    a run) gives its problem a method ``taken(rows, run)``.
-    """
-    method_taken = getattr(problem, "taken", None)
-    if method_taken is not None:
-        several: ChainProblem = method_taken(rows, run)
-        return several
-    arrays: dict[str, Any] = {
-        field.name: value[rows]
-        for field in fields(problem)
-        if isinstance(value := getattr(problem, field.name), np.ndarray)
-        and len(value) == len(problem.context)
-    }
-    return replace(problem, context=replace(rows_of(problem.context, rows), run=run), **arrays)
 
 
 @dataclass(frozen=True)
@@ -91,7 +70,7 @@ class RowRun(MeasuredRun):
     def repeated(self, inputs: Array) -> _Shifted:
         """The problem whose runs are the trials ``inputs`` (N, B)."""
         trials, count = inputs.shape[1], self.probings
-        several = taken(self.problem, np.tile(np.arange(count), trials), np.repeat(np.arange(trials), count))
+        several = self.problem.taken(np.tile(np.arange(count), trials), np.repeat(np.arange(trials), count))
         return _Shifted(several, self.whitened(inputs).T)
 
 
@@ -106,7 +85,7 @@ def measured_run(problem: ChainProblem, run: int, common: Array | None = None) -
     if isinstance(problem, TouchProblem):
         return touch_run(problem, run, held)
     rows = np.flatnonzero(problem.context.run == run)
-    return RowRun(taken(problem, rows, problem.context.run[rows]), held)
+    return RowRun(problem.taken(rows, problem.context.run[rows]), held)
 
 
 def repeated_readings(problem: ChainProblem) -> Array:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
-from monitor.uncertainty.measured_run import MeasuredRun, rows_of
+from monitor.uncertainty.measured_run import MeasuredRun
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class TouchedRun(MeasuredRun):
         readings = inputs[: count * len(self.linear)].T.reshape(trials * count, len(self.linear))
         positions = np.tile(context.positions, (trials, 1))
         positions[:, self.linear] = readings * self.signs
-        several = rows_of(context, np.tile(np.arange(count), trials))
+        several = context.taken(np.tile(np.arange(count), trials))
         lengths = inputs[count * len(self.linear) :]
         return replace(
             self.problem,
@@ -84,7 +84,7 @@ def touch_run(problem: TouchProblem, run: int, common: Array) -> TouchedRun:
     rows = problem.context.run == run
     single = replace(
         problem,
-        context=rows_of(problem.context, np.flatnonzero(rows)),
+        context=problem.context.taken(np.flatnonzero(rows)),
         sigma=problem.sigma[rows],
         distances=tuple(replace(d, length=d.length[[index]]) for d in problem.distances),
     )

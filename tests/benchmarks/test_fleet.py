@@ -22,7 +22,8 @@ from scipy import stats
 from monitor.store import Database, fleet_sums
 from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import cell_tests
-from monitor.workflow.trend.trends import trends
+from monitor.workflow.trend.request import TrendRequest
+from monitor.workflow.trend.trends import trend
 
 WEEKS, RUNS = 260, 4
 NAMES = [
@@ -160,7 +161,7 @@ def main(machines: int, path: Path) -> None:
         _print(least)
         print(f"peak {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6:.1f} GB")
         for _ in range(5):
-            wall, own = _cost(lambda db: trends(db, "M00003"), db)
+            wall, own = _cost(lambda db: trend(db, TrendRequest("M00003")), db)
             print(f"trends of one machine {wall:.2f} s, processor {own:.2f} s")
 
 

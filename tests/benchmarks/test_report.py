@@ -18,6 +18,7 @@ from pathlib import Path
 
 from monitor.store import Database
 from monitor.workflow.health.report import report
+from monitor.workflow.health.request import ReportRequest
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -47,8 +48,8 @@ def fill(db: Database, machines: int, folder: Path, *, all_lack: bool = False) -
 def test_two_machines_are_reported(tmp_path: Path) -> None:
     with Database(tmp_path / "fleet.duckdb", threads=1) as db:
         fill(db, 2, tmp_path)
-        found = report(db, WEEK, out=tmp_path)
-    assert [row["state"] for row in found["machines"]] == ["model fails", "no change seen"]
+        found = report(db, ReportRequest(WEEK, out=tmp_path))
+    assert [row.state for row in found.machines] == ["model fails", "no change seen"]
 
 
 def main(machines: int, *, all_lack: bool, workers: int | None) -> None:
@@ -59,9 +60,9 @@ def main(machines: int, *, all_lack: bool, workers: int | None) -> None:
             fill(db, machines, folder, all_lack=all_lack)
             for what in ("computed", "stored"):
                 before, clock = _processor(), time.perf_counter()
-                found = report(db, WEEK, out=folder / what, workers=workers)
+                found = report(db, ReportRequest(WEEK, out=folder / what, workers=workers))
                 peak, most = (resource.getrusage(who).ru_maxrss / 1e3 for who in WHO)
-                size = sum(Path(file).stat().st_size for file in found["files"]) / 1e6
+                size = sum(Path(file).stat().st_size for file in found.files) / 1e6
                 print(
                     f"{machines} machines, {what}: {_processor() - before:.0f} s of processor time, "
                     f"{time.perf_counter() - clock:.0f} s, peak {peak:.0f} MB and {most:.0f} MB, files {size:.1f} MB",

@@ -216,3 +216,15 @@ def test_a_plug_in_comes_through_the_same_door(plugged_in) -> None:
 def test_a_plug_in_that_is_no_method_is_refused(plugged_in, plug_in: object, words: str) -> None:
     with pytest.raises(InputError, match=words):
         plugged_in(plug_in)
+
+
+@pytest.mark.parametrize("name", OF_MACHINES)
+def test_chosen_rows_of_a_problem_leave_the_residuals_that_they_had(name: str) -> None:
+    campaign = example(name)
+    problem = campaign_method(campaign).problem_of(campaign)
+    rows = np.arange(len(problem.context))
+    twice = problem.taken(np.tile(rows, 2), np.repeat([1, 2], len(rows)))
+    both = twice.vectors(np.tile(problem.start, (2, 1)), problem.common_start)
+    once = problem.vectors(problem.start, problem.common_start)
+    np.testing.assert_array_equal(both[: len(rows)], once)
+    np.testing.assert_allclose(both[len(rows) :], once, atol=1e-9)

@@ -16,6 +16,7 @@ from monitor.methods import Able, AnglePlan, Method, TouchPlan, Unable, methods
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 README, DOCUMENT = CHECKOUT / "README.md", CHECKOUT / "docs" / "methods.md"
+IN_CHECKOUT = pytest.mark.skipif(not DOCUMENT.exists(), reason="the documents stay in the checkout")
 Ability = Able | Unable
 # What a user types, and the field of a method that says whether there is an answer; None: every method has one.
 VERBS: tuple[tuple[str, Callable[[Method], Ability] | None], ...] = (
@@ -37,6 +38,15 @@ def cell(ability: Ability) -> str:
     if isinstance(ability, Unable):
         return "-"
     return {TouchPlan: "balls, indexations", AnglePlan: "angles of the table"}.get(type(ability), "yes")
+
+
+def method_table() -> list[str]:
+    """The methods, and what their targets and rows are called."""
+    rows = ["| method | title | target | row |", "| --- | --- | --- | --- |"]
+    return rows + [
+        f"| `{name}` | {method.title} | {method.nouns.target} | {method.nouns.row} |"
+        for name, method in methods().items()
+    ]
 
 
 def verb_table() -> list[str]:
@@ -72,7 +82,8 @@ def method_row(method: Method) -> str:
     return f"| {name} | {method.description} |"
 
 
-@pytest.mark.parametrize("table", [verb_table, reason_table])
+@IN_CHECKOUT
+@pytest.mark.parametrize("table", [method_table, verb_table, reason_table])
 def test_what_a_method_can_do_is_documented_as_it_is_registered(table: Callable[[], list[str]]) -> None:
     assert "\n".join(table()) in DOCUMENT.read_text(encoding="utf-8")
 
@@ -83,6 +94,7 @@ def test_every_ability_stands_in_the_table() -> None:
     assert sorted(documented) == sorted(abilities)
 
 
+@IN_CHECKOUT
 @pytest.mark.parametrize("name", methods())
 def test_the_readme_lists_every_method_with_an_example_of_it(name: str) -> None:
     start = method_row(methods()[name]).removesuffix("|")
@@ -94,4 +106,4 @@ def test_the_readme_lists_every_method_with_an_example_of_it(name: str) -> None:
 
 if __name__ == "__main__":
     print("\n".join(["README.md", *map(method_row, methods().values()), "", "docs/methods.md", ""]))
-    print("\n".join([*verb_table(), "", *reason_table()]))
+    print("\n".join([*method_table(), "", *verb_table(), "", *reason_table()]))

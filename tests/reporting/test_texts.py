@@ -10,6 +10,7 @@ from decimal import Decimal
 import pytest
 
 from monitor.exceptions import InputError
+from monitor.reporting.refused import reason
 from monitor.reporting.resources import report_text
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import languages, texts_of
@@ -114,6 +115,6 @@ def test_what_a_page_marks_stays_and_what_a_user_writes_is_escaped() -> None:
         ("a sentence that nobody translated", "a sentence that nobody translated"),
     ],
 )  # fmt: skip
-def test_sentences_of_the_computation_are_said_in_german(english: str, german: str) -> None:
-    assert texts_of("de").computed(english) == german
-    assert ENGLISH.computed(english) == english
+def test_why_a_parameter_is_refused_is_said_in_german(english: str, german: str) -> None:
+    assert reason(english, texts_of("de")) == german
+    assert reason(english, ENGLISH) == english

@@ -16,8 +16,7 @@ import matplotlib.image
 import numpy as np
 import pypdf
 import pytest
-from by_path import load
-from monitor.workflow.history.health_series import FALSE_ALARM, Series, changes_of, drift_of
+from by_path import TESTS, load
 
 from monitor.cli import main
 from monitor.documents import from_document, to_document
@@ -26,14 +25,23 @@ from monitor.readers import read_campaign
 from monitor.reporting.health.records import STATES, Change, MachineHealth
 from monitor.reporting.health.render import health_html, health_pdf
 from monitor.reporting.health.words import in_words
-from monitor.store import Database, import_campaign, record_event
-from monitor.workflow.health.machine import Settings
-from monitor.workflow.health.report import report, stored_health
+from monitor.store import Database, import_campaign, machine_history, record_event
+from monitor.workflow.health.forecast import drift_forecast
+from monitor.workflow.health.report import stored_health
+from monitor.workflow.health.request import ReportOptions
 from monitor.workflow.health.weeks import week_before, week_named
+from monitor.workflow.history.calendar import local_time
+from monitor.workflow.history.changes import FALSE_ALARM, search_changes
+from monitor.workflow.history.drift import PieceDrift
+from monitor.workflow.history.past import machine_past
+from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.volumetric.request import VolumetricRequest
 from monitor.workflow.volumetric.volumetric import volumetric_map
+
+answers = load("answers", TESTS / "answers.py")
+report = answers.report
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 WIDE = {"EA0B": 400, "EC0B": 400, "EX0C": 400, "EB0C": 400, "EXX": 600}
@@ -90,6 +98,13 @@ def stored(db: Database, machine: str) -> MachineHealth:
     return stored_health(db, number)
 
 
+def series_of(name: str, values: np.ndarray, u: float) -> Series:
+    """A run a day."""
+    n = len(values)
+    t, steady = np.arange(float(n)), np.zeros(n, dtype=np.bool_)
+    return Series(name, "µm/m", values, np.full(n, u), t, np.arange(n), np.zeros(n), steady, timedelta())
+
+
 def text_of(path: str | Path | io.BytesIO) -> list[str]:
     return [" ".join(page.extract_text().split()) for page in pypdf.PdfReader(path).pages]
 
@@ -116,20 +131,16 @@ def test_the_known_step_of_day_four_is_split_off_by_the_event_but_seen_without_i
     found = stored(fleet, "B-stepped")
     assert [one.kind for one in found.changes if one.kind == "event"] == ["event"]
     assert "repair: C axis brake changed" in [one.what for one in found.changes]
-    series = {
-        one.name: Series(
-            one.name, one.unit, one.history.times,
-            np.array([(at - found.parameters[0].history.times[0]).total_seconds() / 86400 for at in one.history.times]),
-            np.array(one.history.values), np.array(one.history.u), np.zeros(len(one.history.times)),
-        )
-        for one in found.parameters
-    }  # fmt: skip
-    origin = found.parameters[0].history.times[0]
-    (step,) = changes_of(series, [], origin)["EB0C"]
+    history = machine_history(fleet, "B-stepped", model="samba")
+    past = machine_past(history, [])["EB0C"]
+    (step,) = past.search.changes
     assert step.kind == "step"
     assert step.size == pytest.approx(15.0, abs=3.0)
-    assert (origin + timedelta(days=step.interval[0])).date() == date(2026, 3, 4)
-    assert (origin + timedelta(days=step.at)).date() == date(2026, 3, 5)
+    between, at = (local_time(t, past.series.offset) for t in (step.interval[0], step.at))
+    assert between is not None
+    assert at is not None
+    assert between.date() == date(2026, 3, 4)
+    assert at.date() == date(2026, 3, 5)
 
 
 def test_a_page_has_every_parameter_with_tolerance_uncertainty_and_history(
@@ -247,15 +258,15 @@ def test_campaigns_that_one_machine_cannot_have_made_at_once_are_not_mixed(
         # The example campaigns state no tolerances: nothing is claimed about them.
         assert row["probability_out"] is None
         assert row["next_check"] == "no forecast: the campaign states no tolerances"
-        chosen = Settings(campaigns=("hidden-reversal-x",))
-        other = report(db, "2026-W10", out=tmp_path, made_at=MADE, settings=chosen)
+        chosen = ReportOptions(campaigns=("hidden-reversal-x",))
+        other = report(db, "2026-W10", out=tmp_path, made_at=MADE, options=chosen)
         assert other["machines"][0]["state"] in ("changed", "model fails")
         health = stored(db, "HU40-T")
         assert health.model is not None
         assert health.model.missing[0].remedy
         assert health.model.missing[0].effect in text_of(other["files"][1])[1]
         with pytest.raises(NotFoundError, match="there is no campaign 'nowhere'; there are five-days"):
-            report(db, "2026-W10", out=tmp_path, settings=Settings(campaigns=("nowhere",)))
+            report(db, "2026-W10", out=tmp_path, options=ReportOptions(campaigns=("nowhere",)))
 
 
 def test_fail_on_alarm_is_exit_status_1_and_json_is_one_document(
@@ -292,42 +303,29 @@ def test_changes_are_rarely_found_where_there_are_none() -> None:
     # At most FALSE_ALARM of quiet histories may show a change: 300 histories of 4 parameters, at most 9 (the
     # 99.8 % point of the binomial distribution with 1 %).
     rng = np.random.default_rng(5)
-    origin = datetime(2026, 1, 1)
-    t = np.arange(20.0)
     alarms = 0
     for _ in range(300):
-        series = {
-            name: Series(
-                name,
-                "µm",
-                tuple(origin + timedelta(days=day) for day in t),
-                t,
-                rng.normal(size=20),
-                np.ones(20),
-                np.zeros(20),
-            )
-            for name in "abcd"
-        }
-        alarms += bool(changes_of(series, [], origin))
+        series = [series_of(name, rng.normal(size=20), 1.0) for name in "abcd"]
+        alarms += any(search.changes for search in search_changes(series, []).values())
     assert FALSE_ALARM == 0.01
     assert alarms <= 9
 
 
 def test_a_drift_is_forecast_no_further_than_the_history_is_long() -> None:
-    origin = datetime(2026, 1, 1)
-    t = np.arange(60.0)
-    values = 0.1 * t + np.random.default_rng(1).normal(scale=0.2, size=60)
-    times = tuple(origin + timedelta(days=day) for day in t)
-    series = Series("EXX", "µm/m", times, t, values, np.full(60, 0.2), np.zeros(60))
-    near, far = (drift_of(series, -np.inf, 59.0, limit) for limit in (8.0, 80.0))
+    values = 0.1 * np.arange(60.0) + np.random.default_rng(1).normal(scale=0.2, size=60)
+    drift = PieceDrift(series_of("EXX", values, 0.2), -np.inf)
+    near, far = (drift_forecast(drift, 59.0, limit) for limit in (8.0, 80.0))
     assert near is not None
     assert far is not None
-    assert near.slope == pytest.approx(0.1 * 365.25, rel=0.05)
-    assert near.crosses == pytest.approx(80.0, abs=2.0)
+    assert near.line.slope == pytest.approx(0.1, rel=0.05)
+    assert near.ahead is not None
+    assert near.ahead.crossing.at == pytest.approx(80.0, abs=2.0)
+    assert near.good_for is not None
     assert 5.0 < near.good_for < 22.0
-    assert far.crosses is None
+    assert far.ahead is not None
+    assert far.ahead.crossing.at is None
     assert far.good_for == 59.0
-    assert drift_of(series, 58.0, 59.0, 8.0) is None
+    assert drift_forecast(PieceDrift(drift.whole, 58.0), 59.0, 8.0) is None
 
 
 def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_page(
@@ -459,12 +457,12 @@ def test_a_first_report_has_the_whole_history_though_nothing_of_it_was_identifie
 def test_machines_outside_the_chosen_campaigns_are_left_out(
     fleet: Database, week10: dict, tmp_path: Path
 ) -> None:
-    chosen = Settings(campaigns=("campaign-C-february",))
-    found = report(fleet, "2026-W08", out=tmp_path, made_at=MADE, settings=chosen)
+    chosen = ReportOptions(campaigns=("campaign-C-february",))
+    found = report(fleet, "2026-W08", out=tmp_path, made_at=MADE, options=chosen)
     assert [row["machine"] for row in found["machines"]] == ["C-february"]
     assert "1 machine, 1 measured this week" in text_of(found["files"][1])[0]
     with pytest.raises(InputError, match="has none of the campaigns chosen"):
-        report(fleet, "2026-W08", "B-stepped", tmp_path, settings=chosen)
+        report(fleet, "2026-W08", "B-stepped", tmp_path, options=chosen)
 
 
 def test_a_step_states_its_standard_uncertainty_by_name() -> None:

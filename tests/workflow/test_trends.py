@@ -6,12 +6,13 @@ import json
 import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from monitor.workflow.history.change_search import search_changes
+from by_path import TESTS, load
 
 from monitor.cli import main
 from monitor.exceptions import DataError, InputError, NotFoundError
@@ -26,18 +27,21 @@ from monitor.store import (
     record_event,
 )
 from monitor.store.identified_values import gather_values
-from monitor.workflow.fleet import fleet
+from monitor.workflow.history.changes import search_changes
+from monitor.workflow.history.series import Series
 from monitor.workflow.run_statistics.columns import group_labels
 from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.selections.request import SelectionRequest, SideBySideRequest
 from monitor.workflow.selections.select import select
 from monitor.workflow.selections.side_by_side import side_by_side
-from monitor.workflow.trend.figures import headline, trend_figures
-from monitor.workflow.trend.parameter import Series
-from monitor.workflow.trend.trends import Choice, trends
+from monitor.workflow.trend.figures import headline
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
+
+answers = load("answers", TESTS / "answers.py")
+fleet = answers.fleet
+trends = answers.trends
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 START = datetime(2024, 1, 1, 8)
@@ -114,7 +118,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def test_drift_is_found_with_its_slope_and_the_date_it_crosses_the_limit(made: Database) -> None:
-    found = trends(made, "M").document["parameters"]["EX0B"]
+    found = trends(made, "M")["parameters"]["EX0B"]
     per_year = 0.2 / 7 * 365.25
     assert found["slope_interval"][0] < per_year < found["slope_interval"][1]
     assert found["robust_interval"][0] < per_year < found["robust_interval"][1]
@@ -132,7 +136,7 @@ def test_drift_is_found_with_its_slope_and_the_date_it_crosses_the_limit(made: D
 
 
 def test_a_change_is_found_at_its_date_and_not_fitted_as_a_trend(made: Database) -> None:
-    found = trends(made, "M").document["parameters"]["EX0C"]
+    found = trends(made, "M")["parameters"]["EX0C"]
     assert [change["kind"] for change in found["changes"]] == ["step"]
     change = found["changes"][0]
     assert change["at"].startswith((START + timedelta(weeks=25)).date().isoformat())
@@ -145,7 +149,7 @@ def test_a_change_is_found_at_its_date_and_not_fitted_as_a_trend(made: Database)
 
 
 def test_the_latest_mean_has_its_uncertainty_and_its_runs(made: Database) -> None:
-    found = trends(made, "M").document["parameters"]["EX0B"]
+    found = trends(made, "M")["parameters"]["EX0B"]
     history = machine_history(made, "M")
     values = history.values[-4:, history.parameters.index("EX0B")]
     assert found["latest_runs"] == 4
@@ -154,7 +158,7 @@ def test_the_latest_mean_has_its_uncertainty_and_its_runs(made: Database) -> Non
 
 
 def test_a_quiet_parameter_raises_nothing_and_a_dependence_has_its_unit(made: Database) -> None:
-    document = trends(made, "M").document
+    document = trends(made, "M")
     quiet = document["parameters"]["EY0C"]
     assert quiet["changes"] == []
     assert quiet["q_value"] > 0.05
@@ -169,7 +173,7 @@ def test_a_quiet_parameter_raises_nothing_and_a_dependence_has_its_unit(made: Da
 
 
 def test_too_little_history_is_a_sentence_for_each_item_and_no_number(made: Database) -> None:
-    found = trends(made, "small").document["parameters"]["EX0B"]
+    found = trends(made, "small")["parameters"]["EX0B"]
     assert found["slope_per_year"] is None
     assert found["crosses_limit_at"] is None
     assert found["why"] == "1 day of history is too short for a slope a year; at least 30 are needed"
@@ -186,11 +190,11 @@ def test_an_event_splits_the_history_and_is_no_finding(made: Database) -> None:
         made, "split", {"EX0B": rng.normal(size=(20, 2)) + 9.0 * (np.arange(20) >= 10)[:, np.newaxis]}
     )
     at = (START + timedelta(days=67)).replace(tzinfo=UTC)
-    assert len(trends(made, "split").document["parameters"]["EX0B"]["changes"]) == 1
+    assert len(trends(made, "split")["parameters"]["EX0B"]["changes"]) == 1
     record_event(made, "split", at, "note", "ball screw inspected")
-    assert len(trends(made, "split").document["parameters"]["EX0B"]["changes"]) == 1
+    assert len(trends(made, "split")["parameters"]["EX0B"]["changes"]) == 1
     record_event(made, "split", at, "repair", "ball screw changed")
-    document = trends(made, "split").document
+    document = trends(made, "split")
     found = document["parameters"]["EX0B"]
     assert found["changes"] == []
     assert found["days"] == 10
@@ -201,25 +205,25 @@ def test_an_event_splits_the_history_and_is_no_finding(made: Database) -> None:
 
 def test_choices_and_their_refusals(made: Database) -> None:
     since = START.replace(tzinfo=UTC) + timedelta(weeks=30)
-    one = trends(made, "M", Choice(parameter="EX0B", since=since)).document
+    one = trends(made, "M", parameter="EX0B", since=since)
     assert list(one["parameters"]) == ["EX0B"]
     assert one["runs"] == 10 * RUNS
     with pytest.raises(NotFoundError, match="has no parameter 'EQQ'; it has EX0B, EX0C, EY0C, EZ0B"):
-        trends(made, "M", Choice(parameter="EQQ"))
+        trends(made, "M", parameter="EQQ")
     with pytest.raises(InputError, match="--next-check 2024-01-01 lies before the last run"):
-        trends(made, "M", Choice(next_check=START.replace(tzinfo=UTC)))
+        trends(made, "M", next_check=START.replace(tzinfo=UTC))
     with pytest.raises(NotFoundError, match="there is no machine 'N'"):
         trends(made, "N")
 
 
 def test_figures_are_drawn(made: Database, tmp_path: Path) -> None:
-    files = trend_figures(trends(made, "M", Choice(parameter="EX0C")), tmp_path / "figures")
+    files = trends(made, "M", parameter="EX0C", figures=tmp_path / "figures")["figures"]
     assert [Path(file).name for file in files] == ["trend-EX0C.svg", "trend-EX0C.png"]
     assert all(Path(file).stat().st_size > 5000 for file in files)
 
 
 def test_fleet_ranks_what_needs_attention(made: Database) -> None:
-    found = fleet(made, top=None)
+    found = fleet(made, top=0)
     table = {(row["machine"], row["parameter"]): row for row in found["table"]}
     assert found["table"][0]["rank"] == 1
     assert table["M", "EX0B"]["attention"] == "drifts out of tolerance within a year"
@@ -311,20 +315,20 @@ def test_five_days_components_histogram_and_the_vector(campaigns: Database) -> N
     assert found.vector.box_m.why.startswith("group 1 has 4 runs for 13 parameters")
     assert found.vector.manova.p_value < 1e-3
     fourth = found.correlation_by_group["4"]
-    assert fourth["degrees_of_freedom"] == 3
+    assert fourth.degrees_of_freedom == 3
     runs = load_identification(campaigns, "five-days", "samba", 1)
     values = np.array([one.estimate for one in runs.runs if one.run in (13, 14, 15, 16)])
-    assert found["parameter_order"] == list(runs.parameters)
-    assert fourth["correlation"] == pytest.approx(np.corrcoef(values.T), abs=1e-9)
-    assert len(found["coordinates"]["u_by_day_um"]["4"]) == 186
-    bins = found["coordinates"]["histograms"]["anova"]
-    assert sum(bins["counts"]) == found["coordinates"]["n"] == 186
-    assert bins["counts"][0] > 5 * bins["expected"]
+    assert found.parameter_order == tuple(runs.parameters)
+    assert fourth.correlation == pytest.approx(np.corrcoef(values.T), abs=1e-9)
+    assert len(found.coordinates.u_by_day_um["4"]) == 186
+    bins = found.coordinates.histograms["anova"]
+    assert sum(bins.counts) == found.coordinates.n == 186
+    assert bins.counts[0] > 5 * bins.expected
 
 
 def test_the_reset_of_the_b_axis_is_found_by_its_date(campaigns: Database) -> None:
     since = datetime.fromisoformat("2026-03-01T00:00:00-05:00")
-    found = trends(campaigns, "HU40-T", Choice(since=since)).document["parameters"]
+    found = trends(campaigns, "HU40-T", since=since)["parameters"]
     steps = {
         name: [change["at"][:10] for change in one["changes"]]
         for name, one in found.items()
@@ -335,7 +339,7 @@ def test_the_reset_of_the_b_axis_is_found_by_its_date(campaigns: Database) -> No
     assert found["EYY"]["slope_per_year"] is None
     assert found["EYY"]["why"] == "7 days of history are too short for a slope a year; at least 30 are needed"
     assert found["EYY"]["warm_up"] is None
-    hot = trends(campaigns, "HU40-T").document["parameters"]["EYY"]["warm_up"]
+    hot = trends(campaigns, "HU40-T")["parameters"]["EYY"]["warm_up"]
     assert 1.0 < hot["tau_h"] < 4.0
     assert hot["stable_interval_h"][0] < hot["stable_after_h"] < hot["stable_interval_h"][1]
     assert set(steps) == {"EB0C"}
@@ -345,18 +349,18 @@ def test_campaigns_of_the_same_hours_are_named_and_one_can_be_chosen(tmp_path: P
     with Database(tmp_path / "same.duckdb") as db:
         for name in ("five-days", "nothing-hidden", "hot-cold"):
             import_campaign(db, read_campaign(EXAMPLES / name))
-        (note,) = trends(db, "HU40-T").document["notes"]
+        (note,) = trends(db, "HU40-T")["notes"]
         assert note.startswith("campaigns five-days and nothing-hidden hold runs of the same hours")
-        alone = trends(db, "HU40-T", Choice(campaigns=("five-days", "hot-cold"))).document
+        alone = trends(db, "HU40-T", campaigns=("five-days", "hot-cold"))
         assert alone["notes"] == []
         assert alone["campaigns"] == ["hot-cold", "five-days"]
         with pytest.raises(NotFoundError, match="holds no campaign 'cold'; it holds"):
-            trends(db, "HU40-T", Choice(campaigns=("cold",)))
+            trends(db, "HU40-T", campaigns=("cold",))
 
 
 def test_no_run_and_one_run_are_sentences_with_exit_status_0(made: Database, tmp_path: Path, capsys) -> None:
     later = datetime(2030, 1, 1, tzinfo=UTC)
-    nothing = trends(made, "M", Choice(parameter="EX0B", since=later)).document
+    nothing = trends(made, "M", parameter="EX0B", since=later)
     assert nothing["why"] == "machine M has no identified run since 2030-01-01"
     assert nothing["parameters"] == {}
     path = tmp_path / "one.duckdb"
@@ -376,7 +380,7 @@ def test_findings_beyond_any_doubt_are_told(tmp_path: Path, capsys: pytest.Captu
         add_machine(
             db, "sure", {name: x + 1e-3 * rng.normal(size=x.shape) for name, x in values.items()}, ambient
         )
-        (found,) = trends(db, "sure").document["parameters"]["EX0B"]["conditions"]
+        (found,) = trends(db, "sure")["parameters"]["EX0B"]["conditions"]
     assert found["q_value"] == 0.0
     assert main(["--db", str(tmp_path / "sure.duckdb"), "trend", "sure"]) == 0
     said = capsys.readouterr().out
@@ -413,7 +417,7 @@ def test_a_parameter_that_never_varies_has_no_drift_and_no_part_in_the_vector(
     }
     with Database(tmp_path / "still.duckdb") as db:
         add_machine(db, "S", values)
-        document = trends(db, "S").document
+        document = trends(db, "S")
         table = {row["parameter"]: row for row in fleet(db)["table"]}
     assert document["parameters"]["EX0B"]["slope_per_year"] is None
     assert document["parameters"]["EX0B"]["why"] == "no drift of EX0B: it has the same value in every run"
@@ -428,10 +432,11 @@ def test_a_parameter_that_never_varies_has_no_drift_and_no_part_in_the_vector(
 
 
 def test_a_headline_states_the_uncertainty_by_name_and_no_power_of_ten() -> None:
-    step = {"size": 12345.6, "u": 950.0, "unit": "µrad", "at": "2026-03-05T08:00:00"}
-    line = headline("EB0C", {"changes": [step]})
+    step = SimpleNamespace(size=12345.6, u=950.0, unit="µrad", at="2026-03-05T08:00:00")
+    line = headline("EB0C", SimpleNamespace(changes=[step]))
     assert line == "EB0C: changed by +12350 µrad (u = 950 µrad) on 2026-03-05"
-    slope = {"changes": [], "slope_per_year": -2960.0, "u_slope": 166.0, "unit": "µm", "p_value": 0.5}
+    drift = SimpleNamespace(slope_per_year=-2960.0, u_slope=166.0, p_value=0.5)
+    slope = SimpleNamespace(changes=[], drift=drift, unit="µm")
     assert headline("EXX", slope) == "EXX: −2960 µm a year (u = 170 µm a year), no drift seen"
 
 
@@ -442,7 +447,8 @@ def test_parameters_that_were_measured_together_share_one_search(monkeypatch: py
     weighs = rng.uniform(0.5, 2.0, 60)
 
     def series(name: str, u: np.ndarray) -> Series:
-        return Series(name, "µm", rng.normal(size=60), u, t, days, t % 1.0 * 24.0, timedelta())
+        steady = np.zeros(60, dtype=np.bool_)
+        return Series(name, "µm", rng.normal(size=60), u, t, days, t % 1.0 * 24.0, steady, timedelta())
 
     every = [series("A", 0.3 * weighs), series("B", 0.07 * weighs), series("C", np.full(60, 0.1))]
     asked = []
@@ -451,7 +457,7 @@ def test_parameters_that_were_measured_together_share_one_search(monkeypatch: py
         asked.append((sorted(values), {name: u.tobytes() for name, u in options["u"].items()}))
         return find_changes(values, *args, **options)
 
-    monkeypatch.setattr("monitor.workflow.history.change_search.find_changes", counted)
+    monkeypatch.setattr("monitor.workflow.history.changes.find_changes", counted)
     found = search_changes(every, [], false_alarm=0.05, seed=1)
     ((names, weights),) = asked
     assert names == ["A", "B", "C"]

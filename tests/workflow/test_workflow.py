@@ -12,8 +12,7 @@ from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import ChainMethod, methods
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.store import Database, load_campaign, load_identification
-from monitor.workflow import events
-from monitor.workflow.events import EventRequest, EventsRequest
+from monitor.workflow.events import EventRequest, event
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
@@ -26,8 +25,9 @@ from monitor.workflow.model.change import add_effect, version_with
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.model.show import list_all_models
 from monitor.workflow.run_statistics.columns import run_columns
+from monitor.workflow.run_statistics.coordinates import coordinates
 from monitor.workflow.run_statistics.request import StatisticsRequest
-from monitor.workflow.run_statistics.statistics import coordinates, stats
+from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 
@@ -135,10 +135,10 @@ def test_inputs_come_from_the_repeated_runs_where_there_are_enough(db: Database)
 def test_events_need_words_and_a_machine(db: Database) -> None:
     at = datetime.fromisoformat("2026-03-05T07:00:00-05:00")
     with pytest.raises(InputError, match="say in words what happened"):
-        events.record(db, EventRequest("HU40-T", at, "note", " "))
+        event(db, EventRequest("HU40-T", " ", at, "note"))
     with pytest.raises(NotFoundError, match="there is no machine 'NOPE'; there are HU40-T"):
-        events.events(db, EventsRequest("NOPE"))
-    assert events.events(db, EventsRequest()).events == ()
+        event(db, EventRequest("NOPE"))
+    assert event(db, EventRequest("HU40-T")).events == ()
 
 
 def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: Path) -> None:

@@ -42,8 +42,10 @@ def options(parser: ArgumentParser) -> None:
         ),
     )
     removed.add_argument("effect", metavar="EFFECT")
-    removed.add_argument("--from", dest="from_", required=True, metavar="NAME")
-    removed.add_argument("--as", dest="as_", metavar="NEW")
+    removed.add_argument(
+        "--from", dest="from_", required=True, metavar="NAME", help="the model, or a version of it: NAME@2"
+    )
+    removed.add_argument("--as", dest="as_", metavar="NEW", help="another name for the new version")
     removed.set_defaults(run=_remove)
     past = verbs.add_parser(
         "history",
@@ -53,7 +55,7 @@ def options(parser: ArgumentParser) -> None:
     )
     past.add_argument("name", metavar="NAME")
     past.add_argument("--campaign", metavar="CAMPAIGN", help="default: where it was last compared")
-    past.add_argument("--figures", type=Path, metavar="DIR")
+    past.add_argument("--figures", type=Path, metavar="DIR", help="draw how the error falls")
     past.set_defaults(run=_history)
     for verb in (listed, shown, added, removed, past):
         common(verb)

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -274,6 +274,19 @@ class ChainProblem(ABC):
         """The chain at (R, p) and (c,): vectors (n, 3) in mm between its ends, and their derivatives if asked for."""
         errors, target, tip = self.state(local, common)
         return evaluate(self.context.chain, self.context.positions, errors, target, tip, jacobian=jacobian)
+
+    def taken(self, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> Self:
+        """The problem of chosen rows (k,), with repetitions, that belong to the runs ``run`` (k,).
+
+        Every array with one entry a row is taken along; a problem with other arrays (one entry a run) has its own way.
+        """
+        arrays: dict[str, Any] = {
+            field.name: values[rows]
+            for field in fields(self)
+            if isinstance(values := getattr(self, field.name), np.ndarray)
+            and len(values) == len(self.context)
+        }
+        return replace(self, context=replace(self.context.taken(rows), run=run), **arrays)
 
     def vectors(self, local: Array, common: Array) -> Array:
         """Residuals (n, d) in mm, in file order."""

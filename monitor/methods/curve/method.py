@@ -10,7 +10,7 @@ METHOD = CurveMethod(
     name=NAME,
     title="curve",
     description="one response over its inputs: no machine at all",
-    nouns=Nouns(target="row", row="row", tool_point="response"),
+    nouns=Nouns(target="row", row="row"),
     problem_of=problem_of,
     fit=fit,
 )

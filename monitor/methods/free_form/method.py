@@ -100,7 +100,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="free-form self-calibration",
     description="a workpiece of unknown shape, probed at several angles of a table",
-    nouns=Nouns(target="target", row="touch", tool_point="tip"),
+    nouns=Nouns(target="target", row="touch"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,

@@ -62,7 +62,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="L-shaped standard piece",
     description="modules of an L, scanned by an angle sensor: the 21 errors of three axes",
-    nouns=Nouns(target="module", row="reading", tool_point="tip"),
+    nouns=Nouns(target="module", row="reading"),
     problem_of=problem_of,
     advice=advice,
     base_effects=l_shape_base,

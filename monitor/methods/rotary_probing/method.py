@@ -21,7 +21,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="rotary probing",
     description="a block, a part or spheres, touched at indexed angles of two rotary axes",
-    nouns=Nouns(target="target", row="touch", tool_point="tip"),
+    nouns=Nouns(target="target", row="touch"),
     problem_of=problem_of,
     advice=advice,
     base_effects=rotary_base,

@@ -116,7 +116,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="scale and master balls",
     description="balls and a scale bar, touched at indexed angles",
-    nouns=Nouns(target="ball", row="touch", tool_point="tip"),
+    nouns=Nouns(target="ball", row="touch"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,

@@ -51,7 +51,7 @@ METHOD = ChainMethod(
     name=NAME,
     title="tracker",
     description="reflectors on a robot or any serial machine, seen by a laser tracker or camera",
-    nouns=Nouns(target="reflector", row="reading", tool_point="reflectors"),
+    nouns=Nouns(target="reflector", row="reading"),
     problem_of=problem_of,
     refuse=refuse,
     advice=advice,

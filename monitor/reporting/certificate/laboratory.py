@@ -7,7 +7,7 @@ Nothing is filled in: a key that is absent stays None, and the certificate that 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import date, datetime
 from pathlib import Path
@@ -162,6 +162,7 @@ def _section(section: str, content: Mapping[str, Any], faults: list[str]) -> dic
 
 
 def _answer(name: str, value: Any, faults: list[str]) -> Any:
+    """The answer to the item ``name``; None, with a fault, where it is none."""
     if (
         isinstance(value, dict)
         and set(value) == {"not_applicable"}
@@ -170,29 +171,56 @@ def _answer(name: str, value: Any, faults: list[str]) -> Any:
         if name in MAY_NOT_APPLY:
             return NotApplicable(value["not_applicable"])
         faults.append(f"{name} always applies; not_applicable is no answer to it")
-    elif name.endswith(".address"):
-        if isinstance(value, list) and all(isinstance(line, str) for line in value):
-            return tuple(value)
-        faults.append(f'{name} is a list of lines, for example ["1 Example Road", "Town"], but is {value!r}')
-    elif name == "item.received_on":
-        if isinstance(value, date) and not isinstance(value, datetime):
-            return value
-        faults.append(f"{name} is a date without quotes, for example 2026-03-02, but is {_shown(value)}")
-    elif name == "laboratory.language":
-        if value in languages():
-            return value
-        faults.append(f"{name} is one of {', '.join(languages())}, but is {value!r}")
-    elif (
-        name in ("laboratory.accreditation", "laboratory.country")
-        and isinstance(value, str)
-        and not value.strip()
-    ):
-        faults.append(f"{name} is blank; leave the line out where there is none")
-    elif isinstance(value, str):
-        return value
-    else:
-        faults.append(f"{name} is a text in quotes, but is {value!r}")
-    return None
+        return None
+    answer, fault = _RULES.get(name, _text)(value)
+    if fault:
+        faults.append(f"{name} {fault}")
+    return answer
+
+
+#: An answer, and what is wrong with it behind the name of its item; empty where nothing is.
+_Checked = tuple[Any, str]
+
+
+def _text(value: Any) -> _Checked:
+    return (value, "") if isinstance(value, str) else (None, f"is a text in quotes, but is {value!r}")
+
+
+def _text_or_left_out(value: Any) -> _Checked:
+    if isinstance(value, str) and not value.strip():
+        return None, "is blank; leave the line out where there is none"
+    return _text(value)
+
+
+def _address(value: Any) -> _Checked:
+    if isinstance(value, list) and all(isinstance(line, str) for line in value):
+        return tuple(value), ""
+    return None, f'is a list of lines, for example ["1 Example Road", "Town"], but is {value!r}'
+
+
+def _day(value: Any) -> _Checked:
+    if isinstance(value, date) and not isinstance(value, datetime):
+        return value, ""
+    return None, f"is a date without quotes, for example 2026-03-02, but is {_shown(value)}"
+
+
+def _language(value: Any) -> _Checked:
+    return (
+        (value, "")
+        if value in languages()
+        else (None, f"is one of {', '.join(languages())}, but is {value!r}")
+    )
+
+
+#: Items that are answered by something else than any text.
+_RULES: Mapping[str, Callable[[Any], _Checked]] = {
+    "laboratory.address": _address,
+    "customer.address": _address,
+    "item.received_on": _day,
+    "laboratory.language": _language,
+    "laboratory.accreditation": _text_or_left_out,
+    "laboratory.country": _text_or_left_out,
+}
 
 
 def _shown(value: object) -> str:

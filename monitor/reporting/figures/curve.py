@@ -28,25 +28,28 @@ class Residuals:
     values: Array
 
 
-def residuals_figure(
-    x: Array,
-    measured: Array,
-    *,
-    x_name: str,
-    response: str,
-    residuals: Sequence[Residuals],
-    outliers: npt.NDArray[np.bool_],
-    title: str,
-) -> Figure:
-    """Draw the response (n,) over an input (n,) and the residual (n,) of each model, ``outliers`` ringed."""
-    if any(residual.values.shape != x.shape for residual in residuals) or measured.shape != x.shape:
-        raise DataError(f"response and residuals must have the {len(x)} rows of {x_name}")
+@dataclass(frozen=True)
+class MeasuredCurve:
+    """The ``measured`` response (n,) over an input ``x`` (n,), with the names of both; ``outliers`` (n,) are ringed."""
+
+    x: Array
+    measured: Array
+    outliers: npt.NDArray[np.bool_]
+    x_name: str
+    response: str
+
+
+def residuals_figure(curve: MeasuredCurve, residuals: Sequence[Residuals], *, title: str) -> Figure:
+    """Draw the response over an input on top, below it the residual of each model."""
+    x, outliers = curve.x, curve.outliers
+    if any(residual.values.shape != x.shape for residual in residuals) or curve.measured.shape != x.shape:
+        raise DataError(f"response and residuals must have the {len(x)} rows of {curve.x_name}")
     shown = [*residuals[: MOST_PANELS - 1], residuals[-1]] if len(residuals) > MOST_PANELS else [*residuals]
     with style():
         figure = new_figure(PAGE_WIDTH_MM, HEAD_MM + PANEL_MM * (1 + len(shown)), title)
         axes = figure.subplots(1 + len(shown), 1, sharex=True, squeeze=False)[:, 0]
-        axes[0].plot(x, measured, ".", color=INK, markersize=3.0)
-        axes[0].set_ylabel(response)
+        axes[0].plot(x, curve.measured, ".", color=INK, markersize=3.0)
+        axes[0].set_ylabel(curve.response)
         for panel, residual in zip(axes[1:], shown, strict=True):
             zero_line(panel)
             panel.plot(x, residual.values, ".", color=BLUE, markersize=3.0)
@@ -60,5 +63,5 @@ def residuals_figure(
             )
             panel.set_title(residual.title)
             panel.set_ylabel("residual")
-        axes[-1].set_xlabel(x_name)
+        axes[-1].set_xlabel(curve.x_name)
     return figure

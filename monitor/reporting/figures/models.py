@@ -137,47 +137,60 @@ def ranked_effects(
         )
     order = _strongest_first(size, groups)
     rows = _rows_of_groups([groups[index] for index in order])
-    reaches = [threshold is not None and size[index] >= threshold for index in order]
+    reaches = [bool(hit) for hit in size[order] >= (np.inf if threshold is None else threshold)]
     notes = effects.notes or [f"{value:.3g}" for value in size]
     top = float(np.max(size))
     with style():
         figure = new_figure(PAGE_WIDTH_MM, 27.0 + 5.2 * float(rows[-1] + 1), title)
         axes = figure.subplots()
-        bars = axes.barh(
-            rows, size[order], height=0.72, color=[ORANGE if hit else MID for hit in reaches], zorder=2
-        )
-        for bar, hit in zip(bars, reaches, strict=True):
-            bar.set_hatch("////" if hit else "")
-            bar.set_edgecolor("white")
-            bar.set_linewidth(0.0)
-        for row, index in zip(rows, order, strict=True):
-            axes.annotate(
-                notes[index],
-                (size[index], row),
-                xytext=(4, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=7,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
-                zorder=4,
-            )
+        _bars(axes, rows, size[order], reaches)
+        _note(axes, rows, size[order], [notes[index] for index in order])
         axes.set_yticks(rows, [names[index] for index in order])
         axes.tick_params(axis="y", length=0)
         axes.set_ylim(rows[-1] + 0.7, -0.7)
         axes.set_xlim(0.0, 1.6 * top if top > 0 else 1.0)
         axes.set_xlabel(value_name)
         if threshold is not None:
-            axes.axvline(threshold, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
-            axes.annotate(
-                threshold_name,
-                (threshold, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(0, 2),
-                textcoords="offset points",
-                fontsize=7,
-            )
+            _threshold(axes, threshold, threshold_name)
         _brackets(axes, rows, [groups[index] for index in order], size[order], 1.6 * top)
     return figure
+
+
+def _bars(axes: Axes, rows: Array, size: Array, accented: Sequence[bool]) -> None:
+    """Draw the bars; those that are ``accented`` are hatched, in the accent colour."""
+    bars = axes.barh(rows, size, height=0.72, color=[ORANGE if hit else MID for hit in accented], zorder=2)
+    for bar, hit in zip(bars, accented, strict=True):
+        bar.set_hatch("////" if hit else "")
+        bar.set_edgecolor("white")
+        bar.set_linewidth(0.0)
+
+
+def _note(axes: Axes, rows: Array, size: Array, notes: Sequence[str]) -> None:
+    """Write a note behind the end of every bar."""
+    for row, length, note in zip(rows, size, notes, strict=True):
+        axes.annotate(
+            note,
+            (length, row),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
+            zorder=4,
+        )
+
+
+def _threshold(axes: Axes, level: float, name: str) -> None:
+    """Draw a dashed level with its name above."""
+    axes.axvline(level, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
+    axes.annotate(
+        name,
+        (level, 1.0),
+        xycoords=("data", "axes fraction"),
+        xytext=(0, 2),
+        textcoords="offset points",
+        fontsize=7,
+    )
 
 
 def _strongest_first(size: Array, groups: Sequence[int]) -> list[int]:

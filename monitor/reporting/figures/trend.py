@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -15,24 +16,31 @@ from monitor.reporting.figures.style import caption, new_figure, reference_line,
 from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PAGE_WIDTH_MM, PALE
 
 
+@dataclass(frozen=True)
+class RunsOverTime:
+    """Runs (n,) of one parameter: ``values`` ± ``expanded`` in ``unit`` over ``days`` since 1970."""
+
+    days: npt.ArrayLike
+    values: npt.ArrayLike
+    expanded: npt.ArrayLike
+    unit: str
+
+
 def parameter_over_time(
-    days: npt.ArrayLike,
-    values: npt.ArrayLike,
-    expanded: npt.ArrayLike,
+    runs: RunsOverTime,
     *,
-    unit: str,
     title: str,
     line: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike] | None = None,
     limit: float | None = None,
     changes: Sequence[float] = (),
     events: Mapping[float, str] | None = None,
 ) -> Figure:
-    """Draw the runs of one parameter, ``values`` ± ``expanded`` (n,) over ``days`` since 1970 (n,).
+    """Draw the runs of one parameter over time.
 
     ``line`` is the drift and its band: days, level and half-width (m,) each; ``limit`` that of the absolute value;
     ``changes`` and ``events`` (day to text) are upright lines. Raises DataError for arrays of unequal length.
     """
-    t, y, half = (np.asarray(array, dtype=np.float64) for array in (days, values, expanded))
+    t, y, half = (np.asarray(array, dtype=np.float64) for array in (runs.days, runs.values, runs.expanded))
     if not t.shape == y.shape == half.shape or t.ndim != 1 or not len(t):
         raise DataError(f"days, values and expanded must be as long, not {t.shape}, {y.shape}, {half.shape}")
     with style():
@@ -52,7 +60,7 @@ def parameter_over_time(
         locator = AutoDateLocator(minticks=3, maxticks=8)  # type: ignore[no-untyped-call]
         axes.xaxis.set_major_locator(locator)
         axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
-        axes.set_ylabel(unit, labelpad=2)
+        axes.set_ylabel(runs.unit, labelpad=2)
         axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
         axes.legend(loc="best", fontsize=6.5, ncols=2)
         legend = ["grey: 95 % band of the drift"] if line is not None else []

@@ -35,10 +35,12 @@ class MachinePart:
 
     @property
     def rms(self) -> float:
+        """The RMS in ``unit``."""
         return self.rms_um
 
     @property
     def largest(self) -> float:
+        """The largest coordinate in µm."""
         return self.largest_um
 
 
@@ -77,18 +79,22 @@ class MachineComparison:
 
     @property
     def unit(self) -> str:
+        """The unit of ``rms`` and its like: a micrometre."""
         return MICROMETRE.name
 
     @property
     def rms(self) -> float:
+        """The RMS in ``unit``."""
         return self.rms_um
 
     @property
     def repeatability(self) -> float | None:
+        """The repeatability in ``unit``, None where it is not known."""
         return self.repeatability_um
 
     @property
     def expected_rms(self) -> float:
+        """The RMS that the stated uncertainty would leave, in ``unit``."""
         return self.expected_rms_um
 
 

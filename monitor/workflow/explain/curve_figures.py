@@ -8,7 +8,7 @@ from pathlib import Path
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.effects.curve import SEQUENCE
 from monitor.methods.curve.fit import CurveFit, fit
-from monitor.reporting.figures.curve import Residuals, residuals_figure
+from monitor.reporting.figures.curve import MeasuredCurve, Residuals, residuals_figure
 from monitor.reporting.figures.style import Figure
 from monitor.workflow.figure_files import make_folder, save_figure
 
@@ -25,12 +25,14 @@ def residual_figure(first: CurveFit, explanation: CurveExplanation | None) -> Fi
     curve = first.problem.curve
     column = _drawn_over(first, explanation)
     return residuals_figure(
-        first.problem.inputs.numbers[column],
-        curve.measured,
-        x_name="row" if column == SEQUENCE else _with_unit(first, column),
-        response=_with_unit(first, curve.response),
-        residuals=_panels(first, explanation),
-        outliers=(first if explanation is None else explanation.final).problem.left_out,
+        MeasuredCurve(
+            first.problem.inputs.numbers[column],
+            curve.measured,
+            (first if explanation is None else explanation.final).problem.left_out,
+            "row" if column == SEQUENCE else _with_unit(first, column),
+            _with_unit(first, curve.response),
+        ),
+        _panels(first, explanation),
         title=_title(curve.name, explanation),
     )
 

@@ -26,18 +26,22 @@ class MachineVersion:
 
     @property
     def unit(self) -> str:
+        """The unit of ``rms`` and its like: a micrometre."""
         return MICROMETRE.name
 
     @property
     def rms(self) -> float:
+        """The RMS in ``unit``."""
         return self.rms_um
 
     @property
     def heldout_rms(self) -> float | None:
+        """The RMS on held-out readings in ``unit``, None where there is none."""
         return self.heldout_rms_um
 
     @property
     def repeatability(self) -> float | None:
+        """The repeatability in ``unit``, None where it is not known."""
         return self.repeatability_um
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from monitor.reporting.figures.style import save
-from monitor.reporting.figures.trend import parameter_over_time
+from monitor.reporting.figures.trend import RunsOverTime, parameter_over_time
 from monitor.reporting.health.words import in_words
 from monitor.statistics import predict
 from monitor.workflow.figure_files import ENDINGS, make_folder
@@ -53,7 +53,7 @@ def trend_figures(answer: TrendAnswer, past: Mapping[str, ParameterPast], folder
             line = (t + shift, level, factor * u)
         u_run = np.where(np.isfinite(series.u), series.u, 0.0)
         figure = parameter_over_time(
-            series.t + shift, series.values, 2.0 * u_run, unit=series.unit, title=headline(name, parameter),
+            RunsOverTime(series.t + shift, series.values, 2.0 * u_run, series.unit), title=headline(name, parameter),
             line=line, limit=parameter.forecast.limit,
             changes=[change.at + shift for change in past[name].search.changes],
             events={at + shift: kind for at, kind in events.items()},

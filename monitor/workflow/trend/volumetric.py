@@ -186,9 +186,8 @@ def _backtest(
         return trend(values[mask, column], t[mask], u=weights, days=days[mask], robust=False)
 
     try:
-        test = backtest_longest(
-            JointSeries(values, t, days), fit, ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng
-        )
+        series = JointSeries(values, t, days)
+        test = backtest_longest(series, fit, ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng)
     except DataError as error:
         return None, f"no backtest of the volumetric error: {error}"
     return VolumetricTest(

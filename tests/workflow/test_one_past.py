@@ -1,0 +1,150 @@
+"""One past of a machine: trend page, health report and fleet table state the same of the same runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from by_path import load
+
+from monitor.readers import read_campaign
+from monitor.store import Database, import_campaign, machine_history
+from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.health.report import report, stored_health
+from monitor.workflow.health.request import ReportRequest
+from monitor.workflow.history.changes import FALSE_ALARM, SEED
+from monitor.workflow.history.past import machine_past
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.trend.request import TrendRequest
+from monitor.workflow.trend.trends import trend
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+MADE = datetime.fromisoformat("2026-04-06T06:00:00+00:00")
+
+# A half year of weekly campaigns that lead to the example `cold-cold`.
+drifting = load("test_trend_volumetric", Path(__file__).with_name("test_trend_volumetric.py"))
+path = drifting.path
+synthetic = load("test_trends", Path(__file__).with_name("test_trends.py"))
+
+
+@pytest.fixture(scope="module")
+def stepped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    """The example with the reset of the B axis."""
+    with Database(tmp_path_factory.mktemp("one-past") / "m.duckdb", threads=1) as db:
+        import_campaign(db, read_campaign(EXAMPLES / "five-days"))
+        identify(db, IdentifyRequest("five-days"))
+        yield db
+
+
+def reported(db: Database, week: str, out: Path):
+    report(db, ReportRequest(week, out=out, made_at=MADE))
+    ((number,),) = db.rows("SELECT max(analysis_id) FROM v_analyses WHERE kind = 'health'")
+    return stored_health(db, number)
+
+
+def test_the_reset_of_the_b_axis_is_one_change_for_page_and_report(stepped: Database, tmp_path: Path) -> None:
+    page = trend(stepped, TrendRequest("HU40-T"))
+    assert (page.false_alarm, page.seed) == (FALSE_ALARM, SEED) == (0.01, 20260302)
+    # The last runs were in week 11: a report of week 10 has not seen them yet.
+    health = reported(stepped, "2026-W11", tmp_path)
+    past = machine_past(machine_history(stepped, "HU40-T", model="samba"), [])
+    on_page = {name: parameter.changes for name, parameter in page.parameters.items() if parameter.changes}
+    assert set(on_page) == {"EB0C"}
+    (change,) = on_page["EB0C"]
+    (noted,) = [noted for noted in health.changes if noted.after is not None]
+    (found,) = past["EB0C"].search.changes
+    # The same p-value, size and uncertainty, to the last bit; the report rounds what it says in words.
+    assert change.p_value == noted.p_value == found.p_value < FALSE_ALARM
+    assert (change.size, change.u) == (found.size, found.u)
+    assert noted.what == "EB0C stepped by +15.10 µrad (u = 0.83 µrad)"
+    assert change.at is not None
+    assert change.at[:19] == f"{noted.at:%Y-%m-%dT%H:%M:%S}"
+    assert change.interval[0] is not None
+    assert noted.after is not None
+    assert change.interval[0][:19] == f"{noted.after:%Y-%m-%dT%H:%M:%S}"
+    (parameter,) = [one for one in health.parameters if one.name == "EB0C"]
+    assert [f"{at:%Y-%m-%dT%H:%M:%S}" for at in parameter.changed_at] == [change.at[:19]]
+    # Neither states a slope a year of five days.
+    assert page.parameters["EB0C"].drift.slope_per_year is None
+    assert parameter.drift is None
+
+
+def test_last_values_are_those_of_the_last_day(stepped: Database, tmp_path: Path) -> None:
+    page = trend(stepped, TrendRequest("HU40-T"))
+    table = {row.parameter: row for row in fleet(stepped, FleetRequest(top=0)).table}
+    health = reported(stepped, "2026-W11", tmp_path)
+    history = machine_history(stepped, "HU40-T")
+    for name, parameter in page.parameters.items():
+        assert table[name].latest == pytest.approx(parameter.mean.latest, rel=1e-12, abs=1e-12)
+        assert table[name].unit == parameter.unit
+        assert table[name].slope_per_year is None
+    for stated in health.parameters:
+        column = history.parameters.index(stated.name)
+        assert stated.history.values == tuple(history.values[:, column].tolist())
+        # The report's estimate is that of its last run.
+        assert stated.estimate == pytest.approx(stated.history.values[-1], rel=1e-9)
+
+
+def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path) -> None:
+    with Database(path, threads=1) as db:
+        # The past weeks were written by SQL: that each of their runs was identified is written, too.
+        db.execute(
+            "INSERT INTO identified_run SELECT DISTINCT identification_id, run, 1e-3, 1, 1, 1.0, []::DOUBLE[], '[]' "
+            "FROM parameter_value ANTI JOIN identified_run USING (identification_id, run)"
+        )
+        page = trend(db, TrendRequest("HU40-T"))
+        ((last,),) = db.rows("SELECT max(started_at_local) FROM v_runs")
+        week = f"{last.isocalendar().year}-W{last.isocalendar().week:02d}"
+        health = reported(db, week, tmp_path)
+    stated = {parameter.name: parameter for parameter in health.parameters}
+    compared = 0
+    for name, parameter in page.parameters.items():
+        drift, of_report = parameter.drift, stated[name].drift
+        assert [change.at[:19] for change in parameter.changes if change.at] == [
+            f"{at:%Y-%m-%dT%H:%M:%S}" for at in stated[name].changed_at
+        ]
+        if drift.slope_per_year is None:
+            assert of_report is None
+            continue
+        assert of_report is not None
+        assert (of_report.per_year, of_report.u_per_year) == (drift.slope_per_year, drift.u_slope)
+        assert of_report.between == drift.slope_interval
+        assert of_report.p_value == drift.p_value
+        compared += 1
+    assert compared > 3
+
+
+def test_fleet_and_page_fit_the_same_line_where_days_are_alike(tmp_path: Path) -> None:
+    """Days of as many runs, of one uncertainty, and no change: there the two definitions of the drift are one."""
+    rng = np.random.default_rng(8)
+    week = np.arange(40)[:, np.newaxis]
+    values = {
+        "EX0B": 5.0 + 0.2 * week + rng.normal(size=(40, 1)) + 0.5 * rng.normal(size=(40, 4)),
+        "EX0C": rng.normal(size=(40, 1)) + 0.5 * rng.normal(size=(40, 4)),
+    }
+    with Database(tmp_path / "alike.duckdb") as db:
+        synthetic.add_machine(db, "M", values)
+        page = trend(db, TrendRequest("M"))
+        table = {row.parameter: row for row in fleet(db, FleetRequest(top=0)).table}
+    for name, parameter in page.parameters.items():
+        row, drift = table[name], parameter.drift
+        assert parameter.changes == ()
+        assert row.slope_per_year == pytest.approx(drift.slope_per_year, rel=1e-6)
+        assert row.u_slope == pytest.approx(drift.u_slope, rel=1e-3)
+        assert row.drift_p == pytest.approx(drift.p_value, rel=1e-2)
+        assert row.latest == pytest.approx(parameter.mean.latest, rel=1e-12)
+
+
+def test_a_report_of_an_earlier_week_knows_what_was_known_then(stepped: Database, tmp_path: Path) -> None:
+    health = reported(stepped, "2026-W10", tmp_path)
+    history = machine_history(stepped, "HU40-T", model="samba")
+    before = [at.replace(tzinfo=None) < datetime(2026, 3, 9) for at in history.started_at]
+    past = machine_past(history.part(np.array(before)), [])
+    (noted,) = [noted for noted in health.changes if noted.after is not None]
+    (change,) = past["EB0C"].search.changes
+    assert len(before) > sum(before)
+    assert noted.p_value == change.p_value < FALSE_ALARM
