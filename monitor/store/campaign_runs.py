@@ -24,12 +24,13 @@ SELECT campaign_id, unnest(run), unnest(started_at), unnest(utc_offset_s), unnes
        unnest(conditions)
 FROM campaign_runs WHERE campaign_id IN ({marks})
 """
+_COLUMNS = ("machine_hash", "run", "started_at", "utc_offset_s", "day", "warm_up", "conditions")
 _ALTERED = f"""
 SELECT campaign FROM ({RUN_LISTS}) AS expected LEFT JOIN campaign_runs AS stored USING (campaign_id)
 JOIN imported_campaign USING (campaign_id)
-WHERE {{differences}} ORDER BY campaign_id
+WHERE {" OR ".join(f"expected.{column} IS DISTINCT FROM stored.{column}" for column in _COLUMNS)}
+ORDER BY campaign_id
 """
-_COLUMNS = ("machine_hash", "run", "started_at", "utc_offset_s", "day", "warm_up", "conditions")
 
 
 def insert_runs(db: Database, campaign_id: int) -> None:
@@ -57,12 +58,9 @@ def run_rows(db: Database, numbers: Sequence[int]) -> list[tuple[Any, ...]]:
 
 def run_list_faults(db: Database, portion: int = PORTION) -> Iterator[str]:
     """Yield a sentence for each row that is altered, missing or added, compared with campaigns and runs."""
-    differences = " OR ".join(f"expected.{column} IS DISTINCT FROM stored.{column}" for column in _COLUMNS)
     ((last,),) = db.rows("SELECT coalesce(max(campaign_id), 0) FROM imported_campaign")
     for first in range(1, last + 1, portion):
-        for (campaign,) in db.rows(
-            _ALTERED.format(differences=differences), {"first": first, "end": first + portion}
-        ):
+        for (campaign,) in db.rows(_ALTERED, {"first": first, "end": first + portion}):
             yield f"the row of campaign {campaign} in campaign_runs was altered: it differs from its runs or machine"
     for (number,) in db.rows(
         "SELECT campaign_id FROM campaign_runs ANTI JOIN imported_campaign USING (campaign_id) ORDER BY ALL"

@@ -64,17 +64,16 @@ FROM ({_RUN_BY_RUN})
 ORDER BY identification_id
 """,
 )
-#: The rows of ``campaign_runs`` as the tables of runs and campaigns have them; a curve has no runs.
-RUN_LISTS = """
-SELECT campaign_id, CAST(md5_number_lower(machine) % 16777216 AS INTEGER) AS machine_hash, coalesce(r.run, []) AS run,
-       coalesce(r.started_at, []) AS started_at, coalesce(r.utc_offset_s, []) AS utc_offset_s,
-       coalesce(r.day, []) AS day, coalesce(r.warm_up, []) AS warm_up, coalesce(r.conditions, []) AS conditions
+_RUN_COLUMNS = ("run", "started_at", "utc_offset_s", "day", "warm_up", "conditions")
+#: The rows of ``campaign_runs`` as the tables of runs and campaigns have them, ordered by ``run``; a curve has none.
+#: A list of records, sorted once, takes a fifth of the time of six ordered lists.
+RUN_LISTS = f"""
+SELECT campaign_id, CAST(md5_number_lower(machine) % 16777216 AS INTEGER) AS machine_hash,
+       {", ".join(f"coalesce(list_transform(runs, lambda r: r.{name}), []) AS {name}" for name in _RUN_COLUMNS)}
 FROM imported_campaign LEFT JOIN (
-    SELECT campaign_id, list(run ORDER BY run) AS run, list(started_at ORDER BY run) AS started_at,
-           list(utc_offset_s ORDER BY run) AS utc_offset_s, list(day ORDER BY run) AS day,
-           list(warm_up ORDER BY run) AS warm_up, list(conditions ORDER BY run) AS conditions
+    SELECT campaign_id, list_sort(list({{{", ".join(f"'{name}': {name}" for name in _RUN_COLUMNS)}}})) AS runs
     FROM run WHERE campaign_id >= $first AND campaign_id < $end GROUP BY campaign_id
-) AS r USING (campaign_id)
+) USING (campaign_id)
 WHERE campaign_id >= $first AND campaign_id < $end
 """
 #: The runs of campaigns as migration 0011 makes their table.

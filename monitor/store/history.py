@@ -21,8 +21,8 @@ from monitor.store.connection import Database
 from monitor.store.identified_values import IdentifiedValues, values_of
 from monitor.store.machine_runs import RecordedRun, runs_of_campaigns
 
-# Only numbers are looked through for all campaigns of the fleet; a key, alone in its condition, finds the models of those
-# of the machine, then the heads, which are long, of those that are selected.
+# Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the models of one machine's
+# identifications, then the heads, which are long, of those that are selected.
 _IDENTIFICATIONS = """
 SELECT identification_id
 FROM identification JOIN (SELECT unnest(CAST(? AS INTEGER[])) AS campaign_id) USING (campaign_id)
