@@ -26,6 +26,7 @@ from monitor.store import (
     machine_history,
     record_event,
 )
+from monitor.store.campaign_runs import gather_runs
 from monitor.store.identified_values import gather_values
 from monitor.workflow.history.changes import search_changes
 from monitor.workflow.history.series import Series
@@ -93,6 +94,7 @@ def add_machine(
             own,
         )
     gather_values(db)
+    gather_runs(db)
 
 
 @pytest.fixture(scope="module")
