@@ -11,16 +11,9 @@ from monitor.documents import OMITTED, named
 from monitor.records import Array
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
+from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.svg.map_slices import Slice
 from monitor.workflow.uncertainty.released import covariance_source_of
-
-
-@dataclass(frozen=True)
-class RefusedGroup:
-    """Parameters that got no number, and why."""
-
-    parameters: tuple[str, ...]
-    why: str
 
 
 @dataclass(frozen=True)
@@ -43,7 +36,7 @@ class StatedUncertainty:
     parameters: tuple[str, ...]
     units: Mapping[str, str]
     input_covariance: str
-    refused: tuple[RefusedGroup, ...]
+    refused: tuple[RefusedParameters, ...]
     guf: FrameworkResult
     input_covariance_source: CovarianceSource | None = field(default=None, metadata=OMITTED)
 
