@@ -21,12 +21,16 @@ from monitor.store.connection import Database
 from monitor.store.identified_values import IdentifiedValues, values_of
 from monitor.store.machine_runs import RecordedRun, runs_of_campaigns
 
-# The heads of identifications are long: first the numbers are chosen, then a key finds the heads of those.
+# Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the models of one machine's
+# identifications, then the heads, which are long, of those that are selected.
 _IDENTIFICATIONS = """
-SELECT campaign_id, run_count, identification_id
-FROM identification JOIN (SELECT unnest(CAST($campaigns AS INTEGER[])) AS campaign_id) USING (campaign_id)
-WHERE (model = $model OR CAST($model AS VARCHAR) IS NULL AND model = method)
-  AND (CAST($version AS INTEGER) IS NULL OR model_version = $version)
+SELECT identification_id
+FROM identification JOIN (SELECT unnest(CAST(? AS INTEGER[])) AS campaign_id) USING (campaign_id)
+"""
+
+_MODELS = """
+SELECT campaign_id, run_count, identification_id, model, model_version, method
+FROM identification WHERE identification_id IN ({marks})
 """
 
 _HEADS = """
@@ -70,7 +74,7 @@ class _Identified:
 
 @dataclass(frozen=True)
 class MachineHistory:
-    """n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
+    """The n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
 
     ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
     are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
@@ -173,9 +177,10 @@ def _identified(
     if not campaigns:
         return {}
     selected: dict[int, tuple[int, int]] = {}
-    rows = db.rows(_IDENTIFICATIONS, {"campaigns": campaigns, "model": model, "version": version})
-    for campaign, run_count, number in rows:
-        selected[campaign] = max((run_count, number), selected.get(campaign, (0, 0)))
+    candidates = [number for (number,) in db.rows(_IDENTIFICATIONS, [campaigns])]
+    for campaign, run_count, number, of_model, of_version, method in _with_marks(db, _MODELS, candidates):
+        if of_model == (method if model is None else model) and version in (None, of_version):
+            selected[campaign] = max((run_count, number), selected.get(campaign, (0, 0)))
     numbers = [number for _, number in selected.values()]
     heads = {number: tuple(map(tuple, head)) for number, *head in _with_marks(db, _HEADS, numbers)}
     return {

@@ -87,7 +87,8 @@ def effects(request: EffectsRequest) -> EffectsAnswer:
     """
     if request.folder is not None:
         return _selected(_of_campaign(read_campaign(request.folder)), request.text)
-    chain = parse_topology(request.topology or DEFAULT_TOPOLOGY)
+    assert request.topology is not None  # the request has one of the two
+    chain = parse_topology(request.topology)
     base = tuple(base_effects(chain))
     others = (*of_balls(DRIVERS), *of_tracker(chain, DRIVERS))
     described = _described(catalogue(chain, base, DRIVERS, more=others))

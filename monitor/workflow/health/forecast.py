@@ -27,6 +27,7 @@ class DriftForecast:
 
     @property
     def good_for(self) -> float | None:
+        """Days that the parameter stays in tolerance, at most the horizon; None without a tolerance."""
         return None if self.ahead is None else float(min(self.ahead.recommended_interval, self.horizon))
 
 

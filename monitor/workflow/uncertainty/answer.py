@@ -13,8 +13,8 @@ import numpy as np
 
 from monitor.documents import OMITTED
 from monitor.records import Array
-from monitor.reporting.certificate.results import RefusedParameters
 from monitor.reporting.covariance_source import CovarianceSource
+from monitor.reporting.refused import RefusedParameters
 from monitor.workflow.uncertainty.request import Asked
 
 
