@@ -10,7 +10,6 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
-from monitor.documents import to_document
 from monitor.exceptions import InputError
 from monitor.workflow.certificate.answer import (
     CertificateFileAnswer,
@@ -135,7 +134,7 @@ def _amend(options: Namespace) -> int:
 
 def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
     if as_json:
-        output.document(to_document(answer))
+        output.document(answer)
     else:
         output.say(f"certificate {answer.certificate.number} ({answer.certificate.state}): {answer.file}")
     return 0
@@ -154,7 +153,7 @@ def _show(options: Namespace) -> int:
         if path is not None:
             with opened(options) as db:
                 written = write(db, CertificateFileRequest(options.number, path))
-            output.document(to_document(written)) if options.json else output.say(written.file)
+            output.document(written) if options.json else output.say(written.file)
             return 0
     with opened(options) as db:
         answer: CertificateShowAnswer | CertificatesAnswer = (
@@ -163,10 +162,10 @@ def _show(options: Namespace) -> int:
             else show_certificate(db, CertificateShowRequest(options.number))
         )
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0
     states = (answer.certificate,) if isinstance(answer, CertificateShowAnswer) else answer.certificates
-    output.listing([to_document(state) for state in states], "no certificate was made yet")
+    output.listing(states, "no certificate was made yet")
     return 0
 
 
@@ -175,7 +174,7 @@ def _remake(options: Namespace) -> int:
     with opened(options) as db, output.working("making it again"):
         answer = remake(db, request)
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
     else:
         output.say(
             f"certificate {answer.certificate.number} made again: {answer.file}, "
@@ -188,7 +187,7 @@ def _verify(options: Namespace) -> int:
     with opened(options) as db, output.working("verifying"):
         answer = verify_file(db, VerificationRequest(options.file, options.trust))
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0 if answer.ok else 1
     for name, passed in dataclasses.asdict(answer.checks).items():
         output.say(f"{name:<10} {'not signed' if passed is None else 'good' if passed else 'FAILED'}")
@@ -205,7 +204,7 @@ def _withdraw(options: Namespace) -> int:
     with opened(options) as db:
         answer = withdraw(db, WithdrawalRequest(options.number, options.reason))
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
     else:
         output.say(f"certificate {answer.number} is {answer.state}")
     return 0

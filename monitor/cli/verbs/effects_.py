@@ -8,7 +8,6 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import check_path, opened
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.workflow.effects import (
     DEFAULT_TOPOLOGY,
     CampaignEffectsRequest,
@@ -51,7 +50,7 @@ def _answer(options: Namespace) -> EffectsAnswer:
 def run(options: Namespace) -> int:
     answer = _answer(options)
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0
     if not answer.effects:
         output.say(

@@ -9,7 +9,6 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 from monitor.workflow.volumetric.request import COMPENSATION_FORMATS, POINTS, VolumetricRequest
 from monitor.workflow.volumetric.volumetric import volumetric_map
@@ -62,7 +61,7 @@ def run(options: Namespace) -> int:
     with opened(options) as db, output.working("mapping"), db.transaction():
         answer = volumetric_map(db, request)
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
     else:
         _say(answer)
     return 0

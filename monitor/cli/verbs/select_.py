@@ -14,7 +14,6 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.exceptions import InputError
 from monitor.store import Database
 from monitor.workflow.selections.request import (
@@ -54,7 +53,7 @@ def run(options: Namespace) -> int:
     with opened(options, threads=1) as db, output.working("selecting"), db.transaction():
         answer = _answer(db, options)
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
     elif isinstance(answer, SelectionAnswer):
         output.say(
             f"{answer.selection}: {len(answer.runs)} runs of {answer.campaign} where {answer.condition}"
@@ -62,7 +61,7 @@ def run(options: Namespace) -> int:
     elif isinstance(answer, SideBySideAnswer):
         _comparison(answer)
     else:
-        output.listing(to_document(answer)["selections"], "there is no selection yet")
+        output.listing(answer.selections, "there is no selection yet")
     return 0
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.workflow.simulation import SimulateRequest, simulate
 
 EXAMPLE = 'monitor simulate rehearsal --effect "EBB:harmonic2" --peak 5 --seed 7'
@@ -39,7 +38,7 @@ def run(options: Namespace) -> int:
         SimulateRequest(options.out, options.effect, options.peak, options.noise, options.seed, options.robot)
     )
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
     else:
         output.say(answer.message)
     return 0

@@ -13,7 +13,6 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.workflow.run_statistics.answer import DIFFERENT, NoVectorTest, StatisticsAnswer, VectorTestAnswer
 from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import stats
@@ -54,7 +53,7 @@ def run(options: Namespace) -> int:
     with opened(options, threads=1) as db, output.working("computing"), db.transaction():
         answer = stats(db, request)
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0
     _parameters(answer)
     if answer.moved:

@@ -8,7 +8,6 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
-from monitor.documents import to_document
 from monitor.readers import read_linear_axes
 from monitor.workflow.uncertainty.answer import MonteCarloAnswer, UncertaintyAnswer, ValidationAnswer
 from monitor.workflow.uncertainty.evaluation import uncertainty
@@ -73,7 +72,7 @@ def run(options: Namespace) -> int:
     with opened(options) as db, output.working("propagating"):
         answer = uncertainty(db, request)
     if options.json:
-        output.document(to_document(answer))
+        output.document(answer)
         return 0
     _parameters(answer)
     _coverage(answer)

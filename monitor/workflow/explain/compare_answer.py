@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from monitor.discovery import Verdict
 from monitor.documents import INLINED, OMITTED
@@ -55,8 +56,26 @@ class CurvePart:
     n: int
 
 
+class InMicrometres:
+    """Gives a machine's residuals, which are in micrometres, the names of a curve's."""
+
+    unit: ClassVar[str] = MICROMETRE.name
+    rms_um: float
+    repeatability_um: float | None
+
+    @property
+    def rms(self) -> float:
+        """The RMS in ``unit``."""
+        return self.rms_um
+
+    @property
+    def repeatability(self) -> float | None:
+        """The repeatability in ``unit``, None where it is not known."""
+        return self.repeatability_um
+
+
 @dataclass(frozen=True)
-class MachineComparison:
+class MachineComparison(InMicrometres):
     """A model against the probings of a machine.
 
     ``expected_rms_um`` is what the stated standard uncertainty would leave, ``repeatability_um`` the standard deviation
@@ -76,21 +95,6 @@ class MachineComparison:
     excess_over_statement_p: float
     verdict: Verdict
     by: Mapping[str, Mapping[str, MachinePart]]
-
-    @property
-    def unit(self) -> str:
-        """The unit of ``rms`` and its like: a micrometre."""
-        return MICROMETRE.name
-
-    @property
-    def rms(self) -> float:
-        """The RMS in ``unit``."""
-        return self.rms_um
-
-    @property
-    def repeatability(self) -> float | None:
-        """The repeatability in ``unit``, None where it is not known."""
-        return self.repeatability_um
 
     @property
     def expected_rms(self) -> float:

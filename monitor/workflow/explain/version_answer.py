@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED
 from monitor.reporting.refused import RefusedParameters
-from monitor.units import MICROMETRE
+from monitor.workflow.explain.compare_answer import InMicrometres
 
 
 @dataclass(frozen=True)
-class MachineVersion:
+class MachineVersion(InMicrometres):
     """The error of a version on a machine's campaign in µm: on all runs, and on runs that took no part in the fit."""
 
     model: str
@@ -25,24 +25,9 @@ class MachineVersion:
     no_number: tuple[RefusedParameters, ...]
 
     @property
-    def unit(self) -> str:
-        """The unit of ``rms`` and its like: a micrometre."""
-        return MICROMETRE.name
-
-    @property
-    def rms(self) -> float:
-        """The RMS in ``unit``."""
-        return self.rms_um
-
-    @property
     def heldout_rms(self) -> float | None:
         """The RMS on held-out readings in ``unit``, None where there is none."""
         return self.heldout_rms_um
-
-    @property
-    def repeatability(self) -> float | None:
-        """The repeatability in ``unit``, None where it is not known."""
-        return self.repeatability_um
 
 
 @dataclass(frozen=True)
