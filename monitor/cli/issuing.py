@@ -43,9 +43,7 @@ def add_issuing(parser: ArgumentParser) -> None:
         help="state the GUM framework's result, or the stored Monte Carlo result (default guf)",
     )  # fmt: skip
     parser.add_argument(
-        "--conformity",
-        choices=RULES,
-        help="state conformity with the machine's tolerances by this rule",
+        "--conformity", choices=RULES, help="state conformity with the machine's tolerances by this rule"
     )
     parser.add_argument("--map", action="store_true", help="state the volumetric error too, with its figure")
     add_fonts(parser)

@@ -87,9 +87,7 @@ def _say(answer: VolumetricAnswer) -> None:
         for name, length in (("worst point", worst), ("mean", answer.mean), ("RMS", answer.rms))
     ]
     output.table(
-        "",
-        ["length of the error", "µm", "u / µm", f"U / µm (k = {answer.k:.2f}, p = {answer.p:g})"],
-        rows,
+        "", ["length of the error", "µm", "u / µm", f"U / µm (k = {answer.k:.2f}, p = {answer.p:g})"], rows
     )
     output.say(f"worst at {_place(worst.at)}: {_vector(worst.vector_um)}")
     shares = (worst.by_parameter_um or {}).items()

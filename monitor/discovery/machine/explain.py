@@ -126,11 +126,7 @@ def explain(
 
 
 def _search(
-    first: Fit,
-    problem: ChainProblem,
-    variants: Sequence[ChainVariant],
-    drivers: Sequence[str],
-    rate: float,
+    first: Fit, problem: ChainProblem, variants: Sequence[ChainVariant], drivers: Sequence[str], rate: float
 ) -> _Search:
     """Search effects and suspects in turn, each under the others, until nothing changes."""
     suspects = Suspects()

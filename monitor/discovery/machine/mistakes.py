@@ -70,7 +70,5 @@ def _worst_run(campaign: Campaign, fit: Fit | None) -> Campaign:
         step = int(np.ceil(len(rows) / most_rows))
         rows = rows[pose % step == 0]
     return replace(
-        campaign,
-        runs=tuple(run for run in campaign.runs if run.run == worst),
-        probings=probings.rows(rows),
+        campaign, runs=tuple(run for run in campaign.runs if run.run == worst), probings=probings.rows(rows)
     )

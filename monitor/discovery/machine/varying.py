@@ -11,13 +11,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.refine import refine_all
 from monitor.discovery.machine.run_evidence import weigh_in_each_run
-from monitor.discovery.machine.scene import (
-    ChainCandidate,
-    ChainScene,
-    ChainVariant,
-    MachineEffect,
-    scene_of,
-)
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.machine.variants import each_run, with_drivers
 from monitor.discovery.search.evidence import Evidence

@@ -10,18 +10,9 @@ from markupsafe import Markup
 from monitor.reporting.certificate.completeness import check_complete
 from monitor.reporting.certificate.matrix import Block, correlation_blocks
 from monitor.reporting.certificate.pictures import Picture, beside, map_picture, pictures_of
-from monitor.reporting.certificate.record import (
-    CertificateRecord,
-    ConformityStatement,
-    MethodUsed,
-)
+from monitor.reporting.certificate.record import CertificateRecord, ConformityStatement, MethodUsed
 from monitor.reporting.certificate.results import ResultSet
-from monitor.reporting.certificate.tables import (
-    Row,
-    conformity_rows,
-    result_rows,
-    result_widths,
-)
+from monitor.reporting.certificate.tables import Row, conformity_rows, result_rows, result_widths
 from monitor.reporting.certificate.volumetric import POINTS_FILE, printed_map
 from monitor.reporting.certificate.words import amendment, answer
 from monitor.reporting.numbers import written_factor, written_probability

@@ -8,13 +8,7 @@ from decimal import Decimal
 from monitor.reporting.certificate.record import ConformityStatement
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.words import verdict_words
-from monitor.reporting.numbers import (
-    PLUS_MINUS,
-    decimal_of,
-    round_result,
-    round_to_place,
-    round_uncertainty,
-)
+from monitor.reporting.numbers import PLUS_MINUS, decimal_of, round_result, round_to_place, round_uncertainty
 from monitor.reporting.palette import PAGE_WIDTH_MM
 from monitor.reporting.svg.letter_widths import BOLD, MILLIMETRES_A_POINT, in_mm
 from monitor.reporting.texts import Texts

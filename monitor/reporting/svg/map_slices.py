@@ -50,10 +50,7 @@ class Slice:
 
 
 def slices_of(
-    readings_mm: npt.ArrayLike,
-    vectors_um: npt.ArrayLike,
-    expanded_um: npt.ArrayLike,
-    names: Sequence[str],
+    readings_mm: npt.ArrayLike, vectors_um: npt.ArrayLike, expanded_um: npt.ArrayLike, names: Sequence[str]
 ) -> tuple[Slice, ...]:
     """Return the three middle slices of a regular grid of points (n, 3) of three axes, across the third axis first.
 

@@ -17,13 +17,7 @@ from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signing import sign
 from monitor.reporting.texts import ENGLISH, texts_of
-from monitor.store import (
-    Database,
-    load_campaign,
-    load_certificate,
-    mark_certificate,
-    save_certificate,
-)
+from monitor.store import Database, load_campaign, load_certificate, mark_certificate, save_certificate
 from monitor.workflow.certificate.answer import CertificateFileAnswer, CertificateState
 from monitor.workflow.certificate.certified import CertifiedRun, certified_run, inputs_of
 from monitor.workflow.certificate.conformity import statement_of

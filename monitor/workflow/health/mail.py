@@ -157,10 +157,7 @@ def message_of(settings: MailSettings, report: ReportAnswer) -> EmailMessage:
     for row in report.machines:
         p = row.probability_out
         out = "" if p is None else f", probability out of tolerance {p:.2g}"
-        lines += [
-            f"{row.machine}: {row.state}{out}",
-            f"  {row.changed}; next check {row.next_check}",
-        ]
+        lines += [f"{row.machine}: {row.state}{out}", f"  {row.changed}; next check {row.next_check}"]
     if report.message:
         lines += ["", report.message]
     room = LARGEST_BYTES

@@ -129,9 +129,7 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
     uncertainty = explanation = mapped = versions = None
     if task.uncertainty:
         uncertainty = attempted(
-            lambda: fitted.uncertainty,
-            "the uncertainty of the last run could not be evaluated",
-            remarks,
+            lambda: fitted.uncertainty, "the uncertainty of the last run could not be evaluated", remarks
         )
     if task.explanation:
         explanation = attempted(

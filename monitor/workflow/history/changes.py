@@ -83,11 +83,7 @@ class _Plan(NamedTuple):
 
 
 def search_changes(
-    series: Sequence[Series],
-    events: Sequence[float],
-    *,
-    false_alarm: float = FALSE_ALARM,
-    seed: int = SEED,
+    series: Sequence[Series], events: Sequence[float], *, false_alarm: float = FALSE_ALARM, seed: int = SEED
 ) -> Mapping[str, ChangeSearch]:
     """Steps, bends and transients of each parameter; or why none were sought.
 

@@ -128,10 +128,7 @@ def _fit_of(planned: PlannedCampaign, choice: Choice) -> Fit:
         pose,
     )
     distances = tuple(
-        replace(
-            distance,
-            length=np.array([np.linalg.norm(places[bar.first] - places[bar.second])]),
-        )
+        replace(distance, length=np.array([np.linalg.norm(places[bar.first] - places[bar.second])]))
         for distance, bar in zip(planned.problem.distances, touches.bars, strict=True)
     )
     sigma = np.full((len(context), 3), touches.sigma)
