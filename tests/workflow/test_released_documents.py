@@ -24,6 +24,9 @@ from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
 from monitor.workflow.certificate.stored import restored_record
+from monitor.workflow.health.machine import MachineName, read_week
+from monitor.workflow.health.request import ReportOptions
+from monitor.workflow.health.weeks import week_named
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.released import covariance_source_of
 from monitor.workflow.uncertainty.released_refusals import reason_of, with_reason
@@ -188,3 +191,28 @@ def test_a_stored_document_without_the_source_is_certified_in_german(db: Databas
     assert load_certificate(db, "R-1").record["inputs"]["stored_result"] == number
     text = printed(Path(made.file))
     assert "Wiederholungsläufe, tageweise zusammengefasst, 15 Freiheitsgrade" in text
+
+
+def test_a_health_report_reads_a_stored_document_and_computes_anew_what_lacks_keys(db: Database) -> None:
+    result = evaluate(db, UncertaintyRequest("five-days", 20, method="guf"))
+    model = result.model
+    document = to_document(answer_of(result))
+    del document["input_covariance_source"]
+    save_analysis(
+        db, "uncertainty", document, method="guf", campaign="five-days", run=20, model=model.name,
+        model_version=model.version,
+    )  # fmt: skip
+    save_analysis(
+        db, "explanation", {"campaign": "five-days", "answer": "Nothing is missing."}, method="samba",
+        campaign="five-days", model=model.name, model_version=model.version,
+    )  # fmt: skip
+    options = ReportOptions(campaigns=("five-days",))
+    week = read_week(db, MachineName("HU40-T", "", ""), week_named("2026-W11"), options)
+    assert week.results is not None
+    assert week.results.uncertainty is not None
+    source = week.results.uncertainty.input_covariance_source
+    assert source is not None
+    assert (source.kind, source.dof) == (result.covariance_source.kind, 15)
+    assert week.results.explanation is None
+    assert week.task is not None
+    assert (week.task.uncertainty, week.task.explanation) == (False, True)
