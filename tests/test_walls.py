@@ -17,7 +17,7 @@ import monitor
 PACKAGE = Path(monitor.__file__).parent
 
 # What every room may import. `from monitor import __version__` is for everyone: the package itself imports nothing.
-GROUND = {"__init__", "exceptions", "units", "records", "documents"}
+GROUND = {"__init__", "exceptions", "units", "records", "documents", "refusal"}
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.
 ROOMS: dict[str, set[str]] = {

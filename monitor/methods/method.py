@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
@@ -18,12 +18,14 @@ from monitor.methods.chain.base_effects import base_effects
 from monitor.methods.chain.identification import Identification, StepwiseCoefficient
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
-from monitor.methods.chain.results import Advice, identification
-from monitor.methods.curve.fit import CurveFit
+from monitor.methods.chain.results import AdviceOf, identification
 from monitor.methods.curve.problem import CurveProblem
 from monitor.methods.model import Model
 from monitor.records import Array, Campaign, CurveCampaign
 from monitor.units import Unit
+
+if TYPE_CHECKING:
+    from monitor.methods.curve.fit import CurveFit
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ class Rehearsal(Able):
 
 
 class ExpectedAngles(Protocol):
-    """What a plan of angles of a table promises.
+    """What a plan of ``angles`` of a table with so many ``probings`` promises.
 
     ``shape`` are standard uncertainties of the shape's points in mm and ``u`` those of all parameters in internal
     units, NaN where the plan gives no number; ``nullity`` counts the dimensions that it leaves open and ``left_out``
@@ -106,7 +108,10 @@ class ExpectedAngles(Protocol):
 
 
 class AngleCandidates(Protocol):
-    """Angles of a table (degrees) to choose from, with the ``present`` plan of the first run."""
+    """Angles of a ``table`` (degrees) to choose from, with the ``present`` plan of the first run.
+
+    ``conditions`` are those on the shape, ``units`` the display units of the parameters.
+    """
 
     @property
     def present(self) -> tuple[float, ...]: ...
@@ -195,7 +200,7 @@ class ChainMethod(Method):
     """
 
     problem_of: ProblemOf
-    advice: Advice
+    advice: AdviceOf
     base_effects: Callable[[Chain], tuple[str, ...]] = base_effects
     refuse: Callable[[Campaign, ChainProblem], None] = nothing_to_refuse
     gross_times: float = 100.0

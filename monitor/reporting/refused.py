@@ -1,42 +1,110 @@
-"""Why a parameter has no number, in the language of a certificate.
-
-A method gives the reason as an English sentence, which records store as it is. ``reason`` recognises it by the English
-texts of section ``sentences``, part by part, and says it in another language; a sentence that nobody translated stays
-as it is.
-"""
+"""Why a parameter has no number: as data, and as one sentence in each language."""
 
 from __future__ import annotations
 
-import re
-import string
-from functools import cache
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import reduce
 
+from monitor.documents import OMITTED
+from monitor.refusal import Advice, AdviceKind, Reason, ReasonKind, Refusal
 from monitor.reporting.texts import ENGLISH, Texts, texts_of
 
-_NUMBER = re.compile(r"\d+\.\d+")
+#: So many places of one table are named one by one.
+MOST_PLACES = 3
 
 
-def reason(sentence: str, texts: Texts) -> str:
-    """The English sentence of a refusal in the language of ``texts``."""
-    if texts.language == ENGLISH:
-        return sentence
-    for key, pattern in _patterns():
-        if match := pattern.fullmatch(sentence):
-            return texts(key, **{name: reason(part, texts) for name, part in match.groupdict().items()})
-    if _NUMBER.fullmatch(sentence):
-        return sentence.replace(".", texts.decimal_sign)
-    return ", ".join(reason(part, texts) for part in sentence.split(", ")) if ", " in sentence else sentence
+@dataclass(frozen=True)
+class RefusedParameters:
+    """Parameters without a number, and ``why`` in an English sentence.
+
+    ``reason`` is the same as data; None where the sentence is all there is: a result that an earlier version stored,
+    in words that this one does not know.
+    """
+
+    parameters: tuple[str, ...]
+    why: str
+    reason: Reason | None = field(default=None, metadata=OMITTED)
 
 
-@cache
-def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
-    """The English sentences as patterns, in the order of their file."""
-    patterns = []
-    for key, text in texts_of(ENGLISH).words.items():
-        if key.startswith("sentences."):
-            parts = [
-                re.escape(literal) + (f"(?P<{name}>.+?)" if name else "")
-                for literal, name, _, _ in string.Formatter().parse(text)
-            ]
-            patterns.append((key, re.compile("".join(parts))))
-    return tuple(patterns)
+def refused_parameters(refusal: Refusal) -> RefusedParameters:
+    """The refusal with its English sentence."""
+    return RefusedParameters(refusal.parameters, refusal_sentence(refusal), refusal.reason)
+
+
+def refusal_of(refused: RefusedParameters) -> Refusal | None:
+    """The refusal as data; None where its sentence is all there is."""
+    return None if refused.reason is None else Refusal(refused.parameters, refused.reason)
+
+
+def why_refused(refused: RefusedParameters, texts: Texts) -> str:
+    """The reason in the language of ``texts``; an English sentence stays as it was stored."""
+    refusal = refusal_of(refused)
+    return refused.why if refusal is None or texts.language == ENGLISH else refusal_sentence(refusal, texts)
+
+
+def refusal_sentence(refusal: Refusal, texts: Texts | None = None) -> str:
+    """The reason of a refusal in a sentence without its full stop, in the language of ``texts`` (English without)."""
+    say = texts or texts_of()
+    parameters, reason = refusal.parameters, refusal.reason
+    if reason.kind is ReasonKind.NOT_SEPARATED:
+        return _not_separated(parameters, reason, say)
+    u = "" if reason.u is None else f"{reason.u:.2g}".replace(".", say.decimal_sign)
+    names = _joined(_unknowns(parameters, say), "both", say)
+    return say(f"sentences.{reason.kind.value}", names=names, u=u, unit=reason.unit)
+
+
+def _not_separated(parameters: tuple[str, ...], reason: Reason, say: Texts) -> str:
+    what = _joined(_unknowns(_by_table(parameters, say), say), "both", say)
+    if reason.others:
+        others = ", ".join(_unknowns(reason.others, say))
+        what = say("sentences.apart_from", names=what, others=others)
+    elif len(parameters) > 1:
+        what = say("sentences.apart", names=what)
+    assert reason.advice is not None  # what is not separated has an advice
+    key = "advised" if reason.advice.kind.is_cause else "advised_more"
+    return say(f"sentences.{key}", what=what, advice=_advice(reason.advice, say))
+
+
+def _advice(advice: Advice, say: Texts) -> str:
+    if advice.kind is AdviceKind.OWN_WORDS:
+        return advice.text or ""
+    key, several = f"sentences.{advice.kind.value}", f"sentences.{advice.kind.value}_several"
+    conditions = zip(advice.names, advice.meanings or (), strict=False)
+    return say(
+        several if len(advice.names) > 1 and several in say.words else key,
+        names=", ".join(advice.names),
+        joined=_joined(advice.names, "both", say),
+        planes=_joined(advice.names, "planes", say),
+        conditions="; ".join(f"{name} = 0 ({meaning})" for name, meaning in conditions),
+        count=advice.count,
+        run=advice.run,
+    )
+
+
+def _joined(names: Sequence[str], key: str, say: Texts) -> str:
+    if not names:
+        return ""
+    return reduce(lambda first, second: say(f"sentences.{key}", first=first, second=second), names)
+
+
+def _unknowns(names: Sequence[str], say: Texts) -> list[str]:
+    """Names of unknowns as they are printed: the coordinates of the stylus tip, ``tip x``, in words."""
+    return [
+        say("sentences.tip", axis=name.removeprefix("tip ")) if name.startswith("tip ") else name
+        for name in names
+    ]
+
+
+def _by_table(names: Sequence[str], say: Texts) -> list[str]:
+    """The names; those of many places of one table, ``EYX(-88)``, as one."""
+    tables = [name.partition("(")[0] if name.endswith(")") else name for name in names]
+    parts: list[str] = []
+    for table in dict.fromkeys(tables):
+        members = [name for name, of_table in zip(names, tables, strict=True) if of_table == table]
+        parts += (
+            members
+            if len(members) <= MOST_PLACES
+            else [say("sentences.many_places", name=table, count=len(members))]
+        )
+    return parts

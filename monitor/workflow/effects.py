@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 
 from monitor.discovery.curve.catalogue import catalogue as curve_catalogue
-from monitor.documents import OMITTED
+from monitor.documents import INLINED, OMITTED
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
 from monitor.effects.curve import SEARCHED, CurveEffect
@@ -23,7 +23,8 @@ from monitor.methods.curve.problem import CurveProblem, grid
 from monitor.methods.curve.problem import problem_of as curve_problem_of
 from monitor.readers import read_campaign
 from monitor.records import Campaign, CurveCampaign
-from monitor.store import Database, is_curve, load_campaign, load_curve
+from monitor.store import Database
+from monitor.workflow.identify.fitting import load_measured
 
 # Those that every campaign has, and two channels as examples.
 DRIVERS = ("warmup", "run_time", "ambient_degC", "x_axis_degC")
@@ -57,14 +58,11 @@ class CatalogueEffect:
 
     effect: str
     unit: str
-    meaning: str
-    cause: str
-    remedy: str
-    described_in: str
+    description: Description = field(metadata=INLINED)
 
     def contains(self, text: str) -> bool:
         """Return whether any of the fields contains a text, in upper or lower case."""
-        return text.lower() in " ".join(getattr(self, column.name) for column in fields(self)).lower()
+        return text.lower() in " ".join((self.effect, self.unit, *astuple(self.description))).lower()
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,8 @@ def effects(request: EffectsRequest) -> EffectsAnswer:
     """
     if request.folder is not None:
         return _selected(_of_campaign(read_campaign(request.folder)), request.text)
-    chain = parse_topology(request.topology or DEFAULT_TOPOLOGY)
+    assert request.topology is not None  # the request has one of the two
+    chain = parse_topology(request.topology)
     base = tuple(base_effects(chain))
     others = (*of_balls(DRIVERS), *of_tracker(chain, DRIVERS))
     described = _described(catalogue(chain, base, DRIVERS, more=others))
@@ -101,9 +100,7 @@ def campaign_effects(db: Database, request: CampaignEffectsRequest) -> EffectsAn
 
     Raises NotFoundError, and DataError where the readings do not suffice.
     """
-    name = request.campaign
-    campaign = load_curve(db, name) if is_curve(db, name) else load_campaign(db, name)
-    return _selected(_of_campaign(campaign), request.text)
+    return _selected(_of_campaign(load_measured(db, request.campaign)), request.text)
 
 
 def _selected(answer: EffectsAnswer, text: str | None) -> EffectsAnswer:
@@ -137,13 +134,7 @@ def _of_campaign(campaign: Campaign | CurveCampaign) -> EffectsAnswer:
 
 
 def _described(effects: Iterable[ChainEffect | ArtefactEffect]) -> tuple[CatalogueEffect, ...]:
-    return tuple(_entry(effect.text, effect.unit.name, describe(effect)) for effect in effects)
-
-
-def _entry(effect: str, unit: str, description: Description) -> CatalogueEffect:
-    return CatalogueEffect(
-        effect, unit, description.meaning, description.cause, description.remedy, description.described_in
-    )
+    return tuple(CatalogueEffect(effect.text, effect.unit.name, describe(effect)) for effect in effects)
 
 
 def _of_curve(curve: CurveCampaign) -> EffectsAnswer:
@@ -155,7 +146,7 @@ def _of_curve(curve: CurveCampaign) -> EffectsAnswer:
         campaign=curve.name,
         base=(curve.base,),
         effects=tuple(
-            _entry(effect.text, unit, description)
+            CatalogueEffect(effect.text, unit, description)
             for effect, description in descriptions
             if description is not None
         ),

@@ -31,6 +31,9 @@ from monitor.methods.chain.touch import TouchProblem
 from monitor.methods.model import chain_of
 from monitor.readers import method_rules, read_campaign
 from monitor.records import Campaign, CurveCampaign
+from monitor.refusal import Reason, ReasonKind, Refusal
+from monitor.reporting.refused import refusal_sentence
+from monitor.reporting.texts import languages, texts_of
 from monitor.units import Unit
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -89,7 +92,10 @@ def test_a_method_of_machines_identifies_its_example_at_the_least_squares_point(
     assert (found.method, found.model, found.parameters) == (name, name, problem.base_names)
     assert [run.run for run in found.runs] == [1]
     assert np.isfinite(found.runs[0].estimate).any()
-    assert method.advice(problem, problem.base_names[:1], 1).startswith((":", ";"))
+    advice = method.advice(problem, problem.base_names[:1], 1)
+    reason = Reason(ReasonKind.NOT_SEPARATED, advice=advice)
+    for language in languages():
+        assert refusal_sentence(Refusal(problem.base_names[:1], reason), texts_of(language))
 
 
 @pytest.mark.parametrize("name", OF_MACHINES)

@@ -10,6 +10,7 @@ from scipy import stats
 
 from monitor.exceptions import DataError
 from monitor.methods.free_form.method import METHOD as free_form
+from monitor.reporting.refused import refusal_sentence
 
 
 def with_conditions(campaign, conditions):
@@ -132,7 +133,8 @@ def test_eqs_16_17_a_missing_condition_is_found_and_named(sim, made):
         (refusal,) = run.refused
         assert missing in refusal.parameters
         assert (
-            f"the boundary condition {missing} = 0 ({problem.conditions[missing]}) is missing" in refusal.why
+            f"the boundary condition {missing} = 0 ({problem.conditions[missing]}) is missing"
+            in refusal_sentence(refusal)
         )
         assert np.isfinite(run.estimate).sum() == len(run.estimate) - len(refusal.parameters)
 
@@ -182,7 +184,7 @@ def test_quarter_turns_alone_are_refused(sim, made):
     _, campaign = made(sim.cross_pocket(), (0.0, 90.0, 180.0, 270.0))
     refused = free_form.identify(campaign).runs[0].refused
     assert refused
-    assert "multiples of 90 degrees apart" in refused[0].why
+    assert "multiples of 90 degrees apart" in refusal_sentence(refused[0])
 
 
 def test_conditions_in_the_workpiece(sim, made):

@@ -16,6 +16,7 @@ from monitor.methods.l_shape.stepwise import squareness, stepwise
 from monitor.methods.model import chain_of
 from monitor.readers import read_campaign
 from monitor.records import Machine
+from monitor.reporting.refused import refusal_sentence
 
 ARCSEC = np.pi / 180.0 / 3600.0
 # Section 3.1.2: the position of a spot is resolved to 0.73 µm; a reading is off by up to half of that.
@@ -163,7 +164,10 @@ def test_one_plane_alone_refuses_what_it_does_not_show_and_says_what_to_do(sim, 
         name for one in found.runs[0].refused if "EC0Y" in one.parameters for name in one.parameters
     }
     assert {"EYX:poly2", "EBX:poly1", "EAY:poly3", "EYY", "EXY:poly2"}.isdisjoint(refused)
-    assert any("lay the piece in the XZ and the YZ plane too" in one.why for one in found.runs[0].refused)
+    assert any(
+        "lay the piece in the XZ and the YZ plane too" in refusal_sentence(one)
+        for one in found.runs[0].refused
+    )
 
 
 def test_stepwise_differs_from_all_at_once_by_its_method_and_by_noise_of_the_stated_size(sim, campaign_of):
@@ -219,7 +223,9 @@ def test_too_few_modules_for_a_cubic_are_named(sim, campaign_of):
     found = METHOD.identify(campaign)
     refused = {name for refusal in found.runs[0].refused for name in refusal.parameters}
     assert "EAY:poly3" in refused
-    assert any("scan 4 or more modules along every arm" in one.why for one in found.runs[0].refused)
+    assert any(
+        "scan 4 or more modules along every arm" in refusal_sentence(one) for one in found.runs[0].refused
+    )
     problem = problem_of(campaign)
     with pytest.raises(
         DataError, match="run 1 scanned 6 modules along X in the XY plane; a cubic needs four"

@@ -19,6 +19,7 @@ from monitor.methods.chain.problem import solve_problem
 from monitor.methods.model import Model
 from monitor.methods.rotary_probing.base import rotary_base
 from monitor.methods.rotary_probing.method import METHOD as rotary_probing
+from monitor.reporting.refused import refusal_sentence
 
 campaigns = load("rotary_campaigns", Path(__file__).with_name("rotary_campaigns.py"))
 reference = load("closed_forms", Path(__file__).with_name("closed_forms.py"))
@@ -232,7 +233,10 @@ def test_a_plan_without_tilting_says_what_it_cannot_separate(rp, chain_of, rng):
     refused = {name for refusal in whole.runs[0].refused for name in refusal.parameters}
     assert {"EY0A", "EY0C", "EB0A", "EB0C", "EZ0A"} <= refused
     assert all(np.isnan(found[name]) for name in refused)
-    assert any("A stands at one angle throughout; index it too" in one.why for one in whole.runs[0].refused)
+    assert any(
+        "A stands at one angle throughout; index it too" in refusal_sentence(one)
+        for one in whole.runs[0].refused
+    )
     assert found["EX0A"] == pytest.approx(TRUTH["EX0A"], abs=1e-6)
 
 

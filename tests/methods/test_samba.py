@@ -12,6 +12,7 @@ from scipy import stats
 from monitor.methods.samba.method import METHOD as samba
 from monitor.readers import read_campaign
 from monitor.records import Array
+from monitor.reporting.refused import refusal_sentence
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 THIRTEEN = (
@@ -76,7 +77,7 @@ def test_without_spindle_indexation_eleven_come_out_and_two_are_refused_by_name(
     assert len(found.runs) == 44
     for run in found.runs:
         assert [refusal.parameters for refusal in run.refused] == [("EX0C1",), ("EY0C1",)]
-        assert run.refused[0].why == (
+        assert refusal_sentence(run.refused[0]) == (
             "with this plan EX0C1 cannot be told apart from tip x: C1 stands at one angle throughout; probe also "
             "with C1 at 90, 180 and 270 degrees"
         )

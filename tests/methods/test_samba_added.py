@@ -14,6 +14,7 @@ from monitor.exceptions import EffectError
 from monitor.methods.model import Model
 from monitor.methods.samba.method import METHOD as samba
 from monitor.records import Array
+from monitor.reporting.refused import refusal_sentence
 
 Distance = Callable[[Array, Array], float]
 
@@ -66,7 +67,7 @@ def test_effects_md_an_invisible_effect_is_refused_by_name(
     assert np.isnan(found.added_estimate).all()
     assert np.isnan(found.added_covariance).all()
     assert [refusal.parameters for refusal in found.added_refused] == [(name,) for name in found.added]
-    assert {"free in every run" in refusal.why for refusal in found.added_refused} == {True}
+    assert {"free in every run" in refusal_sentence(refusal) for refusal in found.added_refused} == {True}
     # It takes nothing away from what the plan does see.
     plain = samba.identify(campaign)
     np.testing.assert_allclose(found.runs[0].estimate, plain.runs[0].estimate, rtol=0, atol=1e-9)

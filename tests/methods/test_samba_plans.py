@@ -12,6 +12,7 @@ import pytest
 
 from monitor.exceptions import DataError
 from monitor.methods.samba.method import METHOD as samba
+from monitor.reporting.refused import refusal_sentence
 
 
 @pytest.mark.parametrize(
@@ -33,7 +34,7 @@ def test_an_axis_that_stands_still_hides_its_parameters(
     without = {name for name, value in zip(found.parameters, run.estimate, strict=True) if np.isnan(value)}
     assert named == without == refused
     axis = next(iter(still))
-    assert {axis in refusal.why.partition(":")[2] for refusal in run.refused} == {True}
+    assert {axis in refusal_sentence(refusal).partition(":")[2] for refusal in run.refused} == {True}
 
 
 def test_every_parameter_without_a_number_is_named_whatever_the_plan(simulated: Callable[..., Any]) -> None:
@@ -67,10 +68,8 @@ def test_a_run_without_the_bar_has_no_unit_of_length(simulated: Callable[..., An
     found = samba.identify(replace(campaign, probings=campaign.probings.rows(rows)))
     assert found.runs[0].refused == ()
     assert [refusal.parameters for refusal in found.runs[1].refused] == [("EXX", "EYY", "EZZ")]
-    assert (
-        found.runs[1]
-        .refused[0]
-        .why.endswith(": run 2 did not probe S1 and S2 of the scale bar, the unit of length")
+    assert refusal_sentence(found.runs[1].refused[0]).endswith(
+        ": run 2 did not probe S1 and S2 of the scale bar, the unit of length"
     )
 
 

@@ -19,6 +19,7 @@ from monitor.methods.model import chain_of
 from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
 from monitor.records import Campaign
+from monitor.reporting.refused import refusal_sentence
 
 Tracks = Callable[..., tuple[Any, Campaign]]
 
@@ -128,7 +129,7 @@ def test_a_joint_that_stands_still_is_named(tracked: Tracks, robots: ModuleType)
     assert np.ptp(made.readings[:, 3]) == 0.0
     refused = tracker.identify(campaign).runs[0].refused
     assert refused
-    assert all("J4 stood still throughout; move it too" in one.why for one in refused)
+    assert all("J4 stood still throughout; move it too" in refusal_sentence(one) for one in refused)
 
 
 def test_too_few_poses_are_refused(tracked: Tracks) -> None:

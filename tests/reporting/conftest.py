@@ -16,13 +16,13 @@ from monitor.reporting.certificate.record import CertificateRecord, NotApplicabl
 from monitor.reporting.certificate.results import (
     CoverageFactors,
     JointEstimate,
-    RefusedParameters,
     ResidualSummary,
     ResultSet,
     ResultStatements,
     result_set,
 )
 from monitor.reporting.certificate.volumetric_result import Length, VolumetricResult
+from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.texts import texts_of
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
 

@@ -27,12 +27,12 @@ from monitor.reporting.certificate.record import (
 from monitor.reporting.certificate.results import (
     CoverageFactors,
     JointEstimate,
-    RefusedParameters,
     ResultSet,
     ResultStatements,
     result_set,
 )
 from monitor.reporting.pdf.render import certificate_pdf
+from monitor.reporting.refused import RefusedParameters
 from monitor.units import MICROMETRE, MICRORADIAN
 
 Make = Callable[..., CertificateRecord]

@@ -28,8 +28,8 @@ from monitor.reporting.certificate.record import (
     Replaced,
     Verdict,
 )
-from monitor.reporting.certificate.results import RefusedParameters
 from monitor.reporting.pdf.render import certificate_pdf
+from monitor.reporting.refused import RefusedParameters
 
 Make = Callable[..., CertificateRecord]
 SPACES = {"dcc": DCC, "si": SI}

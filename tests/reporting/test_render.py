@@ -20,9 +20,9 @@ from jinja2 import UndefinedError
 from monitor.documents import to_document
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.record import CertificateRecord, Person
-from monitor.reporting.certificate.results import RefusedParameters
 from monitor.reporting.numbers import written_correlation
 from monitor.reporting.pdf.render import UnprintableError, certificate_html, certificate_pdf, html_of, pdf_of
+from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.resources import report_folder
 
 Make = Callable[..., CertificateRecord]

@@ -10,7 +10,13 @@ from decimal import Decimal
 import pytest
 
 from monitor.exceptions import InputError
-from monitor.reporting.refused import reason
+from monitor.refusal import Advice, AdviceKind, Reason, ReasonKind, Refusal
+from monitor.reporting.refused import (
+    RefusedParameters,
+    refusal_sentence,
+    refused_parameters,
+    why_refused,
+)
 from monitor.reporting.resources import report_text
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import languages, texts_of
@@ -88,33 +94,66 @@ def test_what_a_page_marks_stays_and_what_a_user_writes_is_escaped() -> None:
     assert str(made) == "No. <strong>&lt;b&gt;&amp;</strong>, issued on today"
 
 
-@pytest.mark.parametrize(
-    ("english", "german"),
-    [
-        (
-            "with this plan EX0C1 cannot be told apart from tip x: C1 stands at one angle throughout; probe also with "
-            "C1 at 90, 180 and 270 degrees",
-            "mit diesem Messplan nicht zu trennen: EX0C1 von Tasterspitze x: C1 steht durchweg bei einem Winkel; auch "
-            "mit C1 bei 90, 180 und 270 Grad antasten",
+#: A refusal, its English and its German sentence.
+REFUSALS = [
+    (
+        Refusal(
+            ("EX0C1",), Reason(ReasonKind.NOT_SEPARATED, ("tip x",), Advice(AdviceKind.SPINDLE_STILL, ("C1",)))
         ),
-        (
-            "with this plan EXX and EYY cannot be told apart; probe more indexations",
-            "mit diesem Messplan nicht voneinander zu trennen: EXX und EYY; mehr Stellungen der Drehachsen antasten",
+        "with this plan EX0C1 cannot be told apart from tip x: C1 stands at one angle throughout; probe also with "
+        "C1 at 90, 180 and 270 degrees",
+        "mit diesem Messplan nicht zu trennen: EX0C1 von Tasterspitze x: C1 steht durchweg bei einem Winkel; auch "
+        "mit C1 bei 90, 180 und 270 Grad antasten",
+    ),
+    (
+        Refusal(("EXX", "EYY"), Reason(ReasonKind.NOT_SEPARATED, (), Advice(AdviceKind.MORE_INDEXATIONS))),
+        "with this plan EXX and EYY cannot be told apart; probe more indexations",
+        "mit diesem Messplan nicht voneinander zu trennen: EXX und EYY; mehr Stellungen der Drehachsen antasten",
+    ),
+    (
+        Refusal(
+            tuple(f"EXX({place})" for place in range(9)),
+            Reason(ReasonKind.NOT_SEPARATED, ("lattice",), Advice(AdviceKind.PIECE_PLANES, ("XY", "YZ"))),
         ),
-        (
-            "with this plan EXX at 9 places cannot be told apart from lattice; lay the piece in the XY and the YZ "
-            "plane too",
-            "mit diesem Messplan nicht zu trennen: EXX an 9 Stellen von lattice; das Stück auch in die Ebene XY und YZ "
-            "legen",
+        "with this plan EXX at 9 places cannot be told apart from lattice; lay the piece in the XY and the YZ "
+        "plane too",
+        "mit diesem Messplan nicht zu trennen: EXX an 9 Stellen von lattice; das Stück auch in die Ebene XY und YZ "
+        "legen",
+    ),
+    (
+        Refusal(
+            ("EX0J1",),
+            Reason(ReasonKind.NOT_SEPARATED, ("tip z",), Advice(AdviceKind.STOOD_STILL, ("J1", "J2"))),
         ),
-        (
-            "with this plan EX0J1 cannot be told apart from tip z: J1, J2 stood still throughout; move them too",
-            "mit diesem Messplan nicht zu trennen: EX0J1 von Tasterspitze z: J1, J2 standen durchweg still; auch diese "
-            "Achsen bewegen",
+        "with this plan EX0J1 cannot be told apart from tip z: J1, J2 stood still throughout; move them too",
+        "mit diesem Messplan nicht zu trennen: EX0J1 von Tasterspitze z: J1, J2 standen durchweg still; auch diese "
+        "Achsen bewegen",
+    ),
+    (
+        Refusal(
+            ("EXX", "EYY"),
+            Reason(ReasonKind.NOT_SEPARATED, (), Advice(AdviceKind.OWN_WORDS, text="look at the moon")),
         ),
-        ("a sentence that nobody translated", "a sentence that nobody translated"),
-    ],
-)  # fmt: skip
-def test_why_a_parameter_is_refused_is_said_in_german(english: str, german: str) -> None:
-    assert reason(english, texts_of("de")) == german
-    assert reason(english, ENGLISH) == english
+        "with this plan EXX and EYY cannot be told apart; look at the moon",
+        "mit diesem Messplan nicht voneinander zu trennen: EXX und EYY; look at the moon",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("refusal", "english", "german"), REFUSALS)
+def test_why_a_parameter_is_refused_is_said_in_german(refusal: Refusal, english: str, german: str) -> None:
+    assert refusal_sentence(refusal) == english
+    assert refusal_sentence(refusal, texts_of("de")) == german
+    assert why_refused(refused_parameters(refusal), ENGLISH) == english
+    assert why_refused(refused_parameters(refusal), texts_of("de")) == german
+
+
+def test_a_sentence_that_is_all_there_is_stays_as_it_is() -> None:
+    refused = RefusedParameters(("EXX",), "a sentence that nobody translated")
+    assert why_refused(refused, texts_of("de")) == why_refused(refused, ENGLISH) == refused.why
+
+
+@pytest.mark.parametrize("kind", [*AdviceKind, *ReasonKind])
+def test_every_kind_of_reason_has_a_sentence(kind: AdviceKind | ReasonKind) -> None:
+    without_text = {AdviceKind.OWN_WORDS, ReasonKind.NOT_SEPARATED}
+    assert (f"sentences.{kind.value}" in ENGLISH.words) == (kind not in without_text)

@@ -1,7 +1,11 @@
-"""Documents that version 0.1.0 stored: a covariance's source as a sentence alone. They certify in each language."""
+"""Documents that version 0.1.0 stored: sources of covariances and reasons of refusals as sentences alone.
+
+They certify in each language.
+"""
 
 from __future__ import annotations
 
+import json
 from datetime import date
 from pathlib import Path
 
@@ -10,12 +14,19 @@ import pytest
 
 from monitor.documents import to_document
 from monitor.exceptions import StoreError
+from monitor.refusal import AdviceKind, Refusal
 from monitor.reporting.covariance_source import covariance_sentence
+from monitor.reporting.pdf.render import certificate_pdf
+from monitor.reporting.refused import RefusedParameters, refusal_of, refusal_sentence, why_refused
+from monitor.reporting.texts import texts_of
 from monitor.store import Database, load_certificate, save_analysis
 from monitor.workflow.certificate.issue import issue
-from monitor.workflow.certificate.request import CertificateRequest
+from monitor.workflow.certificate.remaking import remake
+from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
+from monitor.workflow.certificate.stored import restored_record
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.released import covariance_source_of
+from monitor.workflow.uncertainty.released_refusals import reason_of, with_reason
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import restored
@@ -48,6 +59,110 @@ def test_a_sentence_that_0_1_0_did_not_write_is_refused() -> None:
         covariance_source_of("somewhere")
 
 
+@pytest.mark.parametrize(
+    ("parameters", "advice", "sentence"),
+    [
+        (("EX0C1",), AdviceKind.SPINDLE_STILL, "EX0C1 cannot be told apart from tip x: C1 stands at one angle "
+         "throughout; probe also with C1 at 90, 180 and 270 degrees"),
+        (("EXX",), AdviceKind.NOT_PROBED, "EXX: run 2 did not probe S1 and S2 of the scale bar, the unit of length"),
+        (("EXX", "EYY"), AdviceKind.MORE_INDEXATIONS, "EXX and EYY cannot be told apart; probe more indexations"),
+        (("EA0B",), AdviceKind.AXIS_STILL, "EA0B cannot be told apart from tip x, 1 x: B stands at one angle "
+         "throughout; index it too"),
+        (("EA0A", "EB0C"), AdviceKind.MORE_FACES, "EA0A and EB0C cannot be told apart; touch more faces or other "
+         "angles: the same points at opposite angles, and faces that look elsewhere"),
+        (tuple(f"EXX({place})" for place in range(9)), AdviceKind.PIECE_PLANES, "EXX at 9 places cannot be told "
+         "apart from lattice; lay the piece in the XY and the YZ plane too"),
+        (("EXX:poly2",), AdviceKind.MORE_MODULES, "EXX:poly2; scan 4 or more modules along every arm, as a cubic "
+         "needs"),
+        (("EX0J1",), AdviceKind.STOOD_STILL, "EX0J1 cannot be told apart from tip z: J1, J2 stood still throughout; "
+         "move them too"),
+        (("EX0J1",), AdviceKind.STOOD_STILL, "EX0J1 cannot be told apart from tip z: J1 stood still throughout; move "
+         "it too"),
+        (("EX0J1",), AdviceKind.MORE_REFLECTORS, "EX0J1 cannot be told apart from tip z; add reflectors away from "
+         "the last axis, or poses that turn the wrist more"),
+        (("EX0J1",), AdviceKind.MORE_POSES, "EX0J1; add poses over the whole range of the joints"),
+        (("EXX(-88)", "EYX(0)"), AdviceKind.BOUNDARY_CONDITION, "EXX(-88) and EYX(0) cannot be told apart: the "
+         "boundary conditions EXX(-88) = 0 (where X counts its positioning error from); EYX(0) = 0 (the origin in Y: "
+         "the axis of C at its first angle) are missing; add to the conditions of [artefact.self_calibration]"),
+        (("EXX(-88)",), AdviceKind.NO_POINT, "EXX(-88): no point was probed where EXX(-88) acts; probe nearer to the "
+         "ends, or leave the node out"),
+        (("EXX(-88)", "EYX(0)"), AdviceKind.SWAPPED_TABLES, "EXX(-88) and EYX(0) cannot be told apart: the angles of "
+         "C are multiples of 90 degrees apart, which swaps the tables of the linear axes; probe at another angle too"),
+        (("EXX(-88)",), AdviceKind.MORE_ANGLES, "EXX(-88): 3 angles of C do not suffice for these points; probe at "
+         "more angles, or more points"),
+    ],
+)  # fmt: skip
+def test_the_reason_behind_a_stored_sentence_says_the_same(
+    parameters: tuple[str, ...], advice: AdviceKind, sentence: str
+) -> None:
+    reason = reason_of(f"with this plan {sentence}")
+    assert reason is not None
+    assert reason.advice is not None
+    assert reason.advice.kind is advice
+    assert refusal_sentence(Refusal(parameters, reason)) == f"with this plan {sentence}"
+
+
+@pytest.mark.parametrize("names", ["A, C", "A and C"])
+def test_what_0_1_0_said_of_several_axes_that_stood_still_is_said_of_them(names: str) -> None:
+    why = f"with this plan EB0C: {names} stands at one angle throughout; index it too"
+    refused = with_reason(RefusedParameters(("EB0C",), why))
+    refusal = refusal_of(refused)
+    assert refusal is not None
+    assert why_refused(refused, texts_of()) == why
+    assert refusal_sentence(refusal).endswith("A and C stand at one angle throughout; index them too")
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    ["it has no number in this run", "it is no error of the machine", "the plan does not determine it"],
+)
+def test_the_reason_why_a_map_leaves_a_parameter_out_says_the_same(sentence: str) -> None:
+    refusal = refusal_of(with_reason(RefusedParameters(("EXX",), sentence)))
+    assert refusal is not None
+    assert refusal_sentence(refusal) == sentence
+
+
+def test_a_sentence_of_another_hand_stays_as_it_is() -> None:
+    refused = RefusedParameters(("EXX",), "somebody said so")
+    assert with_reason(refused) == refused
+
+
+def test_a_record_without_reasons_is_made_again_byte_for_byte_and_in_german(
+    db: Database, tmp_path: Path
+) -> None:
+    """cold-cold never turned its spindle: two parameters are refused, and left out of the map."""
+    request = CertificateRequest(
+        "cold-cold",
+        3,
+        laboratory=EXAMPLES / "laboratory-de.toml",
+        with_map=True,
+        out=tmp_path,
+        number="R-2",
+        issued_on=date(2026, 3, 12),
+    )
+    text = printed(Path(issue(db, request).file))
+    said = "mit diesem Messplan nicht zu trennen: EX0C1 von Tasterspitze x: C1 steht durchweg"
+    assert text.count(said) == 2
+    document = dict(load_certificate(db, "R-2").record)
+    for result in document["results"]:
+        for refused in result["refused"]:
+            del refused["reason"]
+    for error_map in document["volumetric"]:
+        del error_map["left_out_refusals"]
+    written = {key: value for key, value in document.items() if key != "inputs"}
+    pdf = certificate_pdf(restored_record(document), (), document["inputs"], written)
+    file = tmp_path / "old.pdf"
+    file.write_bytes(pdf)
+    assert printed(file) == text
+    db.execute("UPDATE certificate SET record = ?, pdf = ?", [json.dumps(document), pdf])
+    assert remake(db, RemakeRequest("R-2")).identical
+
+
+def printed(file: Path) -> str:
+    """What a PDF says."""
+    return " ".join(" ".join(page.extract_text() for page in pypdf.PdfReader(file).pages).split())
+
+
 def test_a_stored_document_without_the_source_is_certified_in_german(db: Database, tmp_path: Path) -> None:
     result = evaluate(db, UncertaintyRequest("five-days", 20, method="guf"))
     document = to_document(answer_of(result))
@@ -71,5 +186,5 @@ def test_a_stored_document_without_the_source_is_certified_in_german(db: Databas
         ),
     )
     assert load_certificate(db, "R-1").record["inputs"]["stored_result"] == number
-    text = " ".join(" ".join(page.extract_text() for page in pypdf.PdfReader(made.file).pages).split())
+    text = printed(Path(made.file))
     assert "Wiederholungsläufe, tageweise zusammengefasst, 15 Freiheitsgrade" in text

@@ -8,15 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.records import Array
+from monitor.refusal import Refusal
 from monitor.units import Unit
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """Parameters that the plan cannot separate, and why; none of them gets a number."""
-
-    parameters: tuple[str, ...]
-    why: str
 
 
 @dataclass(frozen=True)

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from monitor.methods.chain.identification import Identification, Refusal, RunIdentification
+from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.least_squares import MEMBER_SHARE, Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.shared_effects import shared_parameters
 from monitor.methods.model import Model
 from monitor.records import Array, Campaign
+from monitor.refusal import Advice, Reason, ReasonKind, Refusal
 
-#: What a plan would have to do for parameters that one run cannot separate: problem, parameters, run to words.
-Advice = Callable[[ChainProblem, tuple[str, ...], int], str]
-
-#: So many places of one table are named one by one.
-MOST_PLACES = 3
+#: What a plan would have to do for parameters that one run cannot separate: problem, parameters and run to advice.
+AdviceOf = Callable[[ChainProblem, tuple[str, ...], int], Advice]
 
 
 def _groups(null_space: Array, names: tuple[str, ...]) -> list[tuple[str, ...]]:
@@ -42,17 +40,7 @@ def _groups(null_space: Array, names: tuple[str, ...]) -> list[tuple[str, ...]]:
     return groups
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Names in words; those of many places of one thing, ``EYX(-88)``, as one."""
-    heads = [name.partition("(")[0] if name.endswith(")") else name for name in names]
-    parts = []
-    for head in dict.fromkeys(heads):
-        its = [name for name, name_head in zip(names, heads, strict=True) if name_head == head]
-        parts += its if len(its) <= MOST_PLACES else [f"{head} at {len(its)} places"]
-    return " and ".join(parts)
-
-
-def refusals(problem: ChainProblem, null_space: Array, run: int, advice: Advice) -> tuple[Refusal, ...]:
+def refusals(problem: ChainProblem, null_space: Array, run: int, advice: AdviceOf) -> tuple[Refusal, ...]:
     """What one run cannot separate, by its null space, the reported parameters first, and why."""
     reported = problem.base_names
     refused = []
@@ -60,16 +48,14 @@ def refusals(problem: ChainProblem, null_space: Array, run: int, advice: Advice)
         inside = tuple(name for name in group if name in reported)
         if not inside:
             continue
-        others = [name for name in group if name not in inside]
-        with_what = f"{_listed(inside)} cannot be told apart" if len(inside) > 1 else inside[0]
-        if others:
-            with_what += f"{' from' if len(inside) > 1 else ' cannot be told apart from'} {', '.join(others)}"
-        refused.append(Refusal(inside, f"with this plan {with_what}{advice(problem, inside, run)}"))
+        others = tuple(name for name in group if name not in inside)
+        reason = Reason(ReasonKind.NOT_SEPARATED, others, advice(problem, inside, run))
+        refused.append(Refusal(inside, reason))
     return tuple(refused)
 
 
 def identification(
-    campaign: Campaign, model: Model, problem: ChainProblem, solution: Solution, advice: Advice
+    campaign: Campaign, model: Model, problem: ChainProblem, solution: Solution, advice: AdviceOf
 ) -> Identification:
     """The geometric errors of every run, with the covariance of the stated uncertainties."""
     count = len(problem.base_names)

@@ -8,13 +8,11 @@ import numpy as np
 
 from monitor.effects import Basis, ChainEffect, Effect
 from monitor.effects.effect import ChainBasis
-from monitor.methods.chain.identification import Refusal
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
+from monitor.refusal import Reason, ReasonKind, Refusal
 from monitor.units import MINUTE, Unit
-
-UNSEEN = "what it does at this plan's probings is done by the parameters that are free in every run"
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,9 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
     estimate = solution.common.copy()
     covariance = solution.common_covariance.copy()
     units: list[Unit] = []
-    why: list[str] = ["" if free else UNSEEN for free in solution.common_free]
+    reasons: list[Reason | None] = [
+        None if free else Reason(ReasonKind.UNSEEN) for free in solution.common_free
+    ]
     by_error = problem.evaluated(solution.local, solution.common, jacobian=True).by_error
     assert by_error is not None
     for added, columns in zip(problem.shared, problem.common_columns, strict=True):
@@ -64,11 +64,9 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
         for column in range(columns.start, columns.start + added.size):
             units.append(added.effect.unit)
             u = float(np.sqrt(covariance[column, column]))
-            if not why[column] and u > limit:
-                why[column] = (
-                    f"this plan sees so little of it that its standard uncertainty, "
-                    f"{added.effect.unit.to_display(u):.2g} {added.effect.unit.name}, exceeds what a machine may have"
-                )
+            if reasons[column] is None and u > limit:
+                unit = added.effect.unit
+                reasons[column] = Reason(ReasonKind.BARELY_SEEN, u=unit.to_display(u), unit=unit.name)
         if added.searched:
             last = columns.stop - 1
             units.append(MINUTE)
@@ -76,13 +74,15 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
             estimate[last] = tau
             covariance[last, :] *= tau
             covariance[:, last] *= tau
-    determined = np.array([not reason for reason in why], dtype=bool)
+    determined = np.array([reason is None for reason in reasons], dtype=bool)
     return SharedParameters(
         names=problem.added_names,
         units=tuple(units),
         estimate=np.where(determined, estimate, np.nan),
         covariance=np.where(determined[:, None] & determined, covariance, np.nan),
         refused=tuple(
-            Refusal((name,), reason) for name, reason in zip(problem.added_names, why, strict=True) if reason
+            Refusal((name,), reason)
+            for name, reason in zip(problem.added_names, reasons, strict=True)
+            if reason is not None
         ),
     )

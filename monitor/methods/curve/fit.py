@@ -15,10 +15,10 @@ import numpy as np
 
 from monitor.effects.curve import CurveEffect
 from monitor.exceptions import DataError
-from monitor.methods.chain.identification import Refusal
 from monitor.methods.curve.problem import CurveProblem
 from monitor.methods.curve.solver import inverse_normal, refined, searched, slope, solve
 from monitor.records import Array
+from monitor.refusal import Reason, ReasonKind, Refusal
 
 #: Share of a null vector from which on a coefficient counts as part of it.
 MEMBER_SHARE = 1e-5
@@ -144,7 +144,4 @@ def _u_values(effects: Sequence[CurveEffect], free: Sequence[int], u_rates: Arra
 
 
 def _refused(names: Sequence[str]) -> tuple[Refusal, ...]:
-    if not names:
-        return ()
-    group = " and ".join(names)
-    return (Refusal(tuple(names), f"with these rows {group} cannot be told apart; vary them separately"),)
+    return (Refusal(tuple(names), Reason(ReasonKind.ROWS_ALIKE)),) if names else ()

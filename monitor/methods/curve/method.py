@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
-from monitor.methods.curve.fit import fit
-from monitor.methods.curve.problem import NAME, problem_of
+from typing import TYPE_CHECKING
+
+from monitor.methods.curve.problem import NAME, CurveProblem, problem_of
 from monitor.methods.method import CurveMethod, Nouns
+
+if TYPE_CHECKING:
+    from monitor.methods.curve.fit import CurveFit
+
+
+def fit(problem: CurveProblem) -> CurveFit:
+    """Fit a curve. Raises DataError, EffectError as ``monitor.methods.curve.fit.fit``."""
+    # Loaded here: scipy costs a third of a second that nobody need wait who only asks what methods there are.
+    from monitor.methods.curve.fit import fit as least_squares
+
+    return least_squares(problem)
+
 
 METHOD = CurveMethod(
     name=NAME,

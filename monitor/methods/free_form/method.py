@@ -20,9 +20,10 @@ from monitor.methods.free_form.assembly import NAME, problem_of
 from monitor.methods.free_form.axes import plane_of
 from monitor.methods.free_form.plan import candidates_of
 from monitor.methods.free_form.problem import FreeFormProblem
-from monitor.methods.free_form.rank import nullity, reason_of
+from monitor.methods.free_form.rank import advice_of, nullity
 from monitor.methods.method import AnglePlan, ChainMethod, Nouns
 from monitor.records import Campaign
+from monitor.refusal import Advice
 from monitor.units import DEGREE
 
 # With two angles every point has two readings, of which its own shape takes one.
@@ -38,10 +39,10 @@ def base_effects(chain: Chain) -> tuple[str, ...]:
     return (*tables, plane.squareness, "shape")
 
 
-def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
+def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advice:
     """Which boundary condition is missing, or what the plan would have to do besides."""
     assert isinstance(problem, FreeFormProblem)
-    return reason_of(problem, parameters, run)
+    return advice_of(problem, parameters, run)
 
 
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from monitor.methods.chain.least_squares import eliminate
 from monitor.methods.free_form.axes import WORKPIECE_CONDITIONS, all_conditions
 from monitor.records import Array
+from monitor.refusal import Advice, AdviceKind
 from monitor.units import DEGREE
 
 if TYPE_CHECKING:
@@ -44,35 +45,27 @@ def missing_conditions(problem: FreeFormProblem) -> dict[str, str]:
     return {name: meaning for name, meaning in conditions.items() if name not in present}
 
 
-def reason_of(problem: FreeFormProblem, parameters: tuple[str, ...], run: int) -> str:
-    """Why ``parameters`` of a run cannot be separated, and what would separate them."""
+def advice_of(problem: FreeFormProblem, parameters: tuple[str, ...], run: int) -> Advice:
+    """What the plan of a run lacks for ``parameters`` that it does not separate, and what would separate them."""
     missing = {name: meaning for name, meaning in missing_conditions(problem).items() if name in parameters}
     if missing:
-        listed = "; ".join(f"{name} = 0 ({meaning})" for name, meaning in missing.items())
-        return (
-            f": the boundary condition{'s' * (len(missing) > 1)} {listed} {'are' if len(missing) > 1 else 'is'} "
-            "missing; add to the conditions of [artefact.self_calibration]"
-        )
+        return Advice(AdviceKind.BOUNDARY_CONDITION, tuple(missing), tuple(missing.values()))
     rows = problem.context.run == run
     unseen = _unseen(problem, parameters, rows)
     if unseen:
-        return f": no point was probed where {unseen} acts; probe nearer to the ends, or leave the node out"
+        return Advice(AdviceKind.NO_POINT, unseen)
     table = problem.context.chain.index(problem.plane.table.name)
     degrees = np.unique(np.round(problem.context.positions[rows, table] / DEGREE.factor, 6))
     name = problem.plane.table.name
     from_first = (degrees - degrees[0] + 45.0) % 90.0 - 45.0
     if np.all(np.abs(from_first) < QUARTER_DEG):
-        return (
-            f": the angles of {name} are multiples of 90 degrees apart, which swaps the tables of the linear axes; "
-            "probe at another angle too"
-        )
-    return f": {len(degrees)} angles of {name} do not suffice for these points; probe at more angles, or more points"
+        return Advice(AdviceKind.SWAPPED_TABLES, (name,))
+    return Advice(AdviceKind.MORE_ANGLES, (name,), count=len(degrees))
 
 
-def _unseen(problem: FreeFormProblem, parameters: tuple[str, ...], rows: Array) -> str:
+def _unseen(problem: FreeFormProblem, parameters: tuple[str, ...], rows: Array) -> tuple[str, ...]:
     """The parameters that act at none of the probings."""
     local = problem.linearise(problem.start, problem.common_start).local
     index = int(np.flatnonzero(problem.runs == problem.context.run[rows][0])[0])
     size = np.linalg.norm(local[index], axis=0)
-    silent = [name for name in parameters if size[problem.local_names.index(name)] == 0.0]
-    return ", ".join(silent)
+    return tuple(name for name in parameters if size[problem.local_names.index(name)] == 0.0)

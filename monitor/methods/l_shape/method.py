@@ -13,6 +13,7 @@ from monitor.methods.l_shape.stepwise import stepwise
 from monitor.methods.method import ChainMethod, Nouns, Stepwise
 from monitor.methods.model import Model, chain_of
 from monitor.records import Campaign
+from monitor.refusal import Advice, AdviceKind
 from monitor.units import MICROMETRE
 
 NAME = "l-shape"
@@ -47,15 +48,16 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> LShapeProble
     )
 
 
-def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
+def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advice:
     """What the plan left out."""
     assert isinstance(problem, LShapeProblem)
     rows = problem.context.run == run
     used = {problem.piece.placements[index].plane for index in np.unique(problem.placement[rows])}
-    missing = [plane for plane in ("XY", "XZ", "YZ") if plane not in used]
+    missing = tuple(plane for plane in ("XY", "XZ", "YZ") if plane not in used)
     if missing:
-        return f"; lay the piece in the {' and the '.join(missing)} plane too"
-    return f"; scan {len(ORDERS) + 1} or more modules along every arm, as a cubic needs"
+        return Advice(AdviceKind.PIECE_PLANES, missing)
+    # As many as a cubic needs.
+    return Advice(AdviceKind.MORE_MODULES, count=len(ORDERS) + 1)
 
 
 METHOD = ChainMethod(

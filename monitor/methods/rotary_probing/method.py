@@ -7,14 +7,13 @@ from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.method import ChainMethod, Nouns
 from monitor.methods.rotary_probing.base import rotary_base
 from monitor.methods.rotary_probing.problem import NAME, problem_of
+from monitor.refusal import Advice, AdviceKind
 
 
-def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
+def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advice:
     """What the plan did not move and would have to move."""
-    still = [joint.name for joint in still_joints(problem, run, "rotary")]
-    if still:
-        return f": {' and '.join(still)} stands at one angle throughout; index it too"
-    return "; touch more faces or other angles: the same points at opposite angles, and faces that look elsewhere"
+    still = tuple(joint.name for joint in still_joints(problem, run, "rotary"))
+    return Advice(AdviceKind.AXIS_STILL, still) if still else Advice(AdviceKind.MORE_FACES)
 
 
 METHOD = ChainMethod(

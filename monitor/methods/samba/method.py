@@ -20,6 +20,7 @@ from monitor.methods.method import ChainMethod, Nouns, Rehearsal, TouchPlan
 from monitor.methods.model import Model, chain_of
 from monitor.methods.samba.virtual import virtual_campaign
 from monitor.records import Array, Campaign
+from monitor.refusal import Advice, AdviceKind
 
 NAME = "samba"
 DEFAULT_MODEL = Model(NAME)
@@ -70,18 +71,18 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> TouchProblem
     return problem.foreseen() if problem.added else problem
 
 
-def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
+def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advice:
     """What the plan did not move and would have to move."""
     missing = _bar_ends_missing(problem, run)
     if missing and _gains(problem).intersection(parameters):
-        return f": run {run} did not probe {' and '.join(missing)} of the scale bar, the unit of length"
+        return Advice(AdviceKind.NOT_PROBED, tuple(missing), run=run)
     still = still_joints(problem, run, "rotary", "spindle")
     if not still:
-        return "; probe more indexations"
+        return Advice(AdviceKind.MORE_INDEXATIONS)
     spindle = next((joint.name for joint in still if joint.kind == "spindle"), None)
     if spindle is not None and any(name.endswith(f"0{spindle}") for name in parameters):
-        return f": {spindle} stands at one angle throughout; probe also with {spindle} at 90, 180 and 270 degrees"
-    return f": {', '.join(joint.name for joint in still)} stands at one angle throughout; index it too"
+        return Advice(AdviceKind.SPINDLE_STILL, (spindle,))
+    return Advice(AdviceKind.AXIS_STILL, tuple(joint.name for joint in still))
 
 
 def _bar_ends_missing(problem: ChainProblem, run: int) -> list[str]:

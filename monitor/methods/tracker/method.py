@@ -19,6 +19,7 @@ from monitor.methods.method import ChainMethod, Nouns, Rehearsal, Unable
 from monitor.methods.tracker.assembly import NAME, problem_of, tool_side
 from monitor.methods.tracker.virtual import virtual_robot
 from monitor.records import Campaign
+from monitor.refusal import Advice, AdviceKind
 
 
 def tracker_base(chain: Chain) -> tuple[str, ...]:
@@ -26,14 +27,14 @@ def tracker_base(chain: Chain) -> tuple[str, ...]:
     return base_effects(tool_side(chain), outside=True)
 
 
-def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> str:
+def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advice:
     """What the plan did not move and would have to move."""
-    still = [joint.name for joint in still_joints(problem, run)]
+    still = tuple(joint.name for joint in still_joints(problem, run))
     if still:
-        return f": {', '.join(still)} stood still throughout; move {'it' if len(still) == 1 else 'them'} too"
+        return Advice(AdviceKind.STOOD_STILL, still)
     if len(np.unique(problem.context.target[problem.context.run == run])) == 1:
-        return "; add reflectors away from the last axis, or poses that turn the wrist more"
-    return "; add poses over the whole range of the joints"
+        return Advice(AdviceKind.MORE_REFLECTORS)
+    return Advice(AdviceKind.MORE_POSES)
 
 
 def refuse(campaign: Campaign, problem: ChainProblem) -> None:

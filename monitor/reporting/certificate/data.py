@@ -31,15 +31,21 @@ class Attached:
 
 
 def certificate_files(
-    record: CertificateRecord, inputs: Mapping[str, Any] | None = None
+    record: CertificateRecord,
+    inputs: Mapping[str, Any] | None = None,
+    document: Mapping[str, Any] | None = None,
 ) -> tuple[Attached, ...]:
     """The whole record as JSON; for every result set the estimates and the covariance as CSV, for every map its points.
 
     A record that names the laboratory's country has its digital calibration certificate beside them. ``inputs``
-    say what the results were computed from (hashes of the raw files, model, software).
+    say what the results were computed from (hashes of the raw files, model, software); ``document`` is the record as it
+    was stored, where it is not to be written anew.
     """
     texts = texts_of(record.language)
-    whole = {"certificate": to_document(record), "inputs": dict(inputs or {})}
+    whole = {
+        "certificate": to_document(record) if document is None else document,
+        "inputs": dict(inputs or {}),
+    }
     text = json.dumps(whole, ensure_ascii=False, allow_nan=False, indent=1)
     files = [Attached("certificate.json", text.encode(), texts("files.record"), "Source")]
     if record.country is not None:

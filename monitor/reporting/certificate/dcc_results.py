@@ -13,7 +13,7 @@ from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric import printed_map
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
-from monitor.reporting.refused import reason
+from monitor.reporting.refused import why_refused
 from monitor.reporting.texts import Texts
 
 DCC = "https://ptb.de/dcc"
@@ -81,7 +81,7 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
     for refusal in result.refused:
         element = add(results, "result")
         say(element, "name", texts("dcc.refused", parameters=", ".join(refusal.parameters)), texts.language)
-        say(add(element, "data"), "text", reason(refusal.why, texts), texts.language)
+        say(add(element, "data"), "text", why_refused(refusal, texts), texts.language)
 
 
 def volumetric_error(
@@ -118,9 +118,9 @@ def _results(parent: ET.Element, record: CertificateRecord, evaluation: str, tex
     say(method, "description", explanation, texts.language)
     conditions = add(parent, "influenceConditions")
     for condition in record.conditions or ():
-        one = add(conditions, "influenceCondition")
-        say(one, "name", condition.name, texts.language)
-        say(add(one, "data"), "text", str(condition.value), texts.language)
+        element = add(conditions, "influenceCondition")
+        say(element, "name", condition.name, texts.language)
+        say(add(element, "data"), "text", str(condition.value), texts.language)
     return add(parent, "results")
 
 

@@ -97,14 +97,14 @@ def _signed(coefficient: float, decimal_sign: str) -> str:
     return written if written.startswith(MINUS) else "\N{FIGURE SPACE}\N{THIN SPACE}" + written
 
 
-def _spaced(words: list[str], pitch: float, *, middle: bool = False) -> str:
-    """Words at equal distances, by spaces between them; with ``middle`` in the middle of a coefficient's width."""
+def _spaced(entries: list[str], pitch: float, *, middle: bool = False) -> str:
+    """Entries at equal distances, by spaces between them; with ``middle`` in the middle of a coefficient's width."""
     wide = pitch / (_POINTS * MILLIMETRES_A_POINT) * units_an_em()
     room = in_units("\N{FIGURE SPACE}\N{THIN SPACE}0.00")
     line, at = "", 0
-    for index, word in enumerate(words):
-        begin = index * wide + (max(0.0, (room - in_units(word)) / 2.0) if middle else 0.0)
-        more = _space(begin - at, least=index > 0) + word
+    for index, entry in enumerate(entries):
+        begin = index * wide + (max(0.0, (room - in_units(entry)) / 2.0) if middle else 0.0)
+        more = _space(begin - at, least=index > 0) + entry
         line += more
         at += in_units(more)
     return line

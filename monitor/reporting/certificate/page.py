@@ -25,7 +25,7 @@ from monitor.reporting.certificate.tables import (
 from monitor.reporting.certificate.volumetric import POINTS_FILE, printed_map
 from monitor.reporting.certificate.words import amendment, answer
 from monitor.reporting.numbers import written_factor, written_probability
-from monitor.reporting.refused import reason
+from monitor.reporting.refused import why_refused
 from monitor.reporting.texts import Texts, texts_of
 
 
@@ -118,7 +118,7 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
         ),
         refused=tuple(
             texts.markup(
-                "page.refused", parameters=", ".join(refusal.parameters), why=reason(refusal.why, texts)
+                "page.refused", parameters=", ".join(refusal.parameters), why=why_refused(refusal, texts)
             )
             for refusal in result.refused
         ),

@@ -15,17 +15,10 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 from monitor.units import Unit
-
-
-@dataclass(frozen=True)
-class RefusedParameters:
-    """Parameters without a number, and why."""
-
-    parameters: tuple[str, ...]
-    why: str
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from monitor.reporting.numbers import (
     written_factor,
     written_probability,
 )
-from monitor.reporting.refused import reason
+from monitor.reporting.refused import why_refused
 from monitor.reporting.texts import Texts
 
 #: The file inside the PDF that holds every point of the grid.
@@ -59,8 +59,8 @@ def printed_map(volumetric: VolumetricResult, texts: Texts) -> PrintedMap:
             p=written_probability(volumetric.p, sign),
         ),
         left_out=" ".join(
-            texts("page.map_left_out", parameters=name, why=reason(why, texts))
-            for name, why in volumetric.left_out
+            texts("page.map_left_out", parameters=name, why=why_refused(refused, texts))
+            for name, refused in volumetric.refused
         ),
     )
 

@@ -6,8 +6,11 @@ It is stored with the certificate's record, so that figure and numbers can be ma
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from monitor.records import Array
+from monitor.refusal import Refusal
+from monitor.reporting.refused import RefusedParameters
 
 Place = tuple[tuple[str, float, str], ...]
 
@@ -29,7 +32,8 @@ class VolumetricResult:
     ``k`` is the coverage factor of one length for the probability ``p``. The region: ``ranges`` (axis, from, to) in mm
     of the linear axes, ``from_strokes`` where these are the machine's strokes, ``each`` points along each axis at
     ``poses`` rotary poses, ``points`` in all. ``datum`` is where the workpiece's zero was set, empty where nowhere.
-    ``left_out`` are parameters that the map does not contain, and why.
+    ``left_out`` are parameters that the map does not contain, and why in an English sentence;
+    ``left_out_refusals`` are the refusals that they belong to, in their order, None where the sentence is all there is.
 
     The grid with the rotary axes at zero: ``readings_mm`` (n, 3) of ``axes``, ``vectors_um`` (n, 3) along X, Y and Z
     of the machine, ``expanded_um`` (n,) of their lengths.
@@ -52,3 +56,17 @@ class VolumetricResult:
     readings_mm: Array
     vectors_um: Array
     expanded_um: Array
+    left_out_refusals: tuple[Refusal | None, ...] = ()
+
+    @property
+    def refused(self) -> tuple[tuple[str, RefusedParameters], ...]:
+        """The parameters that are left out, each with the refusal that it belongs to."""
+        return tuple(
+            (
+                name,
+                RefusedParameters((name,), why)
+                if refusal is None
+                else RefusedParameters(refusal.parameters, why, refusal.reason),
+            )
+            for (name, why), refusal in zip_longest(self.left_out, self.left_out_refusals)
+        )

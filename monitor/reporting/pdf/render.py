@@ -108,10 +108,12 @@ def certificate_pdf(
     record: CertificateRecord,
     extra_fonts: Sequence[Path] = (),
     inputs: Mapping[str, Any] | None = None,
+    document: Mapping[str, Any] | None = None,
 ) -> bytes:
     """Make the certificate as PDF/A-3u: the same bytes for the same record and ``inputs``.
 
-    Its data travel inside it: the record with the ``inputs`` as JSON, estimates and covariance as CSV.
+    Its data travel inside it: the record with the ``inputs`` as JSON, estimates and covariance as CSV. ``document`` is
+    the record as an earlier version wrote it, where it is not to be written anew.
 
     ``extra_fonts`` are TrueType or OpenType files for letters that DejaVu Sans lacks (Chinese, Japanese, ...).
     Raises IncompleteCertificateError with the list of what is missing, UnprintableError for letters that no
@@ -125,7 +127,7 @@ def certificate_pdf(
         identifier=str(record.number),
         moment=moment,
         extra_fonts=extra_fonts,
-        attached=certificate_files(record, inputs),
+        attached=certificate_files(record, inputs, document),
     )
 
 

@@ -6,6 +6,7 @@ from monitor.discovery import fit
 from monitor.methods import campaign_method
 from monitor.records import Array
 from monitor.reporting.certificate.volumetric_result import Length, Place, VolumetricResult
+from monitor.reporting.refused import refusal_of
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.stored import StatedUncertainty
@@ -38,7 +39,8 @@ def volumetric_result(evaluated: StatedUncertainty, state: str) -> VolumetricRes
         ),
         mean=_length(*error.mean, k),
         rms=_length(*error.rms, k),
-        left_out=tuple(mapped.left_out.items()),
+        left_out=tuple((name, refused.why) for name, refused in mapped.left_out.items()),
+        left_out_refusals=tuple(map(refusal_of, mapped.left_out.values())),
         axes=drawn.axes,
         readings_mm=drawn.readings_mm,
         vectors_um=drawn.vectors_um,

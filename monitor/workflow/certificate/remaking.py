@@ -5,7 +5,6 @@ from __future__ import annotations
 from monitor import __version__
 from monitor.documents import from_document
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signature import is_signed
@@ -15,6 +14,7 @@ from monitor.workflow.certificate.files import font_hashes, path_of, write_file
 from monitor.workflow.certificate.inputs import MadeWith
 from monitor.workflow.certificate.request import RemakeRequest
 from monitor.workflow.certificate.states import state_of
+from monitor.workflow.certificate.stored import restored_record
 
 
 def remake(db: Database, request: RemakeRequest) -> RemakeAnswer:
@@ -25,7 +25,7 @@ def remake(db: Database, request: RemakeRequest) -> RemakeAnswer:
     """
     number = request.number
     stored = load_certificate(db, number)
-    record = from_document(CertificateRecord, stored.record)
+    record = restored_record(stored.record)
     inputs = stored.record.get("inputs") or {}
     made_with = from_document(MadeWith, inputs)
     if [font.sha256 for font in font_hashes(request.fonts)] != [font.sha256 for font in made_with.fonts]:
@@ -33,7 +33,9 @@ def remake(db: Database, request: RemakeRequest) -> RemakeAnswer:
         raise InputError(
             f"certificate {number} was made with {fonts or 'no font but ours'}: give the same by --font"
         )
-    pdf = certificate_pdf(record, request.fonts, inputs)
+    # The document holds the record as it was stored, not as this version would write it.
+    written = {key: value for key, value in stored.record.items() if key != "inputs"}
+    pdf = certificate_pdf(record, request.fonts, inputs, written)
     signed = is_signed(stored.pdf)
     identical = stored.pdf.startswith(pdf) if signed else stored.pdf == pdf
     why = None if identical else (

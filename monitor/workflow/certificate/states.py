@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from monitor.documents import from_document
 from monitor.reporting.certificate.dcc import dcc_xml
-from monitor.reporting.certificate.record import CertificateRecord
 from monitor.store import Database, StoredCertificate, certificate_numbers, load_certificate
 from monitor.workflow.certificate.answer import (
     CertificateFileAnswer,
@@ -18,6 +16,7 @@ from monitor.workflow.certificate.request import (
     CertificateShowRequest,
     CertificatesRequest,
 )
+from monitor.workflow.certificate.stored import restored_record
 
 
 def state_of(stored: StoredCertificate) -> CertificateState:
@@ -55,7 +54,7 @@ def write_digital(db: Database, request: CertificateFileRequest) -> CertificateF
     """
     stored = load_certificate(db, request.number)
     path = dcc_path_of(request.path, request.number)
-    write_file(path, dcc_xml(from_document(CertificateRecord, stored.record)))
+    write_file(path, dcc_xml(restored_record(stored.record)))
     return CertificateFileAnswer(state_of(stored), str(path))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from monitor.documents import OMITTED
-from monitor.methods.chain.identification import Refusal
+from monitor.reporting.refused import RefusedParameters
 from monitor.units import MICROMETRE
 
 
@@ -22,7 +22,7 @@ class MachineVersion:
     repeatability_um: float | None
     stated_uncertainty_um: float
     lack_of_fit_p: float | None
-    no_number: tuple[Refusal, ...]
+    no_number: tuple[RefusedParameters, ...]
 
     @property
     def unit(self) -> str:
@@ -68,7 +68,7 @@ class CurveVersion:
     lack_of_fit_f: float | None
     lack_of_fit_p: float | None
     bic: float
-    no_number: tuple[Refusal, ...]
+    no_number: tuple[RefusedParameters, ...]
 
 
 @dataclass(frozen=True)

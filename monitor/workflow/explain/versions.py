@@ -11,6 +11,7 @@ from monitor.exceptions import NotFoundError
 from monitor.methods.chain.shared_effects import shared_parameters
 from monitor.methods.curve.fit import CurveFit
 from monitor.records import Campaign, CurveCampaign
+from monitor.reporting.refused import refused_parameters
 from monitor.store import Database, StoredModel, last_used_campaign, model_history
 from monitor.units import MICROMETRE
 from monitor.workflow.explain.machine_answer import micrometres
@@ -70,7 +71,7 @@ def _machine_step(fit: Fit, campaign: str, version: StoredModel) -> MachineVersi
         repeatability_um=micrometres(error.repeatability),
         stated_uncertainty_um=MICROMETRE.to_display(error.stated_uncertainty),
         lack_of_fit_p=error.lack_of_fit_p,
-        no_number=shared_parameters(fit.problem, fit.solution).refused,
+        no_number=tuple(map(refused_parameters, shared_parameters(fit.problem, fit.solution).refused)),
     )
 
 
@@ -98,5 +99,5 @@ def _curve_step(fit: CurveFit, version: StoredModel) -> CurveVersion:
         lack_of_fit_f=None if test is None else test.f,
         lack_of_fit_p=None if test is None else test.p_value,
         bic=bic(fit),
-        no_number=fit.refused,
+        no_number=tuple(map(refused_parameters, fit.refused)),
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED
-from monitor.methods.chain.identification import Refusal
+from monitor.reporting.refused import RefusedParameters
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class MachineRun:
 
     run: int
     parameters: Mapping[str, Estimate]
-    refused: tuple[Refusal, ...]
+    refused: tuple[RefusedParameters, ...]
     rms_um: float
     largest_um: float
     chi_square: float
@@ -55,7 +55,7 @@ class CurveRun:
 
     run: int
     parameters: Mapping[str, CurveEstimate]
-    refused: tuple[Refusal, ...]
+    refused: tuple[RefusedParameters, ...]
     rms_um: float | None
     rms: float
     largest_um: float | None
@@ -108,7 +108,7 @@ class IdentifyAnswer:
     curve: ResponseOverInputs | None = field(default=None, metadata=INLINED)
     runs: tuple[MachineRun | CurveRun, ...]
     added: Mapping[str, Estimate | CurveEstimate]
-    added_refused: tuple[Refusal, ...]
+    added_refused: tuple[RefusedParameters, ...]
     autocorrelation: CurveNoise | None = field(default=None, metadata=OMITTED)
 
 

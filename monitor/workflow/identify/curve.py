@@ -8,6 +8,7 @@ from monitor.discovery.curve.quality import allowed_for, bic, inflation, noise_o
 from monitor.effects.curve import SEARCHED
 from monitor.methods.curve.fit import CurveFit
 from monitor.records import CurveCampaign
+from monitor.reporting.refused import refused_parameters
 from monitor.statistics.noise import Assessed, effective_number
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.answer import (
@@ -103,7 +104,7 @@ def _run(fit: CurveFit, parameters: dict[str, CurveEstimate]) -> CurveRun:
     return CurveRun(
         run=1,
         parameters=parameters,
-        refused=fit.refused,
+        refused=tuple(map(refused_parameters, fit.refused)),
         rms_um=in_micrometres(curve, fit.rms),
         rms=fit.rms,
         largest_um=in_micrometres(curve, largest),

@@ -8,6 +8,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.problem import Solver, solve_problem
 from monitor.records import Array, Campaign, Machine
+from monitor.reporting.refused import refusal_sentence, refused_parameters
 from monitor.store import StoredIdentification, StoredModel, StoredRun
 from monitor.units import MICROMETRE, Unit
 from monitor.workflow.identify.answer import Estimate, IdentifyAnswer, MachineRun
@@ -40,7 +41,7 @@ def machine_answer(machine: Machine, identification: Identification) -> Identify
             identification.added_estimate,
             identification.added_covariance,
         ),
-        added_refused=identification.added_refused,
+        added_refused=tuple(map(refused_parameters, identification.added_refused)),
     )
 
 
@@ -59,7 +60,7 @@ def _run(machine: Machine, identification: Identification, run: RunIdentificatio
     return MachineRun(
         run=run.run,
         parameters=_estimates(identification.parameters, identification.units, run.estimate, run.covariance),
-        refused=run.refused,
+        refused=tuple(map(refused_parameters, run.refused)),
         rms_um=MICROMETRE.to_display(run.rms),
         largest_um=MICROMETRE.to_display(float(np.abs(run.residuals).max())),
         chi_square=run.chi_square,
@@ -83,7 +84,7 @@ def _stored(campaign: Campaign, identification: Identification, model: StoredMod
                 run=run.run,
                 estimate=run.estimate,
                 covariance=run.covariance,
-                refused=tuple((refusal.parameters, refusal.why) for refusal in run.refused),
+                refused=tuple((refusal.parameters, refusal_sentence(refusal)) for refusal in run.refused),
                 rms_mm=run.rms,
                 iterations=identification.iterations,
                 degrees_of_freedom=run.degrees_of_freedom,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from monitor.discovery import Fit
-from monitor.methods.chain.identification import Refusal
 from monitor.records import Campaign
+from monitor.refusal import Refusal
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.store import StoredModel
 from monitor.uncertainty import FrameworkResult, MonteCarloResult, Validation

@@ -9,8 +9,8 @@ import numpy as np
 
 from monitor.discovery import Verdict, compare
 from monitor.records import Array
-from monitor.reporting.certificate.results import RefusedParameters
 from monitor.reporting.covariance_source import covariance_sentence
+from monitor.reporting.refused import refused_parameters
 from monitor.uncertainty.coverage import ellipsoid_factor, joint_coverage, rectangle_factor
 from monitor.uncertainty.validation import Comparison, Validation
 from monitor.units import MICROMETRE
@@ -50,7 +50,7 @@ def statement(result: RunUncertainty) -> UncertaintyAnswer:
         units={name: unit.name for name, unit in zip(result.framework.names, result.units, strict=True)},
         input_covariance=covariance_sentence(result.covariance_source),
         input_covariance_source=result.covariance_source,
-        refused=tuple(RefusedParameters(refusal.parameters, refusal.why) for refusal in result.refused),
+        refused=tuple(map(refused_parameters, result.refused)),
         residuals=_residuals(result),
         guf=_framework(result),
         lack_of_fit_causes=causes or None,

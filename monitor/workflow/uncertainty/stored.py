@@ -21,6 +21,7 @@ from monitor.store import Database, StoredModel, check_analysis, save_analysis, 
 from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.released import covariance_source_of
+from monitor.workflow.uncertainty.released_refusals import with_reason
 from monitor.workflow.uncertainty.request import Asked
 
 #: The kind of analysis under which answers are stored.
@@ -70,7 +71,7 @@ class StatedUncertainty:
     @property
     def covariance(self) -> Array:
         """Covariance (m, m) in products of the display units."""
-        return np.asarray(self.answer.guf.correlation * np.outer(self.u, self.u))
+        return self.answer.covariance
 
     @property
     def k_p(self) -> float:
@@ -127,7 +128,11 @@ def save_uncertainty(
 def restored(document: Mapping[str, Any]) -> UncertaintyAnswer:
     """The answer that a stored document holds. Raises StoreError where it was written by another version or altered."""
     answer = from_document(UncertaintyAnswer, document)
-    return replace(answer, input_covariance_source=covariance_source(document))
+    return replace(
+        answer,
+        input_covariance_source=covariance_source(document),
+        refused=tuple(map(with_reason, answer.refused)),
+    )
 
 
 def covariance_source(document: Mapping[str, Any]) -> CovarianceSource:

@@ -10,6 +10,7 @@ from monitor.discovery import Fit
 from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
 from monitor.records import Array, Campaign
+from monitor.reporting.refused import RefusedParameters
 from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
 from monitor.units import MICROMETRE
 from monitor.workflow.uncertainty.stored import StatedUncertainty
@@ -32,7 +33,7 @@ class VolumetricMap:
     poses: Array
     points: int
     error: VolumetricError
-    left_out: dict[str, str]
+    left_out: dict[str, RefusedParameters]
 
 
 def ranges_of(campaign: Campaign, chain: Chain) -> tuple[dict[str, tuple[float, float]], bool]:

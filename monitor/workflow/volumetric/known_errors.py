@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,16 +11,15 @@ from monitor.discovery import Fit
 from monitor.effects import ChainEffect
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
+from monitor.refusal import Reason, ReasonKind, Refusal
+from monitor.reporting.refused import RefusedParameters, refused_parameters
 from monitor.uncertainty.volumetric import GeometricErrors
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 
-#: Why a parameter is not in the map, besides the reasons for which it has no number in any run.
-NO_NUMBER = "it has no number in this run"
-NO_MACHINE_ERROR = "it is no error of the machine"
-NOT_DETERMINED = "the plan does not determine it"
 
-
-def geometric_errors(evaluated: StatedUncertainty, fit: Fit) -> tuple[GeometricErrors, dict[str, str]]:
+def geometric_errors(
+    evaluated: StatedUncertainty, fit: Fit
+) -> tuple[GeometricErrors, dict[str, RefusedParameters]]:
     """What is known of the machine from one evaluated run, and what is not, with the reason.
 
     ``fit`` is the evaluated model fitted to the campaign.
@@ -74,9 +74,9 @@ class _Known:
     factors: tuple[float, ...]
 
 
-def _of_run(evaluated: StatedUncertainty, fit: Fit) -> tuple[_Known, dict[str, str]]:
+def _of_run(evaluated: StatedUncertainty, fit: Fit) -> tuple[_Known, dict[str, RefusedParameters]]:
     """The effects whose parameters all have a number in the run, and the other parameters with the reason."""
-    left_out = {name: refusal.why for refusal in evaluated.answer.refused for name in refusal.parameters}
+    left_out = {name: refused for refused in evaluated.answer.refused for name in refused.parameters}
     effects: list[ChainEffect] = []
     names: list[str] = []
     factors: list[float] = []
@@ -87,13 +87,13 @@ def _of_run(evaluated: StatedUncertainty, fit: Fit) -> tuple[_Known, dict[str, s
             names += parameters
             factors += [effect.unit.factor] * len(parameters)
         elif isinstance(effect, ChainEffect):
-            left_out |= {name: NO_NUMBER for name in parameters if name not in left_out}
+            left_out |= _refused([name for name in parameters if name not in left_out], ReasonKind.NO_NUMBER)
     estimates = evaluated.answer.guf.estimate
     values = tuple(estimates[name] * factor for name, factor in zip(names, factors, strict=True))
     return _Known(tuple(effects), tuple(names), values, tuple(factors)), left_out
 
 
-def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, str]]:
+def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, RefusedParameters]]:
     """The effects that all runs share and the plan determines, the indices of their common unknowns, and the others
     with the reason."""
     problem, solution = fit.problem, fit.solution
@@ -102,15 +102,15 @@ def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, str]]:
     names: list[str] = []
     estimate: list[float] = []
     indices: list[int] = []
-    left_out: dict[str, str] = {}
+    left_out: dict[str, RefusedParameters] = {}
     first = coefficient = 0
     for shared, plain in zip(problem.shared, fixed.added, strict=True):
         unknowns = range(first, first + shared.size)
         first += shared.unknowns
         if not isinstance(plain, ChainEffect):
-            left_out |= dict.fromkeys(shared.names(), NO_MACHINE_ERROR)
+            left_out |= _refused(shared.names(), ReasonKind.NO_MACHINE_ERROR)
         elif not all(solution.common_free[list(unknowns)]):
-            left_out |= dict.fromkeys(shared.names(), NOT_DETERMINED)
+            left_out |= _refused(shared.names(), ReasonKind.NOT_DETERMINED)
         else:
             effects.append(plain)
             names += shared.effect.parameters(problem.context)
@@ -118,6 +118,11 @@ def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, str]]:
             indices += unknowns
         coefficient += shared.size
     return _Known(tuple(effects), tuple(names), tuple(estimate), ()), indices, left_out
+
+
+def _refused(names: Iterable[str], kind: ReasonKind) -> dict[str, RefusedParameters]:
+    """Parameters that are left out of the map for another reason than that they have no number in any run."""
+    return {name: refused_parameters(Refusal((name,), Reason(kind))) for name in names}
 
 
 def _of_shared(fit: Fit, run: int, local: list[int], shared: list[int]) -> Array:

@@ -48,7 +48,7 @@ def map_answer(mapped: VolumetricMap) -> VolumetricAnswer:
         ),
         datum=None if error.datum is None else _at(chain, error.datum),
         parameters=tuple(error.names),
-        left_out=tuple(LeftOutOfMap(name, why) for name, why in mapped.left_out.items()),
+        left_out=tuple(LeftOutOfMap(name, refused.why) for name, refused in mapped.left_out.items()),
         worst=_point(mapped, error.worst, k, by_parameter),
         mean=_length(*error.mean, k),
         rms=_length(*error.rms, k),

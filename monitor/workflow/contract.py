@@ -1,0 +1,92 @@
+"""The contract of the product: every question that can be asked, as a function of a typed request with a typed answer.
+
+The faces (the command line today; a Python interface, HTTP and pages to come) ask nothing else. A question is named by
+the place of its function and loaded when it is asked, so that to list the contract loads neither solver nor engine; its
+types are the annotations of the function.
+"""
+
+from __future__ import annotations
+
+import importlib
+import typing
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question by its ``name``; ``function`` is ``module:name`` below ``monitor.workflow``."""
+
+    name: str
+    function: str
+
+    def load(self) -> Callable[..., Any]:
+        """Return the function: of a database, a request, or both."""
+        module, _, name = self.function.partition(":")
+        function: Callable[..., Any] = getattr(importlib.import_module(f"monitor.workflow.{module}"), name)
+        return function
+
+    @property
+    def request(self) -> Any:
+        """The type of the request; None where there is nothing to ask for."""
+        return typing.get_type_hints(self.load()).get("request")
+
+    @property
+    def answer(self) -> Any:
+        """The type of the answer."""
+        return typing.get_type_hints(self.load())["return"]
+
+    @property
+    def needs_database(self) -> bool:
+        """Whether the function takes an open database first."""
+        return "db" in typing.get_type_hints(self.load())
+
+
+#: Every question by its name. A new one is one line here and its function in a folder or file beside this one.
+QUESTIONS = {
+    name: Question(name, function)
+    for name, function in {
+        "add effect": "model.change:add_effect",
+        "amend certificate": "certificate.issue:amend",
+        "audit": "keeping:audit",
+        "backup": "keeping:backup",
+        "campaigns": "intake.campaigns:campaigns",
+        "certificates": "certificate.states:list_certificates",
+        "compare": "explain.compare:compare",
+        "digital certificate": "certificate.states:write_digital",
+        "effects": "effects:effects",
+        "effects of campaign": "effects:campaign_effects",
+        "event": "events:event",
+        "explain": "explain.explain:explain",
+        "export": "keeping:export",
+        "fleet": "fleet:fleet",
+        "identify": "identify.identify:identify",
+        "identify stepwise": "identify.stepwise:identify_stepwise",
+        "import": "intake.importing:import_folders",
+        "issue certificate": "certificate.issue:issue",
+        "issued certificate": "certificate.states:write_issued",
+        "map": "volumetric.volumetric:volumetric_map",
+        "model": "model.show:show_model",
+        "model history": "explain.versions:history",
+        "models": "model.show:list_all_models",
+        "plan": "plan.plan:plan",
+        "remake certificate": "certificate.remaking:remake",
+        "remove effect": "model.change:remove_effect",
+        "report": "health.report:report",
+        "restore": "keeping:restore_backup",
+        "runs": "intake.campaigns:runs",
+        "select": "selections.select:select",
+        "selections": "selections.select:selections",
+        "selections side by side": "selections.side_by_side:side_by_side",
+        "show certificate": "certificate.states:show_certificate",
+        "simulate": "simulation:simulate",
+        "statistics": "run_statistics.statistics:stats",
+        "trend": "trend.trends:trend",
+        "uncertainty": "uncertainty.evaluation:uncertainty",
+        "verify": "keeping:verify",
+        "verify certificate": "certificate.verification:verify_file",
+        "withdraw campaign": "intake.withdrawals:withdraw",
+        "withdraw certificate": "certificate.issue:withdraw",
+    }.items()
+}

@@ -1,0 +1,110 @@
+"""One contract: every question takes a frozen request and gives a frozen answer, and the faces ask nothing else."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import types
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import date, datetime
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import monitor
+from monitor.workflow.contract import QUESTIONS, Question
+
+PACKAGE = Path(monitor.__file__).parent
+SCALARS = (str, int, float, bool, datetime, date, Path, type(None))
+#: What is handed out as it was stored, whatever it holds: the record of a certificate of any version.
+AS_STORED = ["show certificate.record[]: typing.Any"]
+#: What the command line takes from the workflow besides questions, and why.
+BESIDES_QUESTIONS = {
+    "demo:examples_folder",  # the demo types the verbs of the command line itself
+    "demo:fresh_database",
+    "explain.curve_sentences:correlation",  # a sentence that two verbs print
+    "history.agreement:sentence",
+    "health.mail:mail_report",  # sends what was written; nothing is asked
+    "health.mail:read_mail_settings",
+    "intake.campaigns:selected_campaigns",  # `identify` without a campaign asks once for each
+}
+
+each_question = pytest.mark.parametrize("question", QUESTIONS.values(), ids=lambda question: question.name)
+
+
+def _not_plain(kind: Any, path: str, seen: frozenset[type] = frozenset()) -> Iterator[str]:
+    """Every part of a type that ``from_document`` could not restore."""
+    origin = typing.get_origin(kind)
+    if origin in (typing.Union, types.UnionType, tuple, list, Sequence):
+        for member in typing.get_args(kind):
+            if member is not Ellipsis:
+                yield from _not_plain(member, path, seen)
+    elif origin in (dict, Mapping):
+        yield from _not_plain(typing.get_args(kind)[1], f"{path}[]", seen)
+    elif origin is typing.Literal or origin is np.ndarray or kind in SCALARS:
+        return
+    elif dataclasses.is_dataclass(kind):
+        if kind in seen:
+            return
+        assert isinstance(kind, type)
+        if not kind.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+            yield f"{path}: {kind.__name__} is not frozen"
+        hints = typing.get_type_hints(kind)
+        for field in dataclasses.fields(kind):
+            yield from _not_plain(hints[field.name], f"{path}.{field.name}", seen | {kind})
+    elif not (isinstance(kind, type) and issubclass(kind, Enum)):
+        yield f"{path}: {kind}"
+
+
+@each_question
+def test_a_request_is_a_frozen_record_of_plain_values(question: Question) -> None:
+    if question.request is not None:
+        assert list(_not_plain(question.request, question.request.__name__)) == []
+
+
+@each_question
+def test_an_answer_is_a_frozen_record_that_json_can_hold(question: Question) -> None:
+    assert [part for part in _not_plain(question.answer, question.name) if part not in AS_STORED] == []
+
+
+@each_question
+def test_a_question_takes_a_database_and_a_request_and_nothing_else(question: Question) -> None:
+    names = list(inspect.signature(question.load()).parameters)
+    assert set(names) <= {"db", "request", "progress"}
+
+
+def _functions_asked(path: Path) -> Iterator[str]:
+    """``module:name`` of every function of the workflow that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("monitor.workflow"):
+            module = importlib.import_module(str(node.module))
+            for alias in node.names:
+                value = getattr(module, alias.name, None)
+                if inspect.isfunction(value):
+                    yield f"{value.__module__}:{alias.name}".removeprefix("monitor.workflow.")
+                elif value is None or inspect.ismodule(value):
+                    yield from _attributes(path, f"{node.module}.{alias.name}", alias.asname or alias.name)
+
+
+def _attributes(path: Path, module_name: str, local: str) -> Iterator[str]:
+    module = importlib.import_module(module_name)
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == local:
+            value = getattr(module, node.attr, None)
+            if inspect.isfunction(value):
+                yield f"{value.__module__}:{node.attr}".removeprefix("monitor.workflow.")
+
+
+def test_the_command_line_asks_nothing_but_the_questions_of_the_contract() -> None:
+    questions = {question.function for question in QUESTIONS.values()}
+    asked = {
+        function for path in sorted((PACKAGE / "cli").rglob("*.py")) for function in _functions_asked(path)
+    }
+    assert asked - questions == BESIDES_QUESTIONS
+    assert questions - asked == set()
