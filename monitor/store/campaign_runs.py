@@ -17,7 +17,7 @@ _CAMPAIGNS = """
 SELECT campaign_id FROM campaign_runs WHERE machine_hash = CAST(md5_number_lower(?) % 16777216 AS INTEGER)
 """
 _HEADS = """
-SELECT campaign_id, campaign, method, machine FROM imported_campaign WHERE campaign_id IN ({marks}) ORDER BY campaign_id
+SELECT campaign_id, campaign, method, machine FROM imported_campaign WHERE campaign_id IN ({marks})
 """
 _RUNS = """
 SELECT campaign_id, unnest(run), unnest(started_at), unnest(utc_offset_s), unnest(day), unnest(warm_up),
@@ -43,12 +43,9 @@ def imported_campaigns(db: Database, machine: str) -> list[tuple[int, str, str]]
     numbers = [number for (number,) in db.rows(_CAMPAIGNS, [machine])]
     if not numbers:
         return []
-    return [
-        (int(number), str(name), str(method))
-        for number, name, method, owner in db.rows(_HEADS.format(marks=_marks(numbers)), numbers)
-        # Few machines share a hash: the name decides.
-        if owner == machine
-    ]
+    heads = db.rows(_HEADS.format(marks=_marks(numbers)), numbers)
+    # Few machines share a hash: the name decides.
+    return sorted((number, name, method) for number, name, method, owner in heads if owner == machine)
 
 
 def run_rows(db: Database, numbers: Sequence[int]) -> list[tuple[Any, ...]]:

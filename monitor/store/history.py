@@ -21,20 +21,15 @@ from monitor.store.connection import Database
 from monitor.store.identified_values import IdentifiedValues, values_of
 from monitor.store.machine_runs import RecordedRun, runs_of_campaigns
 
-# Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the models of one machine's
-# identifications, then the heads, which are long, of those that are selected.
+# Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the heads, which are long.
 _IDENTIFICATIONS = """
 SELECT identification_id
 FROM identification JOIN (SELECT unnest(CAST(? AS INTEGER[])) AS campaign_id) USING (campaign_id)
 """
 
-_MODELS = """
-SELECT campaign_id, run_count, identification_id, model, model_version, method
-FROM identification WHERE identification_id IN ({marks})
-"""
-
 _HEADS = """
-SELECT identification_id, parameters, units, display_factors FROM identification WHERE identification_id IN ({marks})
+SELECT model, model_version, method, campaign_id, run_count, identification_id, parameters, units, display_factors
+FROM identification WHERE identification_id IN ({marks})
 """
 
 _LATEST = """
@@ -176,17 +171,16 @@ def _identified(
     """Of each campaign the identification with the most runs, the later of two: what load_identification takes."""
     if not campaigns:
         return {}
-    selected: dict[int, tuple[int, int]] = {}
-    candidates = [number for (number,) in db.rows(_IDENTIFICATIONS, [campaigns])]
-    for campaign, run_count, number, of_model, of_version, method in _with_marks(db, _MODELS, candidates):
-        if of_model == (method if model is None else model) and version in (None, of_version):
-            selected[campaign] = max((run_count, number), selected.get(campaign, (0, 0)))
-    numbers = [number for _, number in selected.values()]
-    heads = {number: tuple(map(tuple, head)) for number, *head in _with_marks(db, _HEADS, numbers)}
-    return {
-        campaign: _Identified(run_count, number, *heads[number])
-        for campaign, (run_count, number) in selected.items()
-    }
+    numbers = [number for (number,) in db.rows(_IDENTIFICATIONS, [campaigns])]
+    identified: dict[int, _Identified] = {}
+    for of_model, of_version, method, campaign, *head in _with_marks(db, _HEADS, numbers):
+        if of_model != (method if model is None else model) or version not in (None, of_version):
+            continue
+        run_count, number, *lists = head
+        current = identified.get(campaign)
+        if current is None or (run_count, number) > (current.runs, current.number):
+            identified[campaign] = _Identified(run_count, number, *map(tuple, lists))
+    return identified
 
 
 def _with_marks(db: Database, sql: str, numbers: list[int]) -> list[tuple[Any, ...]]:
