@@ -23,7 +23,8 @@ from monitor.methods.curve.problem import CurveProblem, grid
 from monitor.methods.curve.problem import problem_of as curve_problem_of
 from monitor.readers import read_campaign
 from monitor.records import Campaign, CurveCampaign
-from monitor.store import Database, is_curve, load_campaign, load_curve
+from monitor.store import Database
+from monitor.workflow.measured import load_measured
 
 # Those that every campaign has, and two channels as examples.
 DRIVERS = ("warmup", "run_time", "ambient_degC", "x_axis_degC")
@@ -101,9 +102,7 @@ def campaign_effects(db: Database, request: CampaignEffectsRequest) -> EffectsAn
 
     Raises NotFoundError, and DataError where the readings do not suffice.
     """
-    name = request.campaign
-    campaign = load_curve(db, name) if is_curve(db, name) else load_campaign(db, name)
-    return _selected(_of_campaign(campaign), request.text)
+    return _selected(_of_campaign(load_measured(db, request.campaign)), request.text)
 
 
 def _selected(answer: EffectsAnswer, text: str | None) -> EffectsAnswer:
