@@ -23,62 +23,11 @@ COMMAND_LINE = Path(__file__).resolve().parents[1] / "docs" / "command-line.md"
 #: Options that all verbs have; the document says so once.
 COMMON = {"-h", "--help", "--db", "--json"}
 
-#: Options without a help besides --model, to be emptied.
-WITHOUT_HELP = {
-    "certificate withdraw --reason",
-    "simulate --seed",
-}
-
 #: Functions of a verb's file: what they do is the same in each, and the file's docstring is the verb's help.
 VERB_FUNCTIONS = {"options", "run"}
 
 #: Methods of a library's class that a class of ours overrides; the library documents them.
 LIBRARY_METHODS = {"error"}
-
-#: Files with public names that lack such a docstring, to be emptied.
-LACKING: set[str] = {
-    "discovery/curve/noise_evidence.py",
-    "discovery/machine/poses.py",
-    "discovery/machine/run_evidence.py",
-    "discovery/search/comparison.py",
-    "effects/artefact/ball.py",
-    "effects/context.py",
-    "effects/curve/shapes/exp.py",
-    "effects/curve/shapes/step.py",
-    "effects/driver.py",
-    "effects/drivers/channel.py",
-    "effects/drivers/each_run.py",
-    "effects/drivers/gravity.py",
-    "effects/drivers/run_time.py",
-    "effects/drivers/sequence.py",
-    "effects/drivers/warmup.py",
-    "effects/shapes/compliance.py",
-    "effects/shapes/cyclic.py",
-    "effects/shapes/formula.py",
-    "effects/shapes/harmonic.py",
-    "effects/shapes/lag.py",
-    "effects/shapes/nodes.py",
-    "effects/shapes/poly.py",
-    "effects/shapes/reversal.py",
-    "effects/shapes/table.py",
-    "effects/weight.py",
-    "methods/curve/solver.py",
-    "methods/l_shape/problem.py",
-    "methods/method.py",
-    "methods/registry.py",
-    "readers/toml_table.py",
-    "reporting/texts.py",
-    "store/history.py",
-    "uncertainty/coverage.py",
-    "uncertainty/marginals.py",
-    "uncertainty/tolerance.py",
-    "uncertainty/volumetric.py",
-    "workflow/certificate/files.py",
-    "workflow/explain/compare_answer.py",
-    "workflow/explain/version_answer.py",
-    "workflow/health/forecast.py",
-    "workflow/run_statistics/tests.py",
-}
 
 
 def leaves(path: str, parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.ArgumentParser]]:
@@ -120,7 +69,7 @@ def test_every_option_has_a_help() -> None:
         for action in parser._actions
         if action.option_strings and not action.help
     }
-    assert {name for name in silent if not name.endswith(" --model")} == WITHOUT_HELP
+    assert silent == set()
 
 
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
@@ -148,32 +97,59 @@ def fault_of(docstring: str | None) -> str | None:
     return None
 
 
-def protocol_members() -> set[str]:
-    """Return the documented methods of all protocols: a class that has them need not repeat what they are."""
-    members: set[str] = set()
+def class_definitions() -> dict[str, list[ast.ClassDef]]:
+    """Return the classes of the package by name."""
+    classes: dict[str, list[ast.ClassDef]] = {}
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ClassDef) and any("Protocol" in ast.unparse(base) for base in node.bases):
-                members |= {
-                    member.name
-                    for member in node.body
-                    if isinstance(member, ast.FunctionDef) and ast.get_docstring(member)
-                }
-    return members
+            if isinstance(node, ast.ClassDef):
+                classes.setdefault(node.name, []).append(node)
+    return classes
 
 
-MEMBERS = protocol_members()
+CLASSES = class_definitions()
+
+
+def members_of(node: ast.ClassDef) -> set[str]:
+    """Return the documented members of a class and of its bases: a class that overrides one need not repeat what it is.
+
+    Fields that a class names in its own docstring are documented there.
+    """
+    own = {
+        member.name
+        for member in node.body
+        if isinstance(member, ast.FunctionDef) and ast.get_docstring(member)
+    }
+    own |= set(re.findall(r"``([a-z_]+)``", ast.get_docstring(node) or ""))
+    bases = {ast.unparse(base).split("[")[0] for base in node.bases}
+    return own.union(*(members_of(base) for name in bases for base in CLASSES.get(name, [])))
+
+
+#: Documented members of the protocols, which a class has without naming the protocol among its bases.
+PROTOCOLS = set().union(
+    *(
+        members_of(node)
+        for nodes in CLASSES.values()
+        for node in nodes
+        if any("Protocol" in ast.unparse(base) for base in node.bases)
+    )
+)
 
 
 def faults(path: Path) -> list[str]:
     """Return every public name of a file whose docstring is missing or no sentence."""
     tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
     exempt = VERB_FUNCTIONS if path.parent.name == "verbs" else set()
+    classes = {node.name: node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
     messages = []
     for name, node in public_definitions(tree):
         of_class, _, member = name.rpartition(".")
-        inherited = bool(of_class) and member in MEMBERS | LIBRARY_METHODS
-        if name in exempt or (inherited and not ast.get_docstring(node)):
+        if name in exempt or any(ast.unparse(decorator) == "overload" for decorator in node.decorator_list):
+            continue
+        documented = (
+            members_of(classes[of_class]) | PROTOCOLS | LIBRARY_METHODS if of_class in classes else set()
+        )
+        if member in documented and not ast.get_docstring(node):
             continue
         fault = fault_of(ast.get_docstring(node))
         messages += [f"{name} {fault}"] if fault else []
@@ -183,11 +159,6 @@ def faults(path: Path) -> list[str]:
 FILES = sorted(str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py"))
 
 
-@pytest.mark.parametrize("file", [file for file in FILES if file not in LACKING])
+@pytest.mark.parametrize("file", FILES)
 def test_every_public_name_says_what_it_is(file: str) -> None:
     assert faults(PACKAGE / file) == []
-
-
-def test_a_file_that_was_mended_left_the_list() -> None:
-    mended = [file for file in sorted(LACKING) if not (PACKAGE / file).exists() or not faults(PACKAGE / file)]
-    assert mended == [], "take these out of LACKING"

@@ -29,7 +29,11 @@ def add_issuing(parser: ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="PATH", help="a folder, or a file ending in .pdf")
     parser.add_argument("--number", metavar="NUMBER", help="default: the next of the year")
     parser.add_argument("--date", type=_day, metavar="YYYY-MM-DD", help="of issue; default: today")
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument(
         "--linear-axes", type=Path, metavar="FILE",
         help="errors of the linear axes (TOML), for methods that take these axes as known",

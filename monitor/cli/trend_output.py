@@ -255,11 +255,11 @@ def _backtest(answer: TrendAnswer) -> Iterator[str]:
     }
     if not tests:
         return
-    made, inside = sum(test.made for test in tests.values()), sum(test.inside for test in tests.values())
+    forecasts, inside = sum(test.made for test in tests.values()), sum(test.inside for test in tests.values())
     name = min(tests, key=lambda parameter: tests[parameter].share_inside)
     yield (
-        f"backtest, every day foretold by the days before it: {inside} of {made} later values "
-        f"({100 * inside / made:.0f} %) inside the 95 % forecast interval; least for {name}, "
+        f"backtest, every day foretold by the days before it: {inside} of {forecasts} later values "
+        f"({100 * inside / forecasts:.0f} %) inside the 95 % forecast interval; least for {name}, "
         f"{tests[name].inside} of {tests[name].made}"
     )
 

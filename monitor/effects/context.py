@@ -25,7 +25,7 @@ SMALLEST_MOVE_RAD = 50e-6
 
 @dataclass(frozen=True)
 class Context:
-    """n probings, as the effects need them.
+    """The n probings, as the effects need them.
 
     ``positions`` (n, J) physical displacements in mm and rad as read; ``expected`` (n, J) the same without each
     row's noise, where a method can compute it, for effects that follow fine steps; ``run`` (n,) the run's number;

@@ -86,7 +86,7 @@ class Rehearsal(Able):
 
 
 class ExpectedAngles(Protocol):
-    """What a plan of angles of a table promises.
+    """What a plan of ``angles`` of a table with so many ``probings`` promises.
 
     ``shape`` are standard uncertainties of the shape's points in mm and ``u`` those of all parameters in internal
     units, NaN where the plan gives no number; ``nullity`` counts the dimensions that it leaves open and ``left_out``
@@ -108,7 +108,10 @@ class ExpectedAngles(Protocol):
 
 
 class AngleCandidates(Protocol):
-    """Angles of a table (degrees) to choose from, with the ``present`` plan of the first run."""
+    """Angles of a ``table`` (degrees) to choose from, with the ``present`` plan of the first run.
+
+    ``conditions`` are those on the shape, ``units`` the display units of the parameters.
+    """
 
     @property
     def present(self) -> tuple[float, ...]: ...

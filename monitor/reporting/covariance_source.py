@@ -57,7 +57,7 @@ def covariance_sentence(source: CovarianceSource, texts: Texts | None = None) ->
     if source.linear_axes:
         sentence = say("covariance.with_linear_axes", sentence=sentence)
     if source.taken_as_known:
-        names = [say(f"covariance.{known.name.lower()}") for known in source.taken_as_known]
+        names = [say(f"covariance.{error.name.lower()}") for error in source.taken_as_known]
         both = reduce(lambda first, second: say("covariance.both", first=first, second=second), names)
         sentence = say("covariance.taken_as_known", sentence=sentence, names=both)
     return sentence

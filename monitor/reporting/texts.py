@@ -41,6 +41,7 @@ class Texts:
 
     @property
     def decimal_sign(self) -> str:
+        """The sign between whole and decimal digits."""
         return self.words["language.decimal_sign"]
 
     def day(self, day: date) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from monitor import __version__
 from monitor.exceptions import CampaignError, DataError, Fault
 from monitor.records import Campaign, CurveCampaign, Run, SourceFile
-from monitor.store import audit, probings, record_json
+from monitor.store import audit, campaign_runs, probings, record_json
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.curves import METHOD as CURVE
@@ -88,6 +88,7 @@ def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ())
                 [campaign_id, file.name, file.content, file.sha256],
             )
         _insert_runs(db, campaign_id, campaign.runs)
+        campaign_runs.insert_runs(db, campaign_id)
         probings.insert(db, campaign_id, rows)
         keep_fingerprints(db, campaign_id, run_fingerprints(campaign.probings))
         audit.record(db, "import", "campaign", campaign.name, content)

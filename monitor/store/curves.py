@@ -11,6 +11,7 @@ from monitor import __version__
 from monitor.exceptions import DataError
 from monitor.records import CurveCampaign, Instrument, SourceFile
 from monitor.store import audit
+from monitor.store.campaign_runs import insert_runs
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 
@@ -42,6 +43,7 @@ def insert_curve(db: Database, campaign_id: int, curve: CurveCampaign, content: 
             "{}", "{}", content, __version__, utc_now(),
         ],
     )  # fmt: skip
+    insert_runs(db, campaign_id)
     for file in curve.files:
         db.execute(
             "INSERT INTO source_file VALUES (?, ?, ?, ?)", [campaign_id, file.name, file.content, file.sha256]

@@ -244,30 +244,30 @@ def fleet_sums(db: Database, model: str | None = None, version: int | None = Non
     db.execute(_CHOSEN, {"model": model, "version": version})
     ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")
     if epoch_d is None:
-        of = "" if model is None else f" with model {model}"
-        raise NotFoundError(f"no campaign was identified{of} yet; type `monitor identify`")
+        under = "" if model is None else f" with model {model}"
+        raise NotFoundError(f"no campaign was identified{under} yet; type `monitor identify`")
     for statement in (_GROUPS, _SINCE, _ENDED, _LATEST, _ORIGINS):
         db.execute(statement)
     db.execute(_PARTS, {"epoch_d": epoch_d})
-    found = {name: np.ma.getdata(column) for name, column in db.arrays(_TOGETHER).items()}
+    columns = {name: np.ma.getdata(column) for name, column in db.arrays(_TOGETHER).items()}
     for name in _TABLES:
         db.execute(f"DROP TABLE IF EXISTS fleet_{name}")
-    return _sums(found, epoch_d)
+    return _sums(columns, epoch_d)
 
 
-def _sums(found: Mapping[str, npt.NDArray[np.generic]], epoch_d: float) -> FleetSums:
+def _sums(columns: Mapping[str, npt.NDArray[np.generic]], epoch_d: float) -> FleetSums:
     number = {
         name: np.asarray(column, dtype=np.float64)
-        for name, column in found.items()
+        for name, column in columns.items()
         if name not in ("machine", "parameter", "unit")
     }
     f = number["factor"]
     # ln s² of the groups becomes that of the display unit; their degrees of freedom are runs less groups.
     shift = 2.0 * np.log(f) * (number["n"] - number["k"])
     return FleetSums(
-        machine=found["machine"].astype(np.str_),
-        parameter=found["parameter"].astype(np.str_),
-        unit=found["unit"].astype(np.str_),
+        machine=columns["machine"].astype(np.str_),
+        parameter=columns["parameter"].astype(np.str_),
+        unit=columns["unit"].astype(np.str_),
         origin=number["origin"] / f,
         groups=number["k"],
         runs=number["n"],

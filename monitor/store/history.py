@@ -6,7 +6,7 @@ Arrays for the statistics; people read the same numbers in the view ``v_paramete
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
@@ -21,12 +21,16 @@ from monitor.store.connection import Database
 from monitor.store.identified_values import IdentifiedValues, values_of
 from monitor.store.machine_runs import RecordedRun, runs_of_campaigns
 
-# The heads of identifications are long: first the numbers are chosen, then a key finds the heads of those.
+# Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the models of one machine's
+# identifications, then the heads, which are long, of those that are selected.
 _IDENTIFICATIONS = """
-SELECT campaign_id, run_count, identification_id
-FROM identification JOIN (SELECT unnest(CAST($campaigns AS INTEGER[])) AS campaign_id) USING (campaign_id)
-WHERE (model = $model OR CAST($model AS VARCHAR) IS NULL AND model = method)
-  AND (CAST($version AS INTEGER) IS NULL OR model_version = $version)
+SELECT identification_id
+FROM identification JOIN (SELECT unnest(CAST(? AS INTEGER[])) AS campaign_id) USING (campaign_id)
+"""
+
+_MODELS = """
+SELECT campaign_id, run_count, identification_id, model, model_version, method
+FROM identification WHERE identification_id IN ({marks})
 """
 
 _HEADS = """
@@ -70,7 +74,7 @@ class _Identified:
 
 @dataclass(frozen=True)
 class MachineHistory:
-    """n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
+    """The n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
 
     ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
     are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
@@ -173,9 +177,10 @@ def _identified(
     if not campaigns:
         return {}
     selected: dict[int, tuple[int, int]] = {}
-    rows = db.rows(_IDENTIFICATIONS, {"campaigns": campaigns, "model": model, "version": version})
-    for campaign, run_count, number in rows:
-        selected[campaign] = max((run_count, number), selected.get(campaign, (0, 0)))
+    candidates = [number for (number,) in db.rows(_IDENTIFICATIONS, [campaigns])]
+    for campaign, run_count, number, of_model, of_version, method in _with_marks(db, _MODELS, candidates):
+        if of_model == (method if model is None else model) and version in (None, of_version):
+            selected[campaign] = max((run_count, number), selected.get(campaign, (0, 0)))
     numbers = [number for _, number in selected.values()]
     heads = {number: tuple(map(tuple, head)) for number, *head in _with_marks(db, _HEADS, numbers)}
     return {
@@ -189,41 +194,61 @@ def _with_marks(db: Database, sql: str, numbers: list[int]) -> list[tuple[Any, .
     return db.rows(sql.format(marks=", ".join("?" * len(numbers))), numbers) if numbers else []
 
 
-def _values(
-    db: Database, identified: Iterable[_Identified], rows: dict[tuple[int, int], int], parameter: str | None
-) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
-    """Names, units, values and u (n, p) of the parameters that any run has; ``rows`` by identification and run."""
+@dataclass(frozen=True)
+class _Block:
+    """Values and u (r, k) of k parameters in r runs; ``rows`` (r,) are those of the history, -1 for a run before it."""
+
+    unit_of: Mapping[str, str]
+    rows: npt.NDArray[np.int64]
+    values: Array
+    u: Array
+
+
+def _blocks(
+    db: Database,
+    identified: Iterable[_Identified],
+    rows: Mapping[tuple[int, int], int],
+    parameter: str | None,
+) -> Iterator[_Block]:
+    """Identifications under one version of a model have the same parameters: they are taken together."""
     numbers = {number for number, _ in rows}
     heads = sorted((head for head in identified if head.number in numbers), key=lambda head: head.number)
     stored = values_of(db, [head.number for head in heads]) if heads else {}
-    # Identifications under one version of a model have the same parameters: they are taken together.
     alike: dict[tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]], list[IdentifiedValues]] = {}
     for head in heads:
         alike.setdefault((head.parameters, head.units, head.factors), []).append(stored[head.number])
-    unit_of: dict[str, str] = {}
-    blocks = []
     for (names, units, factors), parts in alike.items():
-        value = np.concatenate([part.value for part in parts]) / np.array(factors)
+        values = np.concatenate([part.value for part in parts]) / np.array(factors)
         u = np.concatenate([part.u for part in parts]) / np.array(factors)
-        # A run before `since` has values, but no row.
-        row = np.array([rows.get((part.number, run), -1) for part in parts for run in part.runs.tolist()])
         # A parameter that was refused everywhere is none of the history.
-        estimated = np.isfinite(value).any(axis=0)
+        estimated = np.isfinite(values).any(axis=0)
         columns = [j for j, name in enumerate(names) if estimated[j] and parameter in (None, name)]
-        for j in columns:
-            unit_of.setdefault(names[j], units[j])
-        blocks.append((row, [names[j] for j in columns], value[:, columns], u[:, columns]))
-    every = tuple(sorted(unit_of))
-    values = np.full((len(rows), len(every)), np.nan)
+        numbered = [(part.number, run) for part in parts for run in part.runs.tolist()]
+        row = np.array([rows.get(number, -1) for number in numbered])
+        yield _Block({names[j]: units[j] for j in columns}, row, values[:, columns], u[:, columns])
+
+
+def _values(
+    db: Database,
+    identified: Iterable[_Identified],
+    rows: Mapping[tuple[int, int], int],
+    parameter: str | None,
+) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
+    """Names, units, values and u (n, p) of the parameters that any run has; ``rows`` by identification and run."""
+    blocks = list(_blocks(db, identified, rows, parameter))
+    unit_of: dict[str, str] = {}
+    for block in blocks:
+        unit_of = {**block.unit_of, **unit_of}
+    names = tuple(sorted(unit_of))
+    values = np.full((len(rows), len(names)), np.nan)
     uncertainties = np.full_like(values, np.nan)
-    for row, names_of_block, value, u in blocks:
-        recorded = row >= 0
-        target = np.ix_(
-            row[recorded], np.array([every.index(name) for name in names_of_block], dtype=np.int64)
-        )
-        values[target] = value[recorded]
-        uncertainties[target] = np.where(np.isnan(value[recorded]), np.nan, u[recorded])
-    return every, tuple(unit_of[name] for name in every), values, uncertainties
+    for block in blocks:
+        recorded = block.rows >= 0
+        columns = np.array([names.index(name) for name in block.unit_of], dtype=np.int64)
+        target = np.ix_(block.rows[recorded], columns)
+        values[target] = block.values[recorded]
+        uncertainties[target] = np.where(np.isnan(block.values[recorded]), np.nan, block.u[recorded])
+    return names, tuple(unit_of[name] for name in names), values, uncertainties
 
 
 def _conditions(db: Database, runs: list[RecordedRun]) -> dict[str, Array]:

@@ -7,14 +7,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 
 from monitor.exceptions import NotFoundError
+from monitor.store.campaign_runs import run_rows
 from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
-
-# A joined table of numbers would be held against every row of the fleet; a list of numbers finds the rows of a machine.
-_RUNS = """
-SELECT campaign_id, run, started_at, utc_offset_s, day, warm_up, conditions
-FROM run JOIN (SELECT unnest(CAST(? AS INTEGER[])) AS campaign_id) USING (campaign_id)
-"""
 
 
 @dataclass(frozen=True)
@@ -67,13 +62,11 @@ def machine_runs(db: Database, machine: str) -> list[RecordedRun]:
 
 def runs_of_campaigns(db: Database, campaigns: Mapping[int, tuple[str, str]]) -> list[RecordedRun]:
     """The runs of campaigns (number to name and method), in the order of time."""
-    if not campaigns:
-        return []
     rows = [
         RecordedRun(
             number, *campaigns[number], run, _by_the_shops_clock(started_at, offset), day, warm_up, conditions
         )
-        for number, run, started_at, offset, day, warm_up, conditions in db.rows(_RUNS, [list(campaigns)])
+        for number, run, started_at, offset, day, warm_up, conditions in run_rows(db, list(campaigns))
     ]
     return sorted(rows, key=lambda row: (row.started_at, row.campaign_id, row.run))
 

@@ -4,7 +4,7 @@ Each applied file leaves its number, name and checksum in ``schema_migration``, 
 database is refused, in words, when it was made by newer software, when a file that made it was edited or is
 missing, or when it is not one of ours.
 
-One statement is not run as its file has it: see ``gathering``.
+Two statements are not run as their files have them: see ``gathering``.
 """
 
 from __future__ import annotations
@@ -134,10 +134,11 @@ def _apply(connection: duckdb.DuckDBPyConnection, migration: Migration) -> None:
         if migration.number == 1:
             connection.execute(_LEDGER)
         for statement in statements:
-            if statement.query.lstrip().startswith(gathering.REPLACED):
-                gathering.gather(connection, gathering.RUN_BY_RUN)
-            else:
+            replacement = _replacement(statement.query)
+            if replacement is None:
                 connection.execute(statement)
+            else:
+                gathering.gather(connection, replacement)
         connection.execute(
             "INSERT INTO schema_migration VALUES (?, ?, ?, ?, ?)",
             [
@@ -152,3 +153,11 @@ def _apply(connection: duckdb.DuckDBPyConnection, migration: Migration) -> None:
     except duckdb.Error as fault:
         connection.rollback()
         raise StoreError(f"the migration {migration.name} failed and left nothing: {fault}") from fault
+
+
+def _replacement(statement: str) -> gathering.Gathering | None:
+    """Return what is gathered in portions in place of a statement; None for one that is run as it stands."""
+    text = statement.lstrip()
+    return next(
+        (gathered for start, gathered in gathering.REPLACEMENTS.items() if text.startswith(start)), None
+    )

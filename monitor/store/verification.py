@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from monitor.exceptions import MonitorError
 from monitor.store import audit
 from monitor.store.analyses import analysis_content
+from monitor.store.campaign_runs import run_list_faults
 from monitor.store.campaigns import stored_content
 from monitor.store.certificates import certificate_faults
 from monitor.store.connection import Database
@@ -49,6 +50,7 @@ def verify_audit(db: Database) -> Verification:
         *certificate_faults(db),
         *_file_faults(db),
         *_machine_faults(db),
+        *run_list_faults(db),
         *index_faults(db),
     ]
     audited = {}

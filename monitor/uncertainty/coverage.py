@@ -40,12 +40,12 @@ class Sampled:
 
 
 def single_factor(p: float = 0.95, dof: float = math.inf) -> float:
-    """k of one output, y ± k u: quantile of the normal or, with ``dof``, the t distribution (GUM G.3)."""
+    """Return k of one output, y ± k u: quantile of the normal or, with ``dof``, the t distribution (GUM G.3)."""
     return rectangle_factor(1, p, dof)
 
 
 def ellipsoid_factor(outputs: int, p: float = 0.95, dof: float = math.inf) -> float:
-    """k_p of the hyper-ellipsoid of ``outputs`` (the rank of U_y, not its order, where it is singular).
+    """Return k_p of the hyper-ellipsoid of ``outputs`` (the rank of U_y, not its order, where it is singular).
 
     Without ``dof`` the root of the chi-square quantile (JCGM 102:2011 6.5.2.3). With ``dof`` nu, the degrees
     of freedom of the estimated covariance, Hotelling's T²: k_p² = nu m / (nu - m + 1) F_p(m, nu - m + 1)
@@ -65,7 +65,7 @@ def ellipsoid_factor(outputs: int, p: float = 0.95, dof: float = math.inf) -> fl
 def rectangle_factor(
     outputs: int, p: float = 0.95, dof: float = math.inf, form: RectangleForm = "bonferroni"
 ) -> float:
-    """k_q of the hyper-rectangle y_j ± k_q u_j over all ``outputs`` (JCGM 102:2011 6.5.4).
+    """Return k_q of the hyper-rectangle y_j ± k_q u_j over all ``outputs`` (JCGM 102:2011 6.5.4).
 
     ``bonferroni`` takes intervals of probability q = 1 - (1 - p)/m each: at least p together, whatever the
     correlation. ``independent`` takes q = p^(1/m): exactly p for independent normal outputs, at least p for
@@ -90,7 +90,7 @@ def correlated_rectangle_factor(
     dof: float = math.inf,
     rng: np.random.Generator | None = None,
 ) -> Sampled:
-    """k_q for normal (or multivariate t) outputs of this ``correlation`` (m, m), singular or not.
+    """Return k_q for normal (or multivariate t) outputs of this ``correlation`` (m, m), singular or not.
 
     The p-quantile of max|z_j|: the smallest factor that covers all outputs at once. The radius is integrated
     exactly, the directions by scrambled Sobol points (Deák 1980 with quasi-random directions).
@@ -131,7 +131,7 @@ def sample_ellipsoid_factor(
     covariance: Array | None = None,
     tolerance: float = RANK_TOLERANCE,
 ) -> float:
-    """k_p of Monte Carlo ``outputs`` (trials, m): p-quantile of their Mahalanobis distances (JCGM 102 7.7).
+    """Return k_p of Monte Carlo ``outputs`` (trials, m): p-quantile of their Mahalanobis distances (JCGM 102 7.7).
 
     ``center`` (m,) and ``covariance`` (m, m) default to the sample's own. Directions in which the correlation
     matrix has an eigenvalue below ``tolerance`` times the largest are left out (rank-deficient U_y).
@@ -143,7 +143,7 @@ def sample_ellipsoid_factor(
 def sample_rectangle_factor(
     outputs: Array, p: float = 0.95, *, center: Array | None = None, covariance: Array | None = None
 ) -> float:
-    """k_q of Monte Carlo ``outputs`` (trials, m): p-quantile of max_j |y_j - center_j| / u_j (JCGM 102 7.7)."""
+    """Return k_q of Monte Carlo ``outputs`` (trials, m): p-quantile of max_j |y_j - center_j| / u_j (JCGM 102 7.7)."""
     outputs, center, covariance = _sample(outputs, p, center, covariance)
     return quantile_of(largest_deviations(outputs, center, covariance), p)
 
@@ -157,7 +157,7 @@ def mahalanobis_distances(
 
 
 def largest_deviations(outputs: Array, center: Array, covariance: Array) -> Array:
-    """max_j |y_j - center_j| / u_j (trials,); outputs without variance take no part."""
+    """Return max_j |y_j - center_j| / u_j (trials,); outputs without variance take no part."""
     u = np.sqrt(np.diag(covariance))
     varies = u > 0.0
     if not np.any(varies):

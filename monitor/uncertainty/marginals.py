@@ -28,7 +28,7 @@ class Marginal(Protocol):
 
     @property
     def std(self) -> float:
-        """Standard deviation; infinite where it does not exist."""
+        """Return Standard deviation; infinite where it does not exist."""
 
     def quantile(self, probability: Array) -> Array:
         """The values that are exceeded with probability 1 - ``probability``, any shape."""
@@ -69,7 +69,7 @@ class StudentT:
 
     @property
     def std(self) -> float:
-        """scale sqrt(dof / (dof - 2)); infinite for dof <= 2."""
+        """Return scale sqrt(dof / (dof - 2)); infinite for dof <= 2."""
         return self.scale * math.sqrt(self.dof / (self.dof - 2.0)) if self.dof > 2.0 else math.inf
 
     def quantile(self, probability: Array) -> Array:
@@ -94,7 +94,7 @@ class Rectangular:
 
     @property
     def std(self) -> float:
-        """Half-width over sqrt(3)."""
+        """Return Half-width over sqrt(3)."""
         return (self.high - self.low) / math.sqrt(12.0)
 
     def quantile(self, probability: Array) -> Array:
@@ -119,7 +119,7 @@ class Triangular:
 
     @property
     def std(self) -> float:
-        """Half-width over sqrt(6)."""
+        """Return Half-width over sqrt(6)."""
         return (self.high - self.low) / math.sqrt(24.0)
 
     def quantile(self, probability: Array) -> Array:
@@ -146,7 +146,7 @@ class Arcsine:
 
     @property
     def std(self) -> float:
-        """Half-width over sqrt(2)."""
+        """Return Half-width over sqrt(2)."""
         return (self.high - self.low) / math.sqrt(8.0)
 
     def quantile(self, probability: Array) -> Array:
@@ -176,7 +176,7 @@ class Empirical:
 
     @property
     def std(self) -> float:
-        """Standard deviation of what is drawn."""
+        """Return Standard deviation of what is drawn."""
         low, high = self.values[:-1] - self.mean, self.values[1:] - self.mean
         return math.sqrt(float(np.mean((low * low + low * high + high * high) / 3.0)))
 

@@ -11,7 +11,7 @@ from monitor.records import Array
 
 
 def numerical_tolerance(value: float, digits: int = 2) -> float:
-    """delta = 10^l / 2, where ``value`` rounded to ``digits`` digits is c 10^l with c an integer of so many.
+    """Return delta = 10^l / 2, where ``value`` rounded to ``digits`` digits is c 10^l with c an integer of so many.
 
     0.00035 has 35e-5 with two digits, so delta is 0.000005. A value that rounds up to the next decade takes
     that decade's l (0.996 is 1.0 with two digits: delta 0.05). Raises DataError for a value that is not

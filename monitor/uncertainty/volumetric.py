@@ -143,7 +143,7 @@ class VolumetricError:
         return int(np.argmax(np.trace(self.covariance, axis1=1, axis2=2)))
 
     def factor(self, p: float = 0.95) -> float:
-        """k of one length or one component, with the degrees of freedom of the parameters."""
+        """Return k of one length or one component, with the degrees of freedom of the parameters."""
         return single_factor(p, self.degrees_of_freedom)
 
     def budget(self, point: int) -> dict[str, float]:

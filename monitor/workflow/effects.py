@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 
 from monitor.discovery.curve.catalogue import catalogue as curve_catalogue
-from monitor.documents import OMITTED
+from monitor.documents import INLINED, OMITTED
 from monitor.effects import ArtefactEffect, ChainEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
 from monitor.effects.curve import SEARCHED, CurveEffect
@@ -58,14 +58,11 @@ class CatalogueEffect:
 
     effect: str
     unit: str
-    meaning: str
-    cause: str
-    remedy: str
-    described_in: str
+    description: Description = field(metadata=INLINED)
 
     def contains(self, text: str) -> bool:
         """Return whether any of the fields contains a text, in upper or lower case."""
-        return text.lower() in " ".join(getattr(self, column.name) for column in fields(self)).lower()
+        return text.lower() in " ".join((self.effect, self.unit, *astuple(self.description))).lower()
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,8 @@ def effects(request: EffectsRequest) -> EffectsAnswer:
     """
     if request.folder is not None:
         return _selected(_of_campaign(read_campaign(request.folder)), request.text)
-    chain = parse_topology(request.topology or DEFAULT_TOPOLOGY)
+    assert request.topology is not None  # the request has one of the two
+    chain = parse_topology(request.topology)
     base = tuple(base_effects(chain))
     others = (*of_balls(DRIVERS), *of_tracker(chain, DRIVERS))
     described = _described(catalogue(chain, base, DRIVERS, more=others))
@@ -136,13 +134,7 @@ def _of_campaign(campaign: Campaign | CurveCampaign) -> EffectsAnswer:
 
 
 def _described(effects: Iterable[ChainEffect | ArtefactEffect]) -> tuple[CatalogueEffect, ...]:
-    return tuple(_entry(effect.text, effect.unit.name, describe(effect)) for effect in effects)
-
-
-def _entry(effect: str, unit: str, description: Description) -> CatalogueEffect:
-    return CatalogueEffect(
-        effect, unit, description.meaning, description.cause, description.remedy, description.described_in
-    )
+    return tuple(CatalogueEffect(effect.text, effect.unit.name, describe(effect)) for effect in effects)
 
 
 def _of_curve(curve: CurveCampaign) -> EffectsAnswer:
@@ -154,7 +146,7 @@ def _of_curve(curve: CurveCampaign) -> EffectsAnswer:
         campaign=curve.name,
         base=(curve.base,),
         effects=tuple(
-            _entry(effect.text, unit, description)
+            CatalogueEffect(effect.text, unit, description)
             for effect, description in descriptions
             if description is not None
         ),

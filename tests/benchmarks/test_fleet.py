@@ -20,6 +20,7 @@ import pytest
 from scipy import stats
 
 from monitor.store import Database, fleet_sums
+from monitor.store.campaign_runs import gather_runs
 from monitor.store.identified_values import gather_values
 from monitor.workflow.fleet import cell_tests
 from monitor.workflow.trend.request import TrendRequest
@@ -86,6 +87,7 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
         {"n": n["n"]},
     )
     gather_values(db)
+    gather_runs(db)
 
 
 def test_a_small_copy_gives_the_numbers_of_the_bare_query(tmp_path: Path) -> None:

@@ -113,6 +113,7 @@ def _broken_by_an_earlier_version(path: Path, folder: Path, environment: dict[st
     shutil.copyfile(folder / "before.duckdb", path)
     with duckdb.connect(str(path)) as connection:
         connection.execute("DELETE FROM schema_migration WHERE number >= 10")
+        connection.execute("DROP TABLE campaign_runs")
         for name, table, column in (
             ("run_of_campaign", "run", "campaign_id"),
             ("identification_of_campaign", "identification", "campaign_id"),

@@ -19,6 +19,7 @@ from monitor.records import Campaign
 from monitor.statistics import anova, bartlett, pool, trend
 from monitor.statistics.sufficient import GroupSums, cells_from_sums, drift_from_sums
 from monitor.store import Database, FleetSums, fleet_sums, machine_history
+from monitor.store.campaign_runs import gather_runs
 from monitor.store.events import record_event
 from monitor.store.identified_values import gather_values
 
@@ -71,6 +72,7 @@ def keep(
         frame,
     )
     gather_values(db)
+    gather_runs(db)
     return own
 
 

@@ -49,7 +49,7 @@ def test_an_explanation_is_restored_from_what_was_stored(measured: Database, cam
     answer = explain(measured, ExplainRequest(campaign))
     stored = load_analysis(measured, "explanation", campaign=campaign)
     assert from_document(ExplainAnswer, stored.document) == answer
-    assert isinstance(answer.missing[0], KINDS[campaign][1])
+    assert isinstance(answer.explanation.missing[0], KINDS[campaign][1])
 
 
 def test_the_coefficients_of_a_curve_are_restored_from_what_was_stored(measured: Database) -> None:

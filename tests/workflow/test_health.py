@@ -436,7 +436,7 @@ def test_a_report_made_late_says_what_one_made_on_monday_said(
     assert late.model.lack_of_fit_p == pytest.approx(then.model.lack_of_fit_p, rel=1e-6)
     # The whole campaign's own result is another, and is left alone.
     whole = uncertainty(fleet, UncertaintyRequest("campaign-B-stepped", 16, method="guf"))
-    assert whole["input_covariance"] == "repeated runs, pooled by day, 15 degrees of freedom"
+    assert whole.input_covariance == "repeated runs, pooled by day, 15 degrees of freedom"
     report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
     assert stored(fleet, "B-stepped").basis == then.basis
 

@@ -56,7 +56,7 @@ def test_table_4_four_repeats_are_four_runs(db):
 
 
 def test_table_4_only_the_z_offset_drifts(db):
-    assert stats(db, StatisticsRequest("tilting-table")).drift.drifts == ["EZ0A"]
+    assert stats(db, StatisticsRequest("tilting-table")).drift.drifts == ("EZ0A",)
 
 
 def test_table_4_compensation_moves_what_was_compensated(db):

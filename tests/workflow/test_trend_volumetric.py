@@ -15,6 +15,7 @@ from scipy import optimize
 
 from monitor.cli import main
 from monitor.store import Database, machine_history
+from monitor.store.campaign_runs import gather_runs
 from monitor.store.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.history.past import machine_past
@@ -89,6 +90,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 frame.assign(value=past * FACTOR[unit]),
             )
         gather_values(db)
+        gather_runs(db)
     return place
 
 

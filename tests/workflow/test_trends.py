@@ -26,6 +26,7 @@ from monitor.store import (
     machine_history,
     record_event,
 )
+from monitor.store.campaign_runs import gather_runs
 from monitor.store.identified_values import gather_values
 from monitor.workflow.history.changes import search_changes
 from monitor.workflow.history.series import Series
@@ -93,6 +94,7 @@ def add_machine(
             own,
         )
     gather_values(db)
+    gather_runs(db)
 
 
 @pytest.fixture(scope="module")
@@ -315,15 +317,15 @@ def test_five_days_components_histogram_and_the_vector(campaigns: Database) -> N
     assert found.vector.box_m.why.startswith("group 1 has 4 runs for 13 parameters")
     assert found.vector.manova.p_value < 1e-3
     fourth = found.correlation_by_group["4"]
-    assert fourth["degrees_of_freedom"] == 3
+    assert fourth.degrees_of_freedom == 3
     runs = load_identification(campaigns, "five-days", "samba", 1)
     values = np.array([one.estimate for one in runs.runs if one.run in (13, 14, 15, 16)])
-    assert found["parameter_order"] == list(runs.parameters)
-    assert fourth["correlation"] == pytest.approx(np.corrcoef(values.T), abs=1e-9)
-    assert len(found["coordinates"]["u_by_day_um"]["4"]) == 186
-    bins = found["coordinates"]["histograms"]["anova"]
-    assert sum(bins["counts"]) == found["coordinates"]["n"] == 186
-    assert bins["counts"][0] > 5 * bins["expected"]
+    assert found.parameter_order == tuple(runs.parameters)
+    assert fourth.correlation == pytest.approx(np.corrcoef(values.T), abs=1e-9)
+    assert len(found.coordinates.u_by_day_um["4"]) == 186
+    bins = found.coordinates.histograms["anova"]
+    assert sum(bins.counts) == found.coordinates.n == 186
+    assert bins.counts[0] > 5 * bins.expected
 
 
 def test_the_reset_of_the_b_axis_is_found_by_its_date(campaigns: Database) -> None:

@@ -25,8 +25,9 @@ from monitor.workflow.model.change import add_effect, version_with
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.model.show import list_all_models
 from monitor.workflow.run_statistics.columns import run_columns
+from monitor.workflow.run_statistics.coordinates import coordinates
 from monitor.workflow.run_statistics.request import StatisticsRequest
-from monitor.workflow.run_statistics.statistics import coordinates, stats
+from monitor.workflow.run_statistics.statistics import stats
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 

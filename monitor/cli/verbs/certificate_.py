@@ -108,7 +108,7 @@ def options(parser: ArgumentParser) -> None:
         ),
     )
     withdrawn.add_argument("number", metavar="NUMBER")
-    withdrawn.add_argument("--reason", required=True)
+    withdrawn.add_argument("--reason", required=True, help="why it is withdrawn")
     withdrawn.set_defaults(run=_withdraw)
     for verb in (issued, shown, verified, amended, withdrawn):
         common(verb)

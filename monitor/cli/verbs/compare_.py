@@ -25,7 +25,11 @@ EXAMPLE = "monitor compare hidden-reversal-x --figures figures"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN")
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw where the model fails")
 
 

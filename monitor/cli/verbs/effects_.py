@@ -58,7 +58,10 @@ def run(options: Namespace) -> int:
             f"no effect says '{options.text}'; try another word, such as backlash, thermal, worm or guideway"
         )
         return 0
-    rows = [[effect.effect, effect.unit, effect.meaning, effect.cause] for effect in answer.effects]
+    rows = [
+        [effect.effect, effect.unit, effect.description.meaning, effect.description.cause]
+        for effect in answer.effects
+    ]
     output.table(
         f"{len(rows)} effects of {answer.campaign or answer.topology}",
         ["effect", "unit", "what it is", "usual cause"],

@@ -17,7 +17,11 @@ EXAMPLE = "monitor explain hidden-spindle-growth --figures figures"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN")
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument(
         "--rate", type=float, default=RATE, metavar="Q", help=f"false discovery rate (default {RATE:g})"
     )

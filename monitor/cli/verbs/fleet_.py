@@ -21,7 +21,11 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--top", type=int, default=20, metavar="N", help="rows of the table (default 20; 0: all)"
     )
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
 
 
 def run(options: Namespace) -> int:

@@ -21,7 +21,11 @@ def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN")
     parser.add_argument("--run", type=int, metavar="N", dest="number", help="the run (default: the last)")
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument(
         "--points", type=int, default=POINTS, metavar="N", help=f"points along each axis (default {POINTS})"
     )

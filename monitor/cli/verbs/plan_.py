@@ -21,7 +21,11 @@ EXAMPLE = "monitor plan five-days --balls 4 --poses 10 --separate EBZ:poly2,EZZ:
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("campaign", metavar="CAMPAIGN", help="whose machine, artefact and plan are the start")
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument(
         "--balls", type=int, metavar="N", help="the best N balls (1 to 24; places for more are proposed)"
     )

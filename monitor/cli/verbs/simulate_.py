@@ -31,7 +31,7 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--robot", action="store_true", help="a robot seen by a tracker instead of a machine tool"
     )
-    parser.add_argument("--seed", type=int, default=1, metavar="S")
+    parser.add_argument("--seed", type=int, default=1, metavar="S", help="seed of the noise (default 1)")
 
 
 def run(options: Namespace) -> int:

@@ -29,7 +29,11 @@ def options(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--where", metavar="CONDITION", help="only runs for which it holds")
     parser.add_argument("--select", metavar="NAME", help="only the runs of this stored selection")
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument(
         "--matrices", type=Path, metavar="DIR", help="write covariance and correlation matrices as CSV files"
     )

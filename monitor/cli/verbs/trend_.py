@@ -41,7 +41,11 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--campaign", action="append", default=[], metavar="NAME", help="only this campaign (may be repeated)"
     )
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw every parameter over the dates")
 
 

@@ -33,7 +33,11 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-p", type=float, default=0.95, metavar="P", help="coverage probability (default 0.95)"
     )
-    parser.add_argument("--model", metavar="NAME")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
     parser.add_argument(
         "--select", metavar="NAME",
         help="covariance of the readings from the runs of this selection, or of a campaign of the same plan",

@@ -32,7 +32,7 @@ def _families(others: Sequence[CurveCandidate], together: Sequence[CurveCandidat
 
 @dataclass(frozen=True)
 class NoiseEvidence:
-    """p-values of effects of a scene, each computed once."""
+    """The p-values of effects of a scene, each computed once."""
 
     scene: CurveScene
     _p_values: dict[Families, float] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class NoiseEvidence:
         return fit.problem.curve.measured[rows], columns[rows]
 
     def p_value(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> float:
-        """p-value in correlated noise, the search paid for."""
+        """Return p-value in correlated noise, the search paid for."""
         key = _families(others, [candidate])
         if key not in self._p_values:
             y, x = self.design(others)
@@ -58,14 +58,14 @@ class NoiseEvidence:
         return self._p_values[key]
 
     def p_value_in_white_noise(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> float:
-        """p-value in independent noise, the search paid for."""
+        """Return p-value in independent noise, the search paid for."""
         y, x = self.design(others)
         (columns,) = self._columns([candidate])
         p = p_value_in_noise(y, x, columns[self.scene.curve.problem.order], white=True)
         return p * candidate.variant.tries
 
     def odds(self, others: Sequence[CurveCandidate], together: Sequence[CurveCandidate]) -> float:
-        """p-value of noise alone against effects together beside others, their search paid for."""
+        """Return p-value of noise alone against effects together beside others, their search paid for."""
         key = _families(others, together)
         if key not in self._odds:
             y, x = self.design(others)

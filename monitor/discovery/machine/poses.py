@@ -42,7 +42,7 @@ def p_value_by_poses(
     others: Sequence[ChainCandidate],
     pose: npt.NDArray[np.int64],
 ) -> float:
-    """p-value of an effect beside others with every pose as one observation, what was searched paid for."""
+    """Return p-value of an effect beside others with every pose as one observation, what was searched paid for."""
     basis = orthonormal(scene.columns(others))
     residual = without(basis, scene.residual[:, None])[:, 0]
     columns = orthonormal(without(basis, candidate.columns))

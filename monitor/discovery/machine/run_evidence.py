@@ -61,7 +61,7 @@ def weigh_in_each_run(
 def p_value_against_runs(
     candidate: ChainCandidate, scene: ChainScene, others: Sequence[ChainCandidate]
 ) -> float:
-    """p-value of an effect's common size against how its size scatters from run to run, given others.
+    """Return p-value of an effect's common size against how its size scatters from run to run, given others.
 
     Where the sizes of the runs scatter no more than noise does, the noise is the better yardstick: 0. Else each
     run is one observation, however many probings it has; with one run there is no such scatter: 0.

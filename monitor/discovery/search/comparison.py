@@ -100,7 +100,7 @@ def lack_of_fit_test(
 
 
 def excess_p_value(chi_square: float, degrees_of_freedom: int) -> float:
-    """p-value of a sum of squares in stated standard uncertainties."""
+    """Return p-value of a sum of squares in stated standard uncertainties."""
     return float(special.chdtrc(degrees_of_freedom, chi_square))
 
 

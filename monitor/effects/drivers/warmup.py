@@ -21,7 +21,7 @@ TYPICAL_TIME_CONSTANT_S = 3600.0
 
 @dataclass(frozen=True)
 class WarmUp(HeatDriver):
-    """1 - exp(-t / tau), t since the first run of the day began."""
+    """The driver 1 - exp(-t / tau), t since the first run of the day began."""
 
     time_constant_s: float | None = None
     pattern: ClassVar[str] = r"warmup(?:(?P<minutes>\d+(?:\.\d+)?)min)?"

@@ -39,7 +39,7 @@ def solve(columns: Array, y: Array) -> tuple[Array, int, Array]:
 
 
 def inverse_normal(columns: Array) -> Array:
-    """(X'X)^-1 of columns (n, k), by a pseudo-inverse of the scaled columns."""
+    """Return (X'X)^-1 of columns (n, k), by a pseudo-inverse of the scaled columns."""
     scale = np.linalg.norm(columns, axis=0)
     scale[scale == 0] = 1.0
     inverse = np.linalg.pinv(columns / scale, rcond=RANK_TOLERANCE)

@@ -118,9 +118,9 @@ def _results(parent: ET.Element, record: CertificateRecord, evaluation: str, tex
     say(method, "description", explanation, texts.language)
     conditions = add(parent, "influenceConditions")
     for condition in record.conditions or ():
-        one = add(conditions, "influenceCondition")
-        say(one, "name", condition.name, texts.language)
-        say(add(one, "data"), "text", str(condition.value), texts.language)
+        element = add(conditions, "influenceCondition")
+        say(element, "name", condition.name, texts.language)
+        say(add(element, "data"), "text", str(condition.value), texts.language)
     return add(parent, "results")
 
 

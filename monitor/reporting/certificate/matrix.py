@@ -55,8 +55,8 @@ def correlation_blocks(
     heads = tuple(str(index + 1) for index in range(len(names))) if numbered else names
     sides = tuple(_side(name, index) for index, name in enumerate(names)) if numbered else names
     pitch = _NUMBERED_MM if numbered else _NAMED_MM
-    left = max((in_mm(column, _POINTS) for column in sides), default=0.0) + 2.0
-    across = max(1, int((PAGE_WIDTH_MM - left) / pitch))
+    left_mm = max((in_mm(column, _POINTS) for column in sides), default=0.0) + 2.0
+    across = max(1, int((PAGE_WIDTH_MM - left_mm) / pitch))
     blocks = []
     for start in range(0, len(names), across):
         columns = range(start, min(start + across, len(names)))
@@ -76,7 +76,7 @@ def correlation_blocks(
                         + _spaced([_signed(column, texts.decimal_sign) for column in values], pitch)
                         for row, values in zip(rows, coefficients, strict=True)
                     ),
-                    left_mm=left,
+                    left_mm=left_mm,
                     shades=_shades(coefficients, pitch, title),
                     title=title,
                 )
@@ -97,14 +97,14 @@ def _signed(coefficient: float, decimal_sign: str) -> str:
     return written if written.startswith(MINUS) else "\N{FIGURE SPACE}\N{THIN SPACE}" + written
 
 
-def _spaced(words: list[str], pitch: float, *, middle: bool = False) -> str:
-    """Words at equal distances, by spaces between them; with ``middle`` in the middle of a coefficient's width."""
+def _spaced(entries: list[str], pitch: float, *, middle: bool = False) -> str:
+    """Entries at equal distances, by spaces between them; with ``middle`` in the middle of a coefficient's width."""
     wide = pitch / (_POINTS * MILLIMETRES_A_POINT) * units_an_em()
     room = in_units("\N{FIGURE SPACE}\N{THIN SPACE}0.00")
     line, at = "", 0
-    for index, word in enumerate(words):
-        begin = index * wide + (max(0.0, (room - in_units(word)) / 2.0) if middle else 0.0)
-        more = _space(begin - at, least=index > 0) + word
+    for index, entry in enumerate(entries):
+        begin = index * wide + (max(0.0, (room - in_units(entry)) / 2.0) if middle else 0.0)
+        more = _space(begin - at, least=index > 0) + entry
         line += more
         at += in_units(more)
     return line

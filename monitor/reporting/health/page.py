@@ -13,6 +13,7 @@ from monitor.reporting.health.records import (
     ALARMS,
     STATES,
     Change,
+    ConditionRange,
     Fleet,
     FleetRow,
     MachineHealth,
@@ -22,10 +23,7 @@ from monitor.reporting.health.records import (
 )
 from monitor.reporting.health.refusals import PrintedRefusal, printed_refusal
 from monitor.reporting.health.words import day, in_words, micrometres, p_in_words, percent, plain
-from monitor.reporting.numbers import (
-    round_result,
-    written,
-)
+from monitor.reporting.numbers import round_result, written
 from monitor.reporting.svg.sparkline import sparkline
 
 #: Signs before a state: they tell the states apart without colour.
@@ -115,11 +113,11 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         "ended": fleet.ended,
         "lines": [_line(row) for row in fleet.rows],
         "legend": [
-            (SIGNS[state], state, words)
-            for state, words in STATES.items()
+            (SIGNS[state], state, meaning)
+            for state, meaning in STATES.items()
             if state in {row.state for row in fleet.rows}
         ],
-        "imports": [printed_refusal(one) for one in fleet.refused_imports],
+        "imports": [printed_refusal(refusal) for refusal in fleet.refused_imports],
         "alarms": sum(row.state in ALARMS for row in fleet.rows),
         "measured": sum(row.state != "not measured" for row in fleet.rows),
     }
@@ -139,29 +137,28 @@ def _page(health: MachineHealth) -> PrintedMachine:
         health=health,
         head=_line(fleet_row(health)),
         meaning=STATES[health.state],
-        lines=tuple(_parameter(one) for one in health.parameters),
+        lines=tuple(_parameter(parameter) for parameter in health.parameters),
         no_trend=(
             ""
-            if any(one.drift for one in health.parameters)
+            if any(parameter.drift for parameter in health.parameters)
             else "No trend a year: the history is too short for one."
         ),
-        changes=tuple((_span(one), _sentence(one), one.this_week) for one in shown),
+        changes=tuple((_span(change), _sentence(change), change.this_week) for change in shown),
         more_changes=len(health.changes) - len(shown),
-        conditions=tuple(
-            (
-                one.name,
-                f"{plain(one.lowest)} to {plain(one.highest)}, mean {plain(one.mean)} {one.unit}".strip(),
-            )
-            for one in health.conditions
-        ),
+        conditions=tuple((condition.name, _range(condition)) for condition in health.conditions),
         fit=_fit(health),
         map=_map(health.map),
         map_picture=map_picture(health.map),
         blind=", ".join(blind[:_BLIND_SHOWN]) + more if blind else "",
         refused=health.quality.refused,
-        imports=tuple(printed_refusal(one) for one in health.quality.refused_imports),
+        imports=tuple(printed_refusal(refusal) for refusal in health.quality.refused_imports),
         pictures=printed_pictures(health.model),
     )
+
+
+def _range(condition: ConditionRange) -> str:
+    lowest, highest, mean = plain(condition.lowest), plain(condition.highest), plain(condition.mean)
+    return f"{lowest} to {highest}, mean {mean} {condition.unit}".strip()
 
 
 def _line(row: FleetRow) -> FleetLine:
@@ -179,40 +176,40 @@ def _line(row: FleetRow) -> FleetLine:
     )
 
 
-def _parameter(one: ParameterHealth) -> ParameterLine:
-    rounded = round_result(one.estimate, one.expanded)
-    factor = one.expanded / one.u
-    drift = _drift(one)
+def _parameter(parameter: ParameterHealth) -> ParameterLine:
+    rounded = round_result(parameter.estimate, parameter.expanded)
+    factor = parameter.expanded / parameter.u
+    drift = _drift(parameter)
     return ParameterLine(
-        name=one.name,
-        description=one.description,
+        name=parameter.name,
+        description=parameter.description,
         estimate=written(rounded.estimate),
         expanded=written(rounded.uncertainty),
-        tolerance="" if one.tolerance is None else "± " + plain(one.tolerance),
-        out="" if one.probability_out is None else percent(one.probability_out),
-        beyond=one.tolerance is not None and abs(one.estimate) > one.tolerance,
+        tolerance="" if parameter.tolerance is None else "± " + plain(parameter.tolerance),
+        out="" if parameter.probability_out is None else percent(parameter.probability_out),
+        beyond=parameter.tolerance is not None and abs(parameter.estimate) > parameter.tolerance,
         drift=drift,
-        drifts=one.drift is not None and one.drift.p_value < _DRIFT_P,
-        unit=one.unit,
-        picture=sparkline(one, factor),
+        drifts=parameter.drift is not None and parameter.drift.p_value < _DRIFT_P,
+        unit=parameter.unit,
+        picture=sparkline(parameter, factor),
     )
 
 
-def _drift(one: ParameterHealth) -> str:
+def _drift(parameter: ParameterHealth) -> str:
     """The drift a year with its interval, and when the tolerance is reached where there is a sign of it."""
-    if one.drift is None:
+    if parameter.drift is None:
         return ""
-    u = one.drift.u_per_year
+    u = parameter.drift.u_per_year
     slope, low, high = (
-        in_words(value, u, sign=True)[0] for value in (one.drift.per_year, *one.drift.between)
+        in_words(value, u, sign=True)[0] for value in (parameter.drift.per_year, *parameter.drift.between)
     )
-    words = f"{slope} ({low} to {high}) {one.unit}/year"
-    if one.drift.crosses_at is not None:
-        first, last = one.drift.crosses_between
+    sentence = f"{slope} ({low} to {high}) {parameter.unit}/year"
+    if parameter.drift.crosses_at is not None:
+        first, last = parameter.drift.crosses_between
         when = f" ({first} at the earliest)" if first else ""
         when = f" ({first} to {last})" if first and last else when
-        words += f"; tolerance reached about {one.drift.crosses_at}{when}"
-    return words
+        sentence += f"; tolerance reached about {parameter.drift.crosses_at}{when}"
+    return sentence
 
 
 def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
@@ -228,18 +225,23 @@ def _fit(health: MachineHealth) -> tuple[tuple[str, str], ...]:
     return tuple(lines)
 
 
-def _map(found: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
-    if found is None:
+def _map(error_map: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
+    if error_map is None:
         return ()
-    worst = round_result(found.worst_um, found.expanded_um)
+    worst = round_result(error_map.worst_um, error_map.expanded_um)
     lines = [
-        ("worst", f"{written(worst.estimate)} µm (U = {written(worst.uncertainty)} µm) at {found.worst_at}"),
-        ("root mean square", f"{plain(float(f'{found.rms_um:.3g}'))} µm over {found.region}"),
+        (
+            "worst",
+            f"{written(worst.estimate)} µm (U = {written(worst.uncertainty)} µm) at {error_map.worst_at}",
+        ),
+        ("root mean square", f"{plain(float(f'{error_map.rms_um:.3g}'))} µm over {error_map.region}"),
     ]
-    by = sorted(found.by_pose, key=lambda one: -one.worst_um)[:_POSES_SHOWN]
-    if by:
-        words = "; ".join(f"{one.pose}: {one.worst_um:.1f} µm ({one.rms_um:.1f} µm)" for one in by)
-        lines.append(("by pose", f"at most (rms) {words}"))
+    worst_poses = sorted(error_map.by_pose, key=lambda pose: -pose.worst_um)[:_POSES_SHOWN]
+    if worst_poses:
+        poses = "; ".join(
+            f"{pose.pose}: {pose.worst_um:.1f} µm ({pose.rms_um:.1f} µm)" for pose in worst_poses
+        )
+        lines.append(("by pose", f"at most (rms) {poses}"))
     return tuple(lines)
 
 

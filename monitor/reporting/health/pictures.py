@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,23 +54,23 @@ def printed_pictures(model: ModelHealth | None) -> PrintedPictures:
     return PrintedPictures(where, against, against_says, steps, steps_say)
 
 
-def map_picture(found: VolumetricMap | None) -> Markup:
+def map_picture(error_map: VolumetricMap | None) -> Markup:
     """The volumetric error in three slices, in the greys of a certificate; empty where there is nothing to draw."""
-    if found is None or not found.slices:
+    if error_map is None or not error_map.slices:
         return Markup()
     title = "Volumetric error over the workspace in three slices"
-    return Markup(map_drawing(found.slices, title=title, scale_words="length of the error / µm").svg())
+    return Markup(map_drawing(error_map.slices, title=title, scale_words="length of the error / µm").svg())
 
 
-def where_it_fails(found: ResidualMap) -> str:
+def where_it_fails(residual_map: ResidualMap) -> str:
     """Residual vectors, magnified, seen along Z, Y and X; the largest tenth thick and in the accent colour."""
-    place, size = np.array(found.place_mm), np.array(found.residual_um)
-    view = view_of(place, size)
+    position, residual = np.array(residual_map.place_mm), np.array(residual_map.residual_um)
+    view = view_of(position, residual)
     on = Drawing(WIDTH_MM, 63.0, "Mean residual vectors over the workspace, seen along Z, Y and X")
     side, gap = 465.0, 112.0
-    for place_of, (across, up) in enumerate(((0, 1), (0, 2), (1, 2))):
+    for index, (across, up) in enumerate(((0, 1), (0, 2), (1, 2))):
         panel = Panel(
-            88.0 + place_of * (side + gap), 34.0, side, side,
+            88.0 + index * (side + gap), 34.0, side, side,
             (view.middle[across] - view.reach, view.middle[across] + view.reach),
             (view.middle[up] - view.reach, view.middle[up] + view.reach),
         )  # fmt: skip
@@ -77,14 +78,14 @@ def where_it_fails(found: ResidualMap) -> str:
         on.text(panel.left, panel.top - 10, f"{'XYZ'[across]}{'XYZ'[up]}", bold=True)
         for large, colour, width in ((False, BLUE, 2.6), (True, ORANGE, 5.0)):
             shafts, heads = [], []
-            for at, vector in zip(place[view.large == large], size[view.large == large], strict=True):
+            for at, vector in zip(position[view.large == large], residual[view.large == large], strict=True):
                 end = at + vector * 1e-3 * view.magnify
                 x1, y1, x2, y2 = panel.x(at[across]), panel.y(at[up]), panel.x(end[across]), panel.y(end[up])
                 shafts.append(f"M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}")
                 heads.append(arrow_head(x1, y1, x2, y2, _HEAD * (1.3 if large else 1.0)))
             on.path("".join(shafts), stroke=colour, width=width)
             on.path("".join(heads), fill=colour)
-        if place_of == 0:
+        if index == 0:
             length = side * view.key * 1e-3 * view.magnify / (2.0 * view.reach)
             x, y = panel.left + 14.0, panel.top + side - 16.0
             on.line(x, y, x + length, y, INK, 7)
@@ -98,87 +99,117 @@ def where_it_fails(found: ResidualMap) -> str:
     return on.svg()
 
 
-def against_driver(found: ResidualAgainst) -> str:
+@dataclass(frozen=True)
+class _Means:
+    """Means of groups as points (x, y, u) of the picture, in one colour and with one sign."""
+
+    points: tuple[tuple[float, float, float], ...]
+    colour: str
+    sign: Callable[[float, float, float], str]
+    name: str
+
+
+def against_driver(residual: ResidualAgainst) -> str:
     """The residual against what drives it: means of groups before (circles) and after (squares), points in grey."""
-    on = Drawing(LEFT_MM, 58.0, f"Residual along {found.along} against {found.driver}")
-    known = [one for one in found.groups if one.after_um is not None]
-    x = np.array([*found.at, *(one.at for one in found.groups)])
-    edge = 0.05 * float(np.ptp(x)) or 1.0
-    # The scale is that of the means; points far from them are left out of the picture.
-    y = np.concatenate(
-        [
-            np.quantile(found.before_um, [0.15, 0.85]) if found.before_um else [],
-            [one.before_um + sign * 1.3 * one.u_before_um for one in found.groups for sign in (-1, 1)],
-            [one.after_um for one in known if one.after_um is not None],
-            [0.0],
-        ]
-    )
-    span = 0.08 * float(np.ptp(y)) or 1.0
+    on = Drawing(LEFT_MM, 58.0, f"Residual along {residual.along} against {residual.driver}")
+    drivers = [*residual.at, *(group.at for group in residual.groups)]
     panel = Panel(
         88.0, 40.0, LEFT_MM * SCALE - 100.0, 430.0,
-        (float(x.min()) - edge, float(x.max()) + edge), (float(y.min()) - span, float(y.max()) + span),
+        _with_margin(drivers, 0.05), _with_margin(_means_and_bars(residual), 0.08),
     )  # fmt: skip
-    directions = (
-        {-1.0: "towards \N{MINUS SIGN}", 1.0: "towards +"} if set(x.tolist()) == {-1.0, 1.0} else None
-    )
-    panel.frame(on, found.driver, "residual / µm", named=directions)
+    directions = {-1.0: "towards \N{MINUS SIGN}", 1.0: "towards +"} if set(drivers) == {-1.0, 1.0} else None
+    panel.frame(on, residual.driver, "residual / µm", named=directions)
     low, high = panel.up
-    points = [(a, b) for a, b in zip(found.at, found.before_um, strict=True) if low <= b <= high]
-    on.path("".join(_square(panel.x(a), panel.y(b), 2.6) for a, b in points), fill=PALE)
-    # The x of the second series is moved a little where groups are few, so that both are seen.
-    shift = 0.012 * panel.width if len(found.groups) <= 8 else 0.0
-    before = [(panel.x(one.at) - shift, one.before_um, one.u_before_um) for one in found.groups]
-    after = [(panel.x(one.at) + shift, one.after_um or 0.0, one.u_after_um or 0.0) for one in known]
-    for series, colour, sign in ((before, ORANGE, _circle), (after, BLUE, _square)):
-        if not series:
-            continue
-        bars = "".join(f"M{a:.1f} {panel.y(b - u):.1f}L{a:.1f} {panel.y(b + u):.1f}" for a, b, u in series)
-        on.path("M" + "L".join(f"{a:.1f} {panel.y(b):.1f}" for a, b, _ in series), stroke=colour, width=3.2)
-        on.path(bars, stroke=colour, width=3.2)
-        on.path(
-            "".join(sign(a, panel.y(b), _SIGN) for a, b, _ in series), fill=colour, stroke="white", width=1.5
-        )
-    at = panel.left + 6
-    on.path(_circle(at, 16, _SIGN), fill=ORANGE)
-    on.text(at + 16, 24, "as the model is", bold=True, colour=ORANGE)
-    if after:
-        at += 330
-        on.path(_square(at, 16, _SIGN), fill=BLUE)
-        on.text(at + 16, 24, "with what is missing added", bold=True, colour=BLUE)
+    points = [
+        (at, size) for at, size in zip(residual.at, residual.before_um, strict=True) if low <= size <= high
+    ]
+    on.path("".join(_square(panel.x(at), panel.y(size), 2.6) for at, size in points), fill=PALE)
+    series = _series(residual, panel)
+    for means in series:
+        _draw_means(on, panel, means)
+    for index, means in enumerate(series):
+        x = panel.left + 6 + 330 * index
+        on.path(means.sign(x, 16, _SIGN), fill=means.colour)
+        on.text(x + 16, 24, means.name, bold=True, colour=means.colour)
     return on.svg()
 
 
-def error_steps(found: ModelHealth) -> str:
+def _means_and_bars(residual: ResidualAgainst) -> list[float]:
+    """What the scale has to hold: the means with their bars and zero; points far from them are left out."""
+    return [
+        *(np.quantile(residual.before_um, [0.15, 0.85]) if residual.before_um else []),
+        *(group.before_um + sign * 1.3 * group.u_before_um for group in residual.groups for sign in (-1, 1)),
+        *(group.after_um for group in residual.groups if group.after_um is not None),
+        0.0,
+    ]
+
+
+def _with_margin(values: Sequence[float], share: float) -> tuple[float, float]:
+    """The range of values, widened at both ends by a share of it."""
+    margin = share * float(np.ptp(values)) or 1.0
+    return float(np.min(values)) - margin, float(np.max(values)) + margin
+
+
+def _series(residual: ResidualAgainst, panel: Panel) -> list[_Means]:
+    """The means before and, where there are some, after; moved apart where groups are few, so that both are seen."""
+    shift = 0.012 * panel.width if len(residual.groups) <= 8 else 0.0
+    before = tuple(
+        (panel.x(group.at) - shift, group.before_um, group.u_before_um) for group in residual.groups
+    )
+    after = tuple(
+        (panel.x(group.at) + shift, group.after_um, group.u_after_um or 0.0)
+        for group in residual.groups
+        if group.after_um is not None
+    )
+    series = [_Means(before, ORANGE, _circle, "as the model is")]
+    return [*series, _Means(after, BLUE, _square, "with what is missing added")] if after else series
+
+
+def _draw_means(on: Drawing, panel: Panel, means: _Means) -> None:
+    """Draw means as signs with bars of a standard uncertainty, joined by a line."""
+    if not means.points:
+        return
+    bars = "".join(f"M{x:.1f} {panel.y(y - u):.1f}L{x:.1f} {panel.y(y + u):.1f}" for x, y, u in means.points)
+    line = "M" + "L".join(f"{x:.1f} {panel.y(y):.1f}" for x, y, _ in means.points)
+    signs = "".join(means.sign(x, panel.y(y), _SIGN) for x, y, _ in means.points)
+    on.path(line, stroke=means.colour, width=3.2)
+    on.path(bars, stroke=means.colour, width=3.2)
+    on.path(signs, fill=means.colour, stroke="white", width=1.5)
+
+
+def error_steps(model: ModelHealth) -> str:
     """A row a version: the fitted error as a bar, the held-out one as a circle, the probe's statement as a line."""
-    steps = _shown(found.steps)
+    steps = _shown(model.steps)
     row = 92.0
     on = Drawing(RIGHT_MM, (64.0 + row * len(steps) + 62.0) / SCALE, "The error, model by model")
-    most = max([one.rms_um for one in steps] + [one.heldout_um or 0.0 for one in steps] + [found.stated_um])
+    most = max(
+        [step.rms_um for step in steps] + [step.heldout_um or 0.0 for step in steps] + [model.stated_um]
+    )
     panel = Panel(6.0, 40.0, RIGHT_MM * SCALE - 190.0, row * len(steps), (0.0, 1.04 * most), (0.0, 1.0))
-    for place, one in enumerate(steps):
-        top = panel.top + place * row
-        on.text(panel.left, top + 26, _fitting(one.what, RIGHT_MM * SCALE - 12.0), bold=not one.proposed)
+    for index, step in enumerate(steps):
+        top = panel.top + index * row
+        on.text(panel.left, top + 26, _fitting(step.what, RIGHT_MM * SCALE - 12.0), bold=not step.proposed)
         y = top + 36
-        end = panel.x(one.rms_um)
+        end = panel.x(step.rms_um)
         on.path(
             f"M{panel.left:g} {y:.1f}H{end:.1f}V{y + 34:.1f}H{panel.left:g}Z",
-            fill="white" if one.proposed else BLUE, stroke=BLUE, width=3,
+            fill="white" if step.proposed else BLUE, stroke=BLUE, width=3,
         )  # fmt: skip
-        held, values = end, f"{one.rms_um:.2f}"
-        if one.heldout_um is not None:
-            held = panel.x(one.heldout_um)
+        held, values = end, f"{step.rms_um:.2f}"
+        if step.heldout_um is not None:
+            held = panel.x(step.heldout_um)
             on.path(_circle(held, y + 17, _SIGN), fill="white", stroke=ORANGE, width=4)
-            values += f" ({one.heldout_um:.2f})"
-        on.text(max(end, held, panel.x(found.stated_um)) + 14, y + 26, values)
+            values += f" ({step.heldout_um:.2f})"
+        on.text(max(end, held, panel.x(model.stated_um)) + 14, y + 26, values)
     bottom = panel.top + panel.height
-    at = panel.x(found.stated_um)
+    at = panel.x(model.stated_um)
     on.line(at, panel.top - 6, at, bottom + 6, INK, 3, "10 6")
-    on.text(min(at, 400.0), panel.top - 14, f"probe's statement {found.stated_um:.2g} µm", anchor="middle")
+    on.text(min(at, 400.0), panel.top - 14, f"probe's statement {model.stated_um:.2g} µm", anchor="middle")
     on.path(f"M{panel.left:g} {bottom + 16:.1f}h22v14h-22Z", fill=BLUE)
     on.text(panel.left + 30, bottom + 32, "fitted runs, µm")
     on.path(_circle(panel.left + 250, bottom + 23, _SIGN), fill="white", stroke=ORANGE, width=4)
     on.text(panel.left + 268, bottom + 32, "(held-out runs)")
-    if any(one.proposed for one in steps):
+    if any(step.proposed for step in steps):
         on.text(panel.left, bottom + 32 + 1.25 * LETTER, "empty bar: if it is added", colour=MID)
     return on.svg()
 
@@ -188,9 +219,9 @@ def _shown(steps: tuple[ErrorStep, ...]) -> tuple[ErrorStep, ...]:
     return steps if len(steps) <= 8 else (steps[0], *steps[-7:])
 
 
-def _fitting(words: str, width: float) -> str:
+def _fitting(text: str, width: float) -> str:
     most = int(width / (WIDE * LETTER))
-    return words if len(words) <= most else words[: most - 1] + "…"
+    return text if len(text) <= most else text[: most - 1] + "…"
 
 
 def _thousands(value: float) -> str:

@@ -23,18 +23,18 @@ class PrintedRefusal:
     settled: str
 
 
-def printed_refusal(one: RefusedImport) -> PrintedRefusal:
+def printed_refusal(refusal: RefusedImport) -> PrintedRefusal:
     """The first faults in words, the others counted."""
-    shown = one.faults[:_FAULTS_SHOWN]
+    shown = refusal.faults[:_FAULTS_SHOWN]
     names = [
-        f"campaign {one.campaign}" if one.campaign else "",
-        f"machine {one.machine}" if one.machine else "",
+        f"campaign {refusal.campaign}" if refusal.campaign else "",
+        f"machine {refusal.machine}" if refusal.machine else "",
     ]
     return PrintedRefusal(
-        when=day(one.at),
-        folder=one.folder,
+        when=day(refusal.at),
+        folder=refusal.folder,
         of=", ".join(name for name in names if name),
         faults=shown,
-        more=one.fault_count - len(shown),
-        settled="" if one.imported_at is None else day(one.imported_at),
+        more=refusal.fault_count - len(shown),
+        settled="" if refusal.imported_at is None else day(refusal.imported_at),
     )

@@ -14,8 +14,8 @@ def in_words(estimate: float, uncertainty: float, *, sign: bool = False) -> tupl
     Where there is no uncertainty above zero to round to, the estimate keeps three digits and the uncertainty is 0.
     """
     if math.isfinite(uncertainty) and uncertainty > 0.0:
-        found = round_result(estimate, uncertainty)
-        texts = written(found.estimate), written(found.uncertainty)
+        rounded = round_result(estimate, uncertainty)
+        texts = written(rounded.estimate), written(rounded.uncertainty)
     else:
         texts = written(decimal_of(float(f"{estimate:.3g}"))), "0"
     return ("+" if sign and estimate >= 0.0 else "") + texts[0], texts[1]

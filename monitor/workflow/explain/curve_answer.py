@@ -8,18 +8,14 @@ import numpy as np
 
 from monitor.discovery.curve.compare import CurveComparison as Comparison
 from monitor.discovery.curve.compare import compare_curve
-from monitor.discovery.curve.explain import CurveExplanation
+from monitor.discovery.curve.explain import CurveExplanation as Explanation
 from monitor.discovery.curve.missing import CurveMissing as Missing
 from monitor.discovery.curve.quality import bic
 from monitor.discovery.search.comparison import Part
 from monitor.records import CurveCampaign
 from monitor.workflow.explain.compare_answer import CurveComparison, CurvePart
 from monitor.workflow.explain.curve_sentences import curve_sentences
-from monitor.workflow.explain.explain_answer import (
-    BadRow,
-    CurveMissing,
-    ExplainAnswer,
-)
+from monitor.workflow.explain.explain_answer import BadRow, CurveExplanation, CurveMissing
 from monitor.workflow.explain.shared_answer import (
     coefficients,
     coinciding,
@@ -84,10 +80,7 @@ def _curve_missing(curve: CurveCampaign, effect: Missing) -> CurveMissing:
         effect=effect.effect,
         certain=effect.certain,
         noise_alone_p=effect.noise_alone,
-        meaning=effect.description.meaning,
-        cause=effect.description.cause,
-        remedy=effect.description.remedy,
-        described_in=effect.description.described_in,
+        description=effect.description,
         amplitude=effect.amplitude,
         u=effect.u,
         unit=effect.units[0].name,
@@ -114,7 +107,7 @@ def _curve_missing(curve: CurveCampaign, effect: Missing) -> CurveMissing:
     )
 
 
-def curve_explanation(explanation: CurveExplanation, model: str) -> ExplainAnswer:
+def curve_explanation(explanation: Explanation, model: str) -> CurveExplanation:
     """The explanation of a curve: what a comparison says, what the model lacks, and the rows that were left out."""
     curve = explanation.first.problem.curve
     comparison = curve_comparison(compare_curve(explanation.first, lacks=bool(explanation.missing)), model)
@@ -138,11 +131,10 @@ def curve_explanation(explanation: CurveExplanation, model: str) -> ExplainAnswe
         for outlier in explanation.suspect
     )
     noise = curve_noise(explanation.noise, explanation.final)
-    return ExplainAnswer(
+    return CurveExplanation(
         comparison=comparison,
         missing=missing,
         suspect_data=suspect_data,
-        changes=(),
         blind_spots=tuple(explanation.blind),
         not_recorded=dict(explanation.refused),
         autocorrelation_after=noise,

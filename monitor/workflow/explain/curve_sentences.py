@@ -54,7 +54,7 @@ def _missing_sentences(missing: Sequence[CurveMissing]) -> list[str]:
     certain = [effect for effect in missing if effect.certain]
     likely = [effect for effect in missing if not effect.certain]
     if certain:
-        sentences.append(f"The model lacks {certain[0].effect}: {certain[0].meaning}.")
+        sentences.append(f"The model lacks {certain[0].effect}: {certain[0].description.meaning}.")
         if len(certain) > 1:
             sentences.append(f"After that {', then '.join(effect.effect for effect in certain[1:])}.")
     if likely:
@@ -68,7 +68,7 @@ def _missing_sentences(missing: Sequence[CurveMissing]) -> list[str]:
 def _likely(likely: Sequence[CurveMissing], more: bool) -> str:
     """What is said of effects that noise alone might bring forth; ``more`` beside others that are certain."""
     doubt = max(effect.noise_alone_p for effect in likely)
-    names = likely[0].effect + (f": {likely[0].meaning}" if not more else "")
+    names = likely[0].effect + (f": {likely[0].description.meaning}" if not more else "")
     names += "".join(f", then {effect.effect}" for effect in likely[1:])
     return (
         f"{'Also likely' if more else 'Likely'}, not certain: {names}. Noise whose neighbouring rows resemble each "

@@ -20,7 +20,7 @@ from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
-from monitor.workflow.explain.explain_answer import ExplainAnswer
+from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
 from monitor.workflow.explain.machine_answer import machine_explanation
 from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sentence
 from monitor.workflow.explain.request import RATE, ExplainRequest
@@ -71,16 +71,16 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
     """
     measured = load_measured(db, request.campaign)
     model = resolve(db, request.model, measured.method)
-    answer, draw = (
+    explanation, draw = (
         _search_curve(measured, model, request.rate)
         if isinstance(measured, CurveCampaign)
         else _search_machine(measured, model, request.rate)
     )
-    save_explanation(db, answer, measured.method, model)
-    return answer if request.figures is None else replace(answer, figures=tuple(draw(request.figures)))
+    save_explanation(db, explanation, measured.method, model)
+    return ExplainAnswer(explanation, None if request.figures is None else tuple(draw(request.figures)))
 
 
-def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[ExplainAnswer, Draw]:
+def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tuple[MachineExplanation, Draw]:
     first = first_fit(campaign, model)
     explanation = explanation_of(campaign, model, first, rate)
     answer = machine_explanation(explanation)
@@ -99,7 +99,7 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
     return answer, draw
 
 
-def _search_curve(curve: CurveCampaign, model: StoredModel, rate: float) -> tuple[ExplainAnswer, Draw]:
+def _search_curve(curve: CurveCampaign, model: StoredModel, rate: float) -> tuple[CurveExplanation, Draw]:
     explanation = explain_curve(curve_problem(curve, model), rate=rate)
 
     def draw(folder: Path) -> Sequence[str]:
@@ -112,14 +112,18 @@ def _search_curve(curve: CurveCampaign, model: StoredModel, rate: float) -> tupl
 
 
 def save_explanation(
-    db: Database, answer: ExplainAnswer, method: str, model: StoredModel, before: datetime | None = None
+    db: Database,
+    explanation: MachineExplanation | CurveExplanation,
+    method: str,
+    model: StoredModel,
+    before: datetime | None = None,
 ) -> None:
     """Store an explanation, as ``partial`` where runs from ``before`` on took no part.
 
     The seed of the search for steps is stored with that of a machine.
     """
     save_analysis(
-        db, kind_of("explanation", before), to_document(answer), method=method_of(method, before),
-        campaign=answer.comparison.campaign, model=model.name, model_version=model.version,
-        seed=None if answer.machine is None else SEED,
+        db, kind_of("explanation", before), to_document(explanation), method=method_of(method, before),
+        campaign=explanation.comparison.campaign, model=model.name, model_version=model.version,
+        seed=SEED if isinstance(explanation, MachineExplanation) else None,
     )  # fmt: skip

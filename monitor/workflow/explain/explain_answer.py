@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED, named
+from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
 from monitor.workflow.identify.answer import CurveNoise, Estimate
@@ -40,10 +41,7 @@ class MachineMissing:
 
     rank: int
     effect: str
-    meaning: str
-    cause: str
-    remedy: str
-    described_in: str
+    description: Description = field(metadata=INLINED)
     amplitude: float
     u: float
     unit: str
@@ -73,10 +71,7 @@ class CurveMissing:
     effect: str
     certain: bool
     noise_alone_p: float
-    meaning: str
-    cause: str
-    remedy: str
-    described_in: str
+    description: Description = field(metadata=INLINED)
     amplitude: float
     u: float
     unit: str
@@ -175,40 +170,50 @@ class LikelyMistake:
     rms_undone_um: float
 
 
-@dataclass(frozen=True)
-class MachineFindings:
-    """What only a machine's explanation says: ``held_out`` are the parts left out in turn for the held-out errors."""
+@dataclass(frozen=True, kw_only=True)
+class MachineExplanation:
+    """The explanation of a machine; ``answer`` is the finding in a few sentences.
 
+    ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why;
+    ``held_out`` are the parts left out in turn for the held-out errors. The residual is pictured where something is
+    missing.
+    """
+
+    comparison: MachineComparison = field(metadata=INLINED)
+    missing: tuple[MachineMissing, ...]
+    suspect_data: tuple[BadProbing, ...]
+    changes: tuple[MovedTarget | ChangedTarget | ChangedParameter, ...]
+    blind_spots: tuple[str, ...]
+    not_recorded: Mapping[str, str]
     target_word: str
     held_out: str
     likely_mistakes: tuple[LikelyMistake, ...]
     undecided: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Pictures:
-    """What the pictures of an explanation show; both None where nothing is missing."""
-
-    residual_map: ResidualMap | None = None
-    residual_against: ResidualAgainst | None = None
+    answer: str
+    residual_map: ResidualMap | None
+    residual_against: ResidualAgainst | None
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExplainAnswer:
-    """The explanation of a machine or of a curve; ``answer`` is the finding in a few sentences.
+class CurveExplanation:
+    """The explanation of a curve, as that of a machine; ``autocorrelation_after`` the missing effects are added.
 
-    ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why. A machine
-    has ``machine`` and ``pictures``, a curve the ``autocorrelation_after`` the missing effects are added.
+    ``changes`` are those between runs: a curve, which is one run, has none.
     """
 
-    comparison: CurveComparison | MachineComparison = field(metadata=INLINED)
-    missing: tuple[MachineMissing | CurveMissing, ...]
-    suspect_data: tuple[BadProbing | BadRow, ...]
-    changes: tuple[MovedTarget | ChangedTarget | ChangedParameter, ...]
+    comparison: CurveComparison = field(metadata=INLINED)
+    missing: tuple[CurveMissing, ...]
+    suspect_data: tuple[BadRow, ...]
+    changes: tuple[ChangedParameter, ...] = ()
     blind_spots: tuple[str, ...]
     not_recorded: Mapping[str, str]
-    machine: MachineFindings | None = field(default=None, metadata=INLINED)
-    autocorrelation_after: CurveNoise | None = field(default=None, metadata=OMITTED)
+    autocorrelation_after: CurveNoise
     answer: str
-    pictures: Pictures | None = field(default=None, metadata=INLINED)
+
+
+@dataclass(frozen=True)
+class ExplainAnswer:
+    """The explanation of a campaign."""
+
+    explanation: MachineExplanation | CurveExplanation = field(metadata=INLINED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

@@ -21,7 +21,7 @@ from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import Figure
 from monitor.reporting.numbers import round_result
 from monitor.units import MICROMETRE
-from monitor.workflow.explain.explain_answer import ExplainAnswer, MachineMissing
+from monitor.workflow.explain.explain_answer import MachineExplanation, MachineMissing
 from monitor.workflow.explain.residuals import drivers_followed, in_machine_frame, mean_over_runs
 from monitor.workflow.explain.residuals_against import against_effect
 from monitor.workflow.explain.shape import shape_figure
@@ -73,10 +73,10 @@ def _over_workspace(fit: Fit, positions: Array, vectors: Array, folder: Path) ->
     return save_figure(figure, folder, "residual-vectors")
 
 
-def explanation_figures(answer: ExplainAnswer, explanation: Explanation, folder: Path) -> list[str]:
+def explanation_figures(answer: MachineExplanation, explanation: Explanation, folder: Path) -> list[str]:
     """Draw what is missing: effects by evidence, the best against the measurement, the error falling."""
     make_folder(folder)
-    missing = [effect for effect in answer.missing if isinstance(effect, MachineMissing)]
+    missing = answer.missing
     if not missing:
         return []
     best = missing[0].effect

@@ -15,12 +15,10 @@ from monitor.workflow.explain.explain_answer import (
     ChangedParameter,
     ChangedTarget,
     DeviationsApart,
-    ExplainAnswer,
     LikelyMistake,
-    MachineFindings,
+    MachineExplanation,
     MachineMissing,
     MovedTarget,
-    Pictures,
 )
 from monitor.workflow.explain.machine_sentences import ONE_RUN, machine_sentences
 from monitor.workflow.explain.residuals_against import pictures_of
@@ -67,10 +65,7 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
     return MachineMissing(
         rank=effect.rank,
         effect=effect.effect,
-        meaning=effect.description.meaning,
-        cause=effect.description.cause,
-        remedy=effect.description.remedy,
-        described_in=effect.description.described_in,
+        description=effect.description,
         amplitude=unit.to_display(effect.amplitude),
         u=unit.to_display(effect.u),
         unit=unit.name,
@@ -121,12 +116,27 @@ def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | Ch
     return (*moved, *(_step(step, units) for step in explanation.steps))
 
 
-def machine_explanation(explanation: Explanation) -> ExplainAnswer:
+def machine_explanation(explanation: Explanation) -> MachineExplanation:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
     missing = tuple(_machine_missing(effect) for effect in explanation.missing)
     comparison = machine_comparison(explanation.comparison)
-    findings = MachineFindings(
+    suspect_data = tuple(
+        BadProbing(point.run, point.sequence, point.target, point.axis, um(point.size), point.p_value)
+        for point in explanation.suspect
+    )
+    changes = _changes(explanation)
+    residual_map = residual_against = None
+    # Where nothing is missing there is nothing to picture.
+    if comparison.verdict is Verdict.SOMETHING_IS_MISSING:
+        residual_map, residual_against = pictures_of(explanation, missing[0].effect if missing else None)
+    return MachineExplanation(
+        comparison=comparison,
+        missing=missing,
+        suspect_data=suspect_data,
+        changes=changes,
+        blind_spots=tuple(explanation.blind),
+        not_recorded=dict(explanation.refused),
         target_word=problem.target_word,
         held_out="runs" if len(problem.runs) > 1 else "blocks of poses",
         likely_mistakes=tuple(
@@ -134,23 +144,7 @@ def machine_explanation(explanation: Explanation) -> ExplainAnswer:
             for mistake in explanation.mistakes
         ),
         undecided=(ONE_RUN,) if len(problem.runs) == 1 else (),
-    )
-    suspect_data = tuple(
-        BadProbing(point.run, point.sequence, point.target, point.axis, um(point.size), point.p_value)
-        for point in explanation.suspect
-    )
-    changes = _changes(explanation)
-    return ExplainAnswer(
-        comparison=comparison,
-        missing=missing,
-        suspect_data=suspect_data,
-        changes=changes,
-        blind_spots=tuple(explanation.blind),
-        not_recorded=dict(explanation.refused),
-        machine=findings,
         answer=machine_sentences(explanation, comparison.verdict, missing, len(suspect_data), changes),
-        # Where nothing is missing there is nothing to picture.
-        pictures=pictures_of(explanation, missing[0].effect if missing else None)
-        if comparison.verdict is Verdict.SOMETHING_IS_MISSING
-        else Pictures(),
+        residual_map=residual_map,
+        residual_against=residual_against,
     )

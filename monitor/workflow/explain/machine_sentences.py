@@ -68,7 +68,7 @@ def _missing_sentences(missing: Sequence[MachineMissing], verdict: Verdict) -> l
             else "Nothing is missing that this plan can see."
         ]
     first = missing[0]
-    sentences = [f"The model lacks {first.effect}: {first.meaning}."]
+    sentences = [f"The model lacks {first.effect}: {first.description.meaning}."]
     if first.varies_from_run_to_run:
         sentences.append("It varies from run to run and no recorded column follows it.")
     if first.indistinguishable_from:

@@ -16,7 +16,6 @@ from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.reporting.health.comparison import GroupMean, ResidualAgainst, ResidualMap
 from monitor.units import COLUMN_UNITS, MICROMETRE, MINUTE
-from monitor.workflow.explain.explain_answer import Pictures
 from monitor.workflow.explain.residuals import drivers_followed, in_machine_frame, mean_over_runs
 
 #: Up to so many different values of a driver are groups of their own; of more, parts of equal width are made.
@@ -171,7 +170,9 @@ def _followed(driver: Array, residual: Array) -> float:
     return float(np.sum(count * means**2) - len(count) * np.var(residual))
 
 
-def pictures_of(explanation: Explanation, effect: str | None) -> Pictures:
+def pictures_of(
+    explanation: Explanation, effect: str | None
+) -> tuple[ResidualMap | None, ResidualAgainst | None]:
     """What the pictures of an explanation show: the mean residual over the workspace, and the residual against what
     drives the missing ``effect``, or where none is named against what it follows most."""
     fit, vectors = explanation.final, explanation.comparison.vectors
@@ -184,7 +185,7 @@ def pictures_of(explanation: Explanation, effect: str | None) -> Pictures:
     if against is None and in_space:
         name, values, axis, residual = drivers_followed(fit)[0]
         against = Against(name.replace("_", " "), axis, values, residual, None)
-    return Pictures(residual_map, None if against is None else _grouped(against))
+    return residual_map, None if against is None else _grouped(against)
 
 
 def _grouped(against: Against) -> ResidualAgainst:

@@ -21,12 +21,13 @@ from monitor.reporting.symbols import describe
 from monitor.statistics import Change as FoundChange
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
+from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
 from monitor.workflow.health.forecast import DriftForecast, stated_drift
-from monitor.workflow.health.stored import StatedUncertainty, StoredExplanation
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
+from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Judgement:
 def parameter_health(
     past: ParameterPast,
     starts: Sequence[datetime],
-    stated: StatedUncertainty,
+    stated: UncertaintyAnswer,
     judgement: Judgement,
     week: Week,
 ) -> ParameterHealth:
@@ -84,7 +85,7 @@ def moment_of(t: float, series: Series) -> datetime:
 def changes_noted(
     past: Mapping[str, ParameterPast],
     events: Sequence[MachineEvent],
-    explanation: StoredExplanation | None,
+    explanation: MachineExplanation | None,
     runs: Sequence[RecordedRun],
     week: Week,
 ) -> list[Change]:
@@ -98,7 +99,7 @@ def changes_noted(
             noted.append(Change("change", after, at, sentence, change.p_value, week.holds(at)))
     starts = {run.run: run.local_start for run in runs}
     for move in () if explanation is None else explanation.changes:
-        if move.target is not None and move.run in starts:
+        if not isinstance(move, ChangedParameter) and move.run in starts:
             sentence = f"ball {move.target} moved by {move.size:.1f} {move.unit} (run {move.run})"
             at = starts[move.run]
             noted.append(Change("change", None, at, sentence, move.p_value, week.holds(at)))
@@ -138,8 +139,8 @@ def condition_ranges(runs: Sequence[RecordedRun]) -> tuple[ConditionRange, ...]:
 def data_quality(
     db: Database,
     runs: Sequence[RecordedRun],
-    explanation: StoredExplanation | None,
-    stated: StatedUncertainty | None,
+    explanation: MachineExplanation | None,
+    stated: UncertaintyAnswer | None,
     refused_imports: tuple[RefusedImport, ...],
     remarks: Sequence[str],
 ) -> DataQuality:
@@ -155,7 +156,7 @@ def data_quality(
             f"run {point.run}, touch {point.sequence}, ball {point.target}: "
             f"{point.axis} is off by {point.size_um:.1f} µm"
             for point in explanation.suspect_data
-            if (explanation.campaign, point.run) in measured
+            if (explanation.comparison.campaign, point.run) in measured
         )
     )
     return DataQuality(

@@ -27,11 +27,12 @@ class DriftForecast:
 
     @property
     def good_for(self) -> float | None:
+        """Days that the parameter stays in tolerance, at most the horizon; None without a tolerance."""
         return None if self.ahead is None else float(min(self.ahead.recommended_interval, self.horizon))
 
 
-def drift_forecast(drift: PieceDrift, now: float, tolerance: float | None) -> DriftForecast | None:
-    """The drift since the last change, and its forecast from ``now`` on (days since 1970).
+def drift_forecast(drift: PieceDrift, last_run: float, tolerance: float | None) -> DriftForecast | None:
+    """The drift since the last change, and its forecast from ``last_run`` on (days since 1970).
 
     None with fewer than three days. Nothing is said of times further ahead than the history is long.
     """
@@ -41,7 +42,9 @@ def drift_forecast(drift: PieceDrift, now: float, tolerance: float | None) -> Dr
     if tolerance is None:
         return DriftForecast(line, span, None)
     try:
-        return DriftForecast(line, span, forecast(line, (-tolerance, tolerance), now, [], horizon=now + span))
+        return DriftForecast(
+            line, span, forecast(line, (-tolerance, tolerance), last_run, [], horizon=last_run + span)
+        )
     except (DataError, InputError):
         return None
 

@@ -121,13 +121,12 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     parameter_pasts = machine_past(history, splitting_events(past.events))
     limits = campaign_tolerances(db, last.campaign)
     judged = conformity_of(stated, limits)
-    now = days_since_1970(last.started_at)
     parameters, drifts = [], {}
     for name in () if stated is None else stated.parameters:
         if stated is None or name not in parameter_pasts:
             continue
         parameter = parameter_pasts[name]
-        drifts[name] = drift_forecast(parameter.drift, now, limits.get(name))
+        drifts[name] = drift_forecast(parameter.drift, days_since_1970(last.started_at), limits.get(name))
         starts = [
             at.replace(tzinfo=None)
             for at, has_it in zip(history.started_at, parameter.mask, strict=True)
@@ -147,7 +146,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         run=_in_words(last),
         basis="" if stated is None else stated.input_covariance, factor=factor_in_words(stated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=condition_ranges(past.runs_of_week),
-        model=model_health(explanation, results.versions or (), measured.span), quality=quality,
+        model=model_health(explanation, results.versions, measured.span), quality=quality,
         map=stated_map(results.map),
     )  # fmt: skip
 

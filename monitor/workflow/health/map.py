@@ -5,27 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from monitor.reporting.health.records import PoseError, VolumetricMap
-from monitor.workflow.health.stored import StoredMap
+from monitor.workflow.volumetric.answer import VolumetricAnswer
 
 
-def stated_map(stored: StoredMap | None) -> VolumetricMap | None:
+def stated_map(answer: VolumetricAnswer | None) -> VolumetricMap | None:
     """The map as the report states it; None where there is none."""
-    if stored is None:
+    if answer is None:
         return None
     return VolumetricMap(
-        run=stored.run,
-        region=f"{stored.region.points} points of {stored.region.from_}",
-        worst_at=_position(stored.worst.at),
-        worst_um=stored.worst.error_um,
-        expanded_um=stored.worst.expanded_um,
-        rms_um=stored.rms.error_um,
+        run=answer.run,
+        region=f"{answer.region.points} points of {answer.region.origin}",
+        worst_at=_position(answer.worst.at),
+        worst_um=answer.worst.error_um,
+        expanded_um=answer.worst.expanded_um,
+        rms_um=answer.rms.error_um,
         by_pose=tuple(
             PoseError(_position(pose.at) or "no rotary axes", pose.worst_um, pose.rms_um)
-            for pose in stored.by_pose
+            for pose in answer.by_pose
         ),
-        slices=stored.slices,
-        k=stored.k,
-        p=stored.p,
+        slices=answer.slices,
+        k=answer.k,
+        p=answer.p,
     )
 
 

@@ -7,35 +7,37 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from monitor.reporting.health.comparison import ErrorStep, MissingEffect, ModelHealth
+from monitor.workflow.explain.explain_answer import MachineExplanation
+from monitor.workflow.explain.version_answer import CurveVersion, HistoryAnswer, MachineVersion
 from monitor.workflow.health.runs import Span
-from monitor.workflow.health.stored import StoredExplanation, VersionError
 
 
 def model_health(
-    explanation: StoredExplanation | None, versions: Sequence[VersionError], span: Span
+    explanation: MachineExplanation | None, versions: HistoryAnswer | None, span: Span
 ) -> ModelHealth | None:
     """The comparison, which is of the runs of ``span``: their number and days are said with it.
 
-    ``versions`` of the model are empty where there is one only.
+    ``versions`` of the model are None where there is one only.
     """
     if explanation is None:
         return None
+    comparison = explanation.comparison
     return ModelHealth(
-        campaign=explanation.campaign,
-        runs=_runs_in_words(explanation.campaign, span),
-        model=explanation.model,
-        verdict=explanation.verdict,
+        campaign=comparison.campaign,
+        runs=_runs_in_words(comparison.campaign, span),
+        model=comparison.model,
+        verdict=comparison.verdict.value,
         answer=explanation.answer,
-        rms_um=explanation.rms_um,
-        repeatability_um=_finite(explanation.repeatability_um),
-        lack_of_fit_f=_finite(explanation.lack_of_fit.f),
-        lack_of_fit_p=_finite(explanation.lack_of_fit.p),
+        rms_um=comparison.rms_um,
+        repeatability_um=_finite(comparison.repeatability_um),
+        lack_of_fit_f=_finite(comparison.lack_of_fit.f),
+        lack_of_fit_p=_finite(comparison.lack_of_fit.p),
         missing=tuple(
             MissingEffect(
                 effect.effect,
-                effect.meaning,
-                effect.cause,
-                effect.remedy,
+                effect.description.meaning,
+                effect.description.cause,
+                effect.description.remedy,
                 _finite(effect.peak_um),
                 _finite(effect.rms_before_um),
                 _finite(effect.rms_after_um),
@@ -43,10 +45,10 @@ def model_health(
             )
             for effect in explanation.missing
         ),
-        stated_um=explanation.stated_uncertainty_um,
+        stated_um=comparison.stated_uncertainty_um,
         where=explanation.residual_map,
         against=explanation.residual_against,
-        steps=tuple(_steps(explanation, versions)),
+        steps=tuple(_steps(explanation, () if versions is None else versions.steps)),
     )
 
 
@@ -54,22 +56,27 @@ def _finite(value: float | None) -> float | None:
     return None if value is None or not np.isfinite(value) else float(value)
 
 
-def _steps(explanation: StoredExplanation, versions: Sequence[VersionError]) -> Iterator[ErrorStep]:
+def _steps(
+    explanation: MachineExplanation, versions: Sequence[MachineVersion | CurveVersion]
+) -> Iterator[ErrorStep]:
     """The error from the method's own model on: what was added, and what adding the missing effects would give."""
     for version in versions:
         changed = [f"+ {text}" for text in (version.added or "").split(" + ") if text]
         changed += [f"\N{MINUS SIGN} {text}" for text in (version.removed or "").split(" + ") if text]
         yield ErrorStep(
             f"{version.model}: {' '.join(changed) or 'as it is'}",
-            version.rms_um,
-            version.heldout_rms_um,
+            version.rms,
+            version.heldout_rms,
             proposed=False,
         )
     missing = explanation.missing
     if missing and not versions:
         first = missing[0]
         yield ErrorStep(
-            f"{explanation.model}: as it is", first.rms_before_um, first.heldout_before_um, proposed=False
+            f"{explanation.comparison.model}: as it is",
+            first.rms_before_um,
+            first.heldout_before_um,
+            proposed=False,
         )
     for effect in missing:
         yield ErrorStep(f"+ {effect.effect}", effect.rms_after_um, effect.heldout_after_um, proposed=True)

@@ -168,31 +168,34 @@ def _write(
     db: Database, fleet: Fleet, numbers: list[int], request: ReportRequest, engine: Engine
 ) -> list[str]:
     """Write HTML and PDF, the latter in parts; the files."""
-    out = request.out
     stem = f"health-{fleet.week}"
     if request.machine is not None:
         stem += "-" + "".join(sign if sign.isalnum() or sign in "-_." else "_" for sign in request.machine)
-    page = out / f"{stem}.html"
-    parts = max(1, -(-len(numbers) // MACHINES_A_PART))
-    files = [page]
+    page = request.out / f"{stem}.html"
     try:
         with _becoming(page) as stream:
             for piece in health_html(fleet, (stored_health(db, number) for number in numbers)):
                 stream.write(piece.encode("utf-8"))
-        # Of nearly the same length, so that no worker waits for another.
-        ends = [len(numbers) * part // parts for part in range(parts + 1)]
-        tasks = (
-            (fleet, [analysis_text(db, number) for number in numbers[first:end]], part, parts)
-            for part, (first, end) in enumerate(pairwise(ends), start=1)
-        )
-        for part, pdf in enumerate(in_order(engine, _pdf, tasks), start=1):
-            path = out / (f"{stem}.pdf" if parts == 1 else f"{stem}-part-{part}-of-{parts}.pdf")
-            with _becoming(path) as stream:
-                stream.write(pdf)
-            files.append(path)
+        return [str(page), *map(str, _write_pdf(db, fleet, numbers, request.out / stem, engine))]
     except OSError as error:
-        raise InputError(f"the report cannot be written to {out}: {why_not(out, error)}") from error
-    return [str(path) for path in files]
+        raise InputError(
+            f"the report cannot be written to {request.out}: {why_not(request.out, error)}"
+        ) from error
+
+
+def _write_pdf(db: Database, fleet: Fleet, numbers: list[int], stem: Path, engine: Engine) -> Iterator[Path]:
+    """Write the parts of the PDF, of nearly the same length, so that no worker waits for another."""
+    parts = max(1, -(-len(numbers) // MACHINES_A_PART))
+    ends = [len(numbers) * part // parts for part in range(parts + 1)]
+    tasks = (
+        (fleet, [analysis_text(db, number) for number in numbers[first:end]], part, parts)
+        for part, (first, end) in enumerate(pairwise(ends), start=1)
+    )
+    for part, pdf in enumerate(in_order(engine, _pdf, tasks), start=1):
+        path = stem.with_name(f"{stem.name}.pdf" if parts == 1 else f"{stem.name}-part-{part}-of-{parts}.pdf")
+        with _becoming(path) as stream:
+            stream.write(pdf)
+        yield path
 
 
 @contextmanager

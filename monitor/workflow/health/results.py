@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import partial
 from typing import Any, TypedDict, TypeVar, Unpack
 
 from monitor.documents import from_document, to_document
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import NotFoundError, StoreError
 from monitor.records import Campaign
 from monitor.store import (
     Database,
@@ -27,31 +28,30 @@ from monitor.store import (
 )
 from monitor.workflow.campaign_parts import kind_of, method_of, runs_before
 from monitor.workflow.explain.explain import save_explanation
+from monitor.workflow.explain.explain_answer import MachineExplanation
+from monitor.workflow.explain.version_answer import HistoryAnswer
 from monitor.workflow.health.runs import Span
-from monitor.workflow.health.stored import (
-    StatedUncertainty,
-    StoredExplanation,
-    StoredMap,
-    VersionError,
-    VersionErrors,
-)
 from monitor.workflow.health.task import METHOD, Task, TaskResult, attempted
+from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.request import COVERAGE
-from monitor.workflow.uncertainty.stored import save_uncertainty
+from monitor.workflow.uncertainty.stored import restored, save_uncertainty
+from monitor.workflow.volumetric.answer import VolumetricAnswer
 from monitor.workflow.volumetric.volumetric import save_map
 
-Record = TypeVar("Record")
 Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
 class Results:
-    """What the pages of a machine say, of its last run and of its campaign; None where there is none."""
+    """The answers about a machine's last run and its campaign; None where there is none.
 
-    uncertainty: StatedUncertainty | None
-    explanation: StoredExplanation | None
-    map: StoredMap | None
-    versions: tuple[VersionError, ...] | None
+    With one version of the model only there is nothing to compare: ``versions`` then has no steps.
+    """
+
+    uncertainty: UncertaintyAnswer | None
+    explanation: MachineExplanation | None
+    map: VolumetricAnswer | None
+    versions: HistoryAnswer | None
 
     @property
     def complete(self) -> bool:
@@ -82,26 +82,31 @@ def stored_results(db: Database, week: MeasuredWeek) -> Results:
     last, model, before = week.last, week.model, week.span.before
     campaign = _Subject(campaign=last.campaign, model=model.name, model_version=model.version)
     run = _Subject(**campaign, run=last.run)
-    uncertainty = _restored(StatedUncertainty, _stored(db, "uncertainty", before, METHOD, **run), needs="guf")
+    uncertainty = _restored(restored, _stored(db, "uncertainty", before, METHOD, **run))
     # A user may have asked for another probability, or for the runs of another campaign.
-    if uncertainty is not None and (uncertainty.p != COVERAGE or uncertainty.rests_on_a_selection):
+    if uncertainty is not None and (uncertainty.p != COVERAGE or _rests_on_a_selection(uncertainty)):
         uncertainty = None
-    versions: tuple[VersionError, ...] | None = ()
-    # With one version only there is nothing to compare.
-    if model.parent is not None:
-        history = _restored(
-            VersionErrors, _stored(db, "model history", before, METHOD, **campaign), needs="steps"
-        )
-        versions = None if history is None else history.steps
     return Results(
         uncertainty,
-        # Versions before 0.1 stored no pictures with explanation and map.
         _restored(
-            StoredExplanation, _stored(db, "explanation", before, last.method, **campaign), needs="residual_map"
+            partial(from_document, MachineExplanation),
+            _stored(db, "explanation", before, last.method, **campaign),
         ),
-        _restored(StoredMap, _stored(db, "volumetric map", before, METHOD, **run), needs="slices"),
-        versions,
-    )  # fmt: skip
+        _restored(
+            partial(from_document, VolumetricAnswer), _stored(db, "volumetric map", before, METHOD, **run)
+        ),
+        HistoryAnswer(())
+        if model.parent is None
+        else _restored(
+            partial(from_document, HistoryAnswer), _stored(db, "model history", before, METHOD, **campaign)
+        ),
+    )
+
+
+def _rests_on_a_selection(answer: UncertaintyAnswer) -> bool:
+    """Whether the scatter is that of runs that a user selected, and not of the campaign's own."""
+    source = answer.input_covariance_source
+    return source is not None and source.selection is not None
 
 
 def _stored(
@@ -116,9 +121,14 @@ def _stored(
     return stored.document
 
 
-def _restored(kind: type[Record], document: Mapping[str, Any] | None, needs: str) -> Record | None:
-    """The record of a document; None where the version that stored it did not have a key yet."""
-    return None if document is None or needs not in document else from_document(kind, document)
+def _restored(
+    restore: Callable[[Mapping[str, Any]], Answer], document: Mapping[str, Any] | None
+) -> Answer | None:
+    """The answer that a document holds; None, so that it is computed anew, where another version stored other keys."""
+    try:
+        return None if document is None else restore(document)
+    except StoreError:
+        return None
 
 
 def task_of(
@@ -166,54 +176,47 @@ def stored_with(
             remarks,
         )
     uncertainty = _saved(
-        StatedUncertainty,
         computed.uncertainty,
-        lambda document: save_uncertainty(db, document, model, METHOD, before),
+        lambda answer: save_uncertainty(db, answer, model, METHOD, before),
         "the uncertainty of the last run could not be evaluated",
         remarks,
     )
     explanation = _saved(
-        StoredExplanation,
         computed.explanation,
         lambda answer: save_explanation(db, answer, week.last.method, model, before),
         "model and measurement could not be compared",
         remarks,
     )
     mapped = _saved(
-        StoredMap,
         computed.map,
-        lambda document: save_map(db, document, model, before),
+        lambda answer: save_map(db, answer, model, before),
         "the volumetric error could not be mapped",
         remarks,
     )
-    versions = stored.versions
     if computed.versions is not None:
-        document = {"steps": [to_document(step) for step in computed.versions]}
-        versions = from_document(VersionErrors, document).steps
         save_analysis(
-            db, kind_of("model history", before), document, method=method_of(METHOD, before),
+            db, kind_of("model history", before), to_document(computed.versions), method=method_of(METHOD, before),
             campaign=week.last.campaign, model=model.name, model_version=model.version,
         )  # fmt: skip
     every = Results(
-        stored.uncertainty or uncertainty, stored.explanation or explanation, stored.map or mapped, versions
+        stored.uncertainty or uncertainty,
+        stored.explanation or explanation,
+        stored.map or mapped,
+        stored.versions or computed.versions,
     )
     return every if every.uncertainty is not None else replace(every, map=None)
 
 
 def _saved(
-    kind: type[Record],
-    answer: Answer | None,
-    save: Callable[[Answer], None],
-    failure: str,
-    remarks: list[str],
-) -> Record | None:
-    """What the page reads of a computed answer, once it is stored."""
+    answer: Answer | None, save: Callable[[Answer], None], failure: str, remarks: list[str]
+) -> Answer | None:
+    """A computed answer once it is stored; None, with a remark, where it could not be."""
     if answer is None:
         return None
 
-    def saved() -> Record:
+    def saved() -> Answer:
         save(answer)
-        return from_document(kind, answer if isinstance(answer, dict) else to_document(answer))
+        return answer
 
     return attempted(saved, failure, remarks)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -20,9 +20,9 @@ from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
 from monitor.workflow.explain.explain import explanation_of
-from monitor.workflow.explain.explain_answer import ExplainAnswer
+from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.machine_answer import machine_explanation
-from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+from monitor.workflow.explain.version_answer import HistoryAnswer
 from monitor.workflow.explain.versions import error_steps
 from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
@@ -35,8 +35,6 @@ from monitor.workflow.volumetric.answer import VolumetricAnswer
 from monitor.workflow.volumetric.error_map import map_of
 from monitor.workflow.volumetric.stating import map_answer
 
-#: A result as it is stored and read again, made by the question that it answers.
-ComputedDocument = dict[str, Any]
 Result = TypeVar("Result")
 METHOD = "guf"
 
@@ -67,9 +65,9 @@ class TaskResult:
 
     identified: tuple[StoredIdentification, ...] = ()
     uncertainty: UncertaintyAnswer | None = None
-    explanation: ExplainAnswer | None = None
+    explanation: MachineExplanation | None = None
     map: VolumetricAnswer | None = None
-    versions: tuple[MachineVersion | CurveVersion, ...] | None = None
+    versions: HistoryAnswer | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -150,7 +148,7 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
         )
     if task.versions:
         versions = attempted(
-            lambda: error_steps(task.past, task.versions),
+            lambda: HistoryAnswer(error_steps(task.past, task.versions)),
             "the versions of the model could not be compared",
             remarks,
         )

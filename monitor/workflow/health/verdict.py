@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import numpy as np
 
+from monitor.discovery import Verdict
 from monitor.reporting.health.records import (
     ALARMS,
     Change,
@@ -17,9 +19,10 @@ from monitor.reporting.health.records import (
     State,
 )
 from monitor.uncertainty.conformity import conformity
+from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.health.forecast import DriftForecast
-from monitor.workflow.health.stored import StatedUncertainty, StoredExplanation
 from monitor.workflow.health.weeks import Week
+from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
 
 @dataclass(frozen=True)
@@ -31,14 +34,14 @@ class Conformity:
     every_has_one: bool
 
 
-def conformity_of(stated: StatedUncertainty | None, limits: Mapping[str, float]) -> Conformity:
+def conformity_of(stated: UncertaintyAnswer | None, limits: Mapping[str, float]) -> Conformity:
     """The parameters of a run against the limits of their absolute values."""
     if stated is None or not any(name in limits for name in stated.parameters):
         return Conformity({}, None, every_has_one=False)
     names, dof = stated.parameters, stated.guf.degrees_of_freedom
     limit = np.array([limits.get(name, np.inf) for name in names])
     result = conformity(
-        [stated.guf.estimate[name] for name in names], stated.covariance(), -limit, limit,
+        [stated.guf.estimate[name] for name in names], stated.covariance, -limit, limit,
         dof=np.inf if dof is None else dof,
     )  # fmt: skip
     single = {name: float(1.0 - p) for name, p in zip(names, result.single, strict=True) if name in limits}
@@ -46,7 +49,7 @@ def conformity_of(stated: StatedUncertainty | None, limits: Mapping[str, float])
 
 
 def changed_in_words(
-    noted: Sequence[Change], explanation: StoredExplanation | None, quality: DataQuality
+    noted: Sequence[Change], explanation: MachineExplanation | None, quality: DataQuality
 ) -> str:
     """What is new this week: changes, then events, what the model lacks, and data that never came in."""
     sentences = [
@@ -91,7 +94,7 @@ def since_when(
 def state_of(
     judged: Conformity,
     noted: Sequence[Change],
-    explanation: StoredExplanation | None,
+    explanation: MachineExplanation | None,
     quality: DataQuality,
     risk: float,
 ) -> State:
@@ -102,7 +105,7 @@ def state_of(
         return "may be out of tolerance"
     if any(change.kind == "change" and change.this_week for change in noted):
         return "changed"
-    if explanation is not None and explanation.verdict == "something is missing":
+    if explanation is not None and explanation.comparison.verdict is Verdict.SOMETHING_IS_MISSING:
         return "model fails"
     if quality.suspect:
         return "suspect data"
@@ -140,11 +143,12 @@ def next_check(
     return f"by {day}: {name} stays in tolerance with 95 % until then"
 
 
-def factor_in_words(stated: StatedUncertainty | None) -> str:
+def factor_in_words(stated: UncertaintyAnswer | None) -> str:
     """What the expanded uncertainties of the page hold for."""
     if stated is None:
         return "no uncertainty"
     k_q, dof = stated.guf.k_q_with_degrees_of_freedom, stated.guf.degrees_of_freedom
+    k_q = math.inf if k_q is None else k_q
     freedom = "" if dof is None else f", {dof:.0f} degrees of freedom"
     count, percent = len(stated.parameters), stated.p * 100
     return f"U = {k_q:.2f} u: all {count} intervals hold at once with {percent:g} %{freedom}"

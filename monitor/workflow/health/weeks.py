@@ -46,11 +46,11 @@ class Week:
 
 def week_named(text: str) -> Week:
     """The week of a name like ``2026-W10``. Raises InputError."""
-    found = re.fullmatch(r"([0-9]{4})-?W([0-9]{1,2})", text.strip().upper())
+    match = re.fullmatch(r"([0-9]{4})-?W([0-9]{1,2})", text.strip().upper())
     try:
-        if found is None or int(found[1]) > LAST_YEAR:
+        if match is None or int(match[1]) > LAST_YEAR:
             raise ValueError
-        return Week(date.fromisocalendar(int(found[1]), int(found[2]), 1))
+        return Week(date.fromisocalendar(int(match[1]), int(match[2]), 1))
     except ValueError:
         raise InputError(
             f"--week {text}: write a year and a week of it, for example 2026-W10 (weeks are W01 to W52 or W53)"

@@ -34,7 +34,7 @@ def finite(value: float) -> float | None:
 
 
 def normal_scatter(values: Array, groups: Sequence[str]) -> tuple[float | None, ...]:
-    """p-value of normal scatter within the groups, column by column (Shapiro-Francia, simulated)."""
+    """Return p-value of normal scatter within the groups, column by column (Shapiro-Francia, simulated)."""
     single = len(set(groups)) == len(groups)
     labels = None if single else np.array(groups)
     try:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from monitor.documents import OMITTED
 from monitor.records import Array
 from monitor.reporting.covariance_source import CovarianceSource
@@ -123,3 +125,9 @@ class UncertaintyAnswer:
     lack_of_fit_causes: tuple[LackOfFitCause, ...] | None = field(default=None, metadata=OMITTED)
     mcm: MonteCarloAnswer | None = field(default=None, metadata=OMITTED)
     validation: ValidationAnswer | None = field(default=None, metadata=OMITTED)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (m, m) of the parameters in products of their display units."""
+        u = np.array([self.guf.u[name] for name in self.parameters], dtype=np.float64)
+        return np.asarray(self.guf.correlation * np.outer(u, u))

@@ -71,7 +71,7 @@ class StatedUncertainty:
     @property
     def covariance(self) -> Array:
         """Covariance (m, m) in products of the display units."""
-        return np.asarray(self.answer.guf.correlation * np.outer(self.u, self.u))
+        return self.answer.covariance
 
     @property
     def k_p(self) -> float:

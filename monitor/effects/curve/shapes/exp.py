@@ -11,7 +11,7 @@ from monitor.records import Array
 
 
 class Exponential:
-    """exp(-x/constant), x from the end at which it is 1, so that nothing overflows; a negative constant grows."""
+    """The shape exp(-x/constant), x from the end at which it is 1, so that nothing overflows; negative: it grows."""
 
     def columns(self, effect: CurveEffect, inputs: Inputs, value: float | None) -> Array:
         assert value is not None

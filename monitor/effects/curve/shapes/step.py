@@ -11,7 +11,7 @@ from monitor.records import Array
 
 
 class Step:
-    """1 above a value of the input, 0 up to it."""
+    """The shape that is 1 above a value of the input, 0 up to it."""
 
     def columns(self, effect: CurveEffect, inputs: Inputs, value: float | None) -> Array:
         assert value is not None
