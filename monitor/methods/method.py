@@ -185,8 +185,11 @@ def nothing_to_refuse(campaign: Campaign, problem: ChainProblem) -> None:
 
 
 NO_REHEARSAL = Unable("there is no virtual machine for it")
-NO_STEPWISE = Unable("all unknowns are found at once")
-NO_TOUCH_PLAN = Unable("what a plan cannot tell apart, identify names with what to do")
+NO_STEPWISE = Unable("all unknowns are identified at once, so type identify without --stepwise")
+NO_TOUCH_PLAN = Unable(
+    "plan weighs touches of balls and angles of a workpiece's table; what this plan cannot tell apart, identify names "
+    "with what to do"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,7 +233,10 @@ class ChainMethod(Method):
         return identification(campaign, model, problem, solve(problem), self.advice)
 
 
-NO_MACHINE = Unable("a curve has no machine")
+NO_MACHINE = Unable(
+    "it is a curve, not a machine; it can be identified, compared and explained "
+    "(monitor identify, compare, explain, model)"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,9 +245,13 @@ class CurveMethod(Method):
 
     problem_of: CurveProblemOf
     fit: Callable[[CurveProblem], CurveFit]
-    statistics: Able | Unable = Unable("a curve is one run")
+    statistics: Able | Unable = Unable(
+        "it is a curve, not a machine: one run; identify gives the uncertainties of its coefficients"
+    )
     coordinates: Able | Unable = NO_MACHINE
-    uncertainty: Able | Unable = Unable("identify gives the uncertainties of the coefficients")
+    uncertainty: Able | Unable = Unable(
+        "it is a curve, not a machine; identify gives the uncertainties of its coefficients"
+    )
     plan: TouchPlan | AnglePlan | Unable = NO_MACHINE
     stepwise: Stepwise | Unable = NO_STEPWISE
     map: Able | Unable = NO_MACHINE

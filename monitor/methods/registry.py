@@ -53,7 +53,7 @@ def campaign_method(campaign: Campaign | CurveCampaign) -> ChainMethod | CurveMe
     return method
 
 
-def require(ability: Able | Unable, campaign: Campaign, verb: str) -> None:
+def require(ability: Able | Unable, campaign: Campaign | CurveCampaign, verb: str) -> None:
     """Raise DataError, with the reason, where the method of a campaign has no answer to a verb."""
     if isinstance(ability, Unable):
         raise DataError(

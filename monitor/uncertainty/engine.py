@@ -80,8 +80,8 @@ def in_order(
     try:
         refill()
         while in_hand:
-            one, handle = in_hand.popleft()
-            yield _result(engine, task, one, handle)
+            arguments, handle = in_hand.popleft()
+            yield _result(engine, task, arguments, handle)
             refill()
     finally:
         engine.cancel(handle for _, handle in in_hand)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from monitor.effects import Context, Effect
 from monitor.effects.effect import ChainBasis
 from monitor.machine import LOCATION, MOTION, Joint
+from monitor.methods.chain.touch import TouchProblem
 from monitor.records import Array
 from monitor.uncertainty.touched_run import TouchedRun
 
@@ -83,6 +84,17 @@ class _Step:
     reading: int = -1
     entries: tuple[tuple[int, int, Array], ...] = ()
 
+    @property
+    def axes(self) -> set[int]:
+        """The linear axes whose readings act in the step."""
+        along = {axis for _, axis, _ in self.entries}
+        return {axis for axis in (*along, self.reading) if axis >= 0}
+
+    @property
+    def turns_with_reading(self) -> bool:
+        """Whether the step is a turn whose angle follows a reading."""
+        return self.kind == TURN_ERROR and any(along >= 0 for _, along, _ in self.entries)
+
 
 def compile_program(run: TouchedRun) -> Program | None:
     """The program of a run's problem, or None where its model needs the plain way.
@@ -100,7 +112,7 @@ def _entries(run: TouchedRun) -> dict[tuple[int, int, int], list[tuple[int, int,
     """For every error term its entries: unknown, axis (-1: none) and value at every probing (n,)."""
     problem = run.problem
     context = problem.context
-    found: dict[tuple[int, int, int], list[tuple[int, int, Array]]] = {}
+    by_term: dict[tuple[int, int, int], list[tuple[int, int, Array]]] = {}
     number = 0
     for effects, first in ((problem.base, 0), (problem.added, len(problem.local_names))):
         number = first
@@ -110,18 +122,18 @@ def _entries(run: TouchedRun) -> dict[tuple[int, int, int], list[tuple[int, int,
                 return None
             columns = basis.columns
             slopes = [_slope(effect, context, int(a)) for a in run.linear]
-            entries = found.setdefault((basis.term.joint, basis.term.stage, basis.term.component), [])
+            entries = by_term.setdefault((basis.term.joint, basis.term.stage, basis.term.component), [])
             for column in range(columns.shape[1]):
                 constant = columns[:, column].copy()
-                for place, (a, slope) in enumerate(zip(run.linear, slopes, strict=True)):
+                for along, (a, slope) in enumerate(zip(run.linear, slopes, strict=True)):
                     if np.any(slope[:, column]):
                         constant -= slope[:, column] * context.positions[:, a]
-                        entries.append((number, place, slope[:, column]))
+                        entries.append((number, along, slope[:, column]))
                 constant[np.abs(constant) < 1e-9 * np.max(np.abs(columns[:, column]), initial=0.0)] = 0.0
                 if np.any(constant):
                     entries.append((number, -1, constant))
                 number += 1
-    return found
+    return by_term
 
 
 def _slope(effect: Effect, context: Context, axis: int) -> Array:
@@ -210,15 +222,8 @@ def _assemble(run: TouchedRun, steps: list[_Step]) -> Program:
     entries = [entry for step in steps for entry in step.entries]
     amounts = np.array([step.amount for step in steps]).T
     values = np.array([value for _, _, value in entries]).T.reshape(count, len(entries))
-    key = np.concatenate([amounts, values], axis=1)
-    # A turn whose angle follows a reading differs from probing to probing.
-    if any(step.kind == TURN_ERROR and along >= 0 for step in steps for _, along, _ in step.entries):
-        key = np.column_stack([key, np.arange(count)])
-    size = np.max(np.abs(key), axis=0, initial=0.0)
-    _, sample, inverse = np.unique(
-        np.round(key / np.where(size > 0.0, size, 1.0), 11), axis=0, return_index=True, return_inverse=True
-    )
-    order = np.argsort(inverse.ravel(), kind="stable")
+    sample, class_of = _classes(steps, amounts, values)
+    order = np.argsort(class_of, kind="stable")
     targets = np.searchsorted(np.array(problem.targets), problem.context.target)
     rows = np.full((count, AXES), -1, dtype=np.int64)
     rows[:, : len(run.linear)] = np.arange(count * len(run.linear)).reshape(count, -1)
@@ -240,20 +245,37 @@ def _assemble(run: TouchedRun, steps: list[_Step]) -> Program:
         begin=begin,
         end=end,
         moves=moves,
-        start=np.concatenate([[0], np.cumsum(np.bincount(inverse.ravel()))]).astype(np.int64),
+        start=np.concatenate([[0], np.cumsum(np.bincount(class_of))]).astype(np.int64),
         target=targets[order].astype(np.int64),
         row=np.ascontiguousarray(rows[order]),
         weight=np.ascontiguousarray(problem.sigma[order] ** -2.0),
         scale=scale,
-        between=np.array(
-            [[problem.targets.index(name) for name in d.between] for d in problem.distances], dtype=np.int64
-        ).reshape(-1, 2),
+        between=_ends(problem),
         length_row=count * len(run.linear) + np.arange(len(problem.distances)),
-        length_weight=np.array([d.standard_uncertainty**-2.0 for d in problem.distances]),
+        length_weight=np.array([distance.standard_uncertainty**-2.0 for distance in problem.distances]),
         targets_at=len(problem.base_names),
         unknowns=run.unknowns,
         held=np.asarray(run.common, dtype=np.float64),
     )
+
+
+def _classes(steps: list[_Step], amounts: Array, values: Array) -> tuple[Ints, Ints]:
+    """A probing of every class (C,), and the class of every probing (n,)."""
+    key = np.concatenate([amounts, values], axis=1)
+    # A turn whose angle follows a reading differs from probing to probing.
+    if any(step.turns_with_reading for step in steps):
+        key = np.column_stack([key, np.arange(len(key))])
+    size = np.max(np.abs(key), axis=0, initial=0.0)
+    _, sample, inverse = np.unique(
+        np.round(key / np.where(size > 0.0, size, 1.0), 11), axis=0, return_index=True, return_inverse=True
+    )
+    return sample, inverse.ravel()
+
+
+def _ends(problem: TouchProblem) -> Ints:
+    """The two targets of every distance (D, 2)."""
+    ends = [[problem.targets.index(name) for name in distance.between] for distance in problem.distances]
+    return np.array(ends, dtype=np.int64).reshape(-1, 2)
 
 
 def _segments(
@@ -267,9 +289,8 @@ def _segments(
     items: list[tuple[int, int, int]] = []
     segments = 0
     for k, step in enumerate(steps):
-        follows = step.kind == TURN_ERROR and any(along >= 0 for _, along, _ in step.entries)
-        mine = values[:, first[k] : first[k + 1]]
-        same = not follows and np.ptp(amounts[:, k]) == 0.0 and bool(np.all(np.ptp(mine, axis=0) == 0.0))
+        of_step = np.column_stack([amounts[:, k], values[:, first[k] : first[k + 1]]])
+        same = not step.turns_with_reading and bool(np.all(np.ptp(of_step, axis=0) == 0.0))
         if same and items and items[-1][0] >= 0:
             items[-1] = (items[-1][0], items[-1][1], k + 1)
         elif same:
@@ -280,8 +301,6 @@ def _segments(
     moves = np.zeros((len(items), AXES), dtype=np.bool_)
     for index, (_, begin, end) in enumerate(items):
         for step in steps[begin:end]:
-            acting = {along for _, along, _ in step.entries if along >= 0}
-            for axis in acting | ({step.reading} if step.reading >= 0 else set()):
-                moves[index, axis] = True
+            moves[index, sorted(step.axes)] = True
     item, begin_of, end_of = (np.array(column, dtype=np.int64) for column in zip(*items, strict=True))
     return item, begin_of, end_of, moves

@@ -24,7 +24,7 @@ from monitor.methods.curve.problem import problem_of as curve_problem_of
 from monitor.readers import read_campaign
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database
-from monitor.workflow.identify.fitting import load_measured
+from monitor.workflow.measured import load_measured
 
 # Those that every campaign has, and two channels as examples.
 DRIVERS = ("warmup", "run_time", "ambient_degC", "x_axis_degC")

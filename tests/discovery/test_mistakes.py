@@ -21,6 +21,7 @@ from monitor.records import Campaign, Probings
 from monitor.store import Database, import_campaign
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.request import ExplainRequest
 from monitor.workflow.models import as_model, resolve
 
@@ -124,13 +125,13 @@ def test_explain_says_it_first_and_tells_nothing_else() -> None:
     campaign = recorded("tracked-robot", exchanged("F1", "F2", slice(0, 2)))
     with Database(":memory:") as db:
         import_campaign(db, campaign)
-        answer = explain(db, ExplainRequest(campaign.name))
+        answer = explain(db, ExplainRequest(campaign.name)).explanation
+    assert isinstance(answer, MachineExplanation)
     assert answer.answer.startswith("It looks as if reflectors F1 and F2 were exchanged in 2 probings")
     assert "mm as recorded" in answer.answer
     assert answer.missing == answer.suspect_data == answer.changes == ()
     assert answer.comparison.verdict is Verdict.SOMETHING_IS_MISSING
-    assert answer.machine is not None
-    (mistake,) = answer.machine.likely_mistakes
+    (mistake,) = answer.likely_mistakes
     assert mistake.rms_undone_um < 100.0 < 2000.0 < mistake.rms_as_recorded_um
 
 

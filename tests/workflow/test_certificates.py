@@ -209,7 +209,8 @@ def test_remake_says_when_the_stored_document_is_another(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        "monitor.workflow.certificate.remaking.certificate_pdf", lambda record, fonts, inputs: b"other"
+        "monitor.workflow.certificate.remaking.certificate_pdf",
+        lambda record, fonts, inputs, document: b"other",
     )
     again = remake(db, RemakeRequest("G-1"))
     assert again.identical is False

@@ -116,14 +116,14 @@ def virtual_robot(
         [joint.sign * campaign.probings.readings[joint.name] for joint in chain.joints], axis=1
     )
 
-    def seen(moved: Array, shift: Array) -> Campaign:
+    def observed(moved: Array, shift: Array) -> Campaign:
         """The campaign with the points that the tracker sees."""
         points = evaluate(chain, positions, moved, shift, tip).residual
         inside = (points - STAND_MM) @ turn
         channels = {column: inside[:, axis] for axis, column in enumerate(TRACKER_COLUMNS)}
         return replace(campaign, probings=replace(campaign.probings, channels=channels))
 
-    plain = seen(errors, np.zeros((count, 3)))
+    plain = observed(errors, np.zeros((count, 3)))
     shift = np.zeros((count, 3))
     if effect is not None:
         context = problem_of(plain).context
@@ -136,7 +136,7 @@ def virtual_robot(
                 f"{effect} does nothing at the poses of the virtual robot; choose another effect"
             )
         basis.apply(np.full(basis.size, peak / largest), errors, shift)
-    exact = seen(errors, shift)
+    exact = observed(errors, shift)
     # A tracker prints a hundredth of a micrometre.
     noisy = {
         column: np.round(values + rng.normal(0.0, noise, count), 5)

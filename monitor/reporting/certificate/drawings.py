@@ -94,19 +94,19 @@ def _range(result: ResultSet, limits: Array, members: list[int]) -> tuple[float,
 def _draw_panel(
     on: Drawing, panel: _Panel, result: ResultSet, limits: Array, top: float, label: float, sign: str
 ) -> None:
-    left, right = label + 10.0, on.width_mm * SCALE - 14.0
+    left_edge, right_edge = label + 10.0, on.width_mm * SCALE - 14.0
     bottom = top + len(panel.members) * _ROW
     low, high = panel.across
 
     def x(value: float) -> float:
-        return left + (right - left) * (value - low) / (high - low)
+        return left_edge + (right_edge - left_edge) * (value - low) / (high - low)
 
     bars, ends, dots, brackets, bands = [], [], [], [], []
     for row, index in enumerate(panel.members):
         y = top + (row + 0.5) * _ROW
         value, half = float(result.estimate[index]), float(result.expanded[index])
         first, last = x(value - half), x(value + half)
-        bands.append(f"M{left:.1f} {y:.1f}H{right:.1f}")
+        bands.append(f"M{left_edge:.1f} {y:.1f}H{right_edge:.1f}")
         bars.append(f"M{first:.1f} {y:.1f}H{last:.1f}")
         ends += [f"M{end:.1f} {y - _END:.1f}v{2 * _END:g}" for end in (first, last)]
         dots.append(f"M{x(value):.1f} {y:.1f}h0")
@@ -123,11 +123,11 @@ def _draw_panel(
     on.dots("".join(dots), BLUE, 13.0)
     if brackets:
         on.path("".join(brackets), stroke=INK, width=5.0)
-    on.line(left, bottom, right, bottom, MID, 2.0)
-    for value in nice_ticks(low, high, max(3, int((right - left) / 130.0))):
+    on.line(left_edge, bottom, right_edge, bottom, MID, 2.0)
+    for value in nice_ticks(low, high, max(3, int((right_edge - left_edge) / 130.0))):
         on.line(x(value), bottom, x(value), bottom + 8.0, MID, 2.0)
         on.text(x(value), bottom + 12.0 + LETTER, tick_words(value, sign), anchor="middle")
-    on.text((left + right) / 2, bottom + 17.0 + 2.0 * LETTER, panel.unit, anchor="middle")
+    on.text((left_edge + right_edge) / 2, bottom + 17.0 + 2.0 * LETTER, panel.unit, anchor="middle")
 
 
 def _fitted(name: str, room: float) -> str:
@@ -142,7 +142,7 @@ def residual_drawing(
     """Bars of the RMS residuals, µm, the probe's uncertainty dashed; bars above twice of it are striped."""
     on = Drawing(width_mm, height_mm, title)
     level = residuals.probe_um
-    left, right, top = 100.0, width_mm * SCALE - 8.0, 14.0
+    left_edge, right_edge, top = 100.0, width_mm * SCALE - 8.0, 14.0
     bottom = height_mm * SCALE - 30.0 - 2.4 * LETTER
     most = max([*residuals.rms_um, level or 0.0]) * 1.15 or 1.0
 
@@ -150,12 +150,14 @@ def residual_drawing(
         return bottom - (bottom - top) * value / most
 
     for value in nice_ticks(0.0, most, 6):
-        on.line(left, y(value), right, y(value), PALE, 1.5)
-        on.text(left - 10.0, y(value) + 0.36 * LETTER, tick_words(value, texts.decimal_sign), anchor="end")
-    step = (right - left) / max(len(residuals.labels), 4)
+        on.line(left_edge, y(value), right_edge, y(value), PALE, 1.5)
+        on.text(
+            left_edge - 10.0, y(value) + 0.36 * LETTER, tick_words(value, texts.decimal_sign), anchor="end"
+        )
+    step = (right_edge - left_edge) / max(len(residuals.labels), 4)
     bars, stripes = [], []
     for index, rms in enumerate(residuals.rms_um):
-        first, wide = left + (index + 0.17) * step, 0.66 * step
+        first, wide = left_edge + (index + 0.17) * step, 0.66 * step
         bars.append(f"M{first:.1f} {bottom:.1f}V{y(rms):.1f}h{wide:.1f}V{bottom:.1f}z")
         if level is not None and rms > 2.0 * level:
             stripes += [
@@ -167,13 +169,13 @@ def residual_drawing(
     longest = WIDE * LETTER * max(map(len, residuals.labels), default=1) + 10.0
     every = max(1, math.ceil(longest / step))
     for index in range(0, len(residuals.labels), every):
-        at = left + (index + 0.5) * step
+        at = left_edge + (index + 0.5) * step
         on.text(at, bottom + 10.0 + LETTER, residuals.labels[index], anchor="middle")
-    on.line(left, bottom, right, bottom, MID, 2.4)
+    on.line(left_edge, bottom, right_edge, bottom, MID, 2.4)
     if level is not None:
-        on.line(left, y(level), right, y(level), INK, 3.4, "14 8")
+        on.line(left_edge, y(level), right_edge, y(level), INK, 3.4, "14 8")
     on.text(
-        (left + right) / 2, bottom + 16.0 + 2.1 * LETTER,
+        (left_edge + right_edge) / 2, bottom + 16.0 + 2.1 * LETTER,
         texts("figures.by", kind=texts(f"figures.{residuals.by}")), anchor="middle",
     )  # fmt: skip
     on.text(LETTER, (top + bottom) / 2, texts("figures.residual_axis"), anchor="middle", turned=True)

@@ -55,8 +55,8 @@ def correlation_blocks(
     heads = tuple(str(index + 1) for index in range(len(names))) if numbered else names
     sides = tuple(_side(name, index) for index, name in enumerate(names)) if numbered else names
     pitch = _NUMBERED_MM if numbered else _NAMED_MM
-    left = max((in_mm(column, _POINTS) for column in sides), default=0.0) + 2.0
-    across = max(1, int((PAGE_WIDTH_MM - left) / pitch))
+    left_mm = max((in_mm(column, _POINTS) for column in sides), default=0.0) + 2.0
+    across = max(1, int((PAGE_WIDTH_MM - left_mm) / pitch))
     blocks = []
     for start in range(0, len(names), across):
         columns = range(start, min(start + across, len(names)))
@@ -76,7 +76,7 @@ def correlation_blocks(
                         + _spaced([_signed(column, texts.decimal_sign) for column in values], pitch)
                         for row, values in zip(rows, coefficients, strict=True)
                     ),
-                    left_mm=left,
+                    left_mm=left_mm,
                     shades=_shades(coefficients, pitch, title),
                     title=title,
                 )

@@ -17,7 +17,12 @@ from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signing import sign
 from monitor.reporting.texts import ENGLISH, texts_of
-from monitor.store import Database, load_campaign, load_certificate, mark_certificate, save_certificate
+from monitor.store import (
+    Database,
+    load_certificate,
+    mark_certificate,
+    save_certificate,
+)
 from monitor.workflow.certificate.answer import CertificateFileAnswer, CertificateState
 from monitor.workflow.certificate.certified import CertifiedRun, certified_run, inputs_of
 from monitor.workflow.certificate.conformity import statement_of
@@ -36,6 +41,7 @@ from monitor.workflow.certificate.orders import (
 from monitor.workflow.certificate.request import AmendmentRequest, CertificateRequest, WithdrawalRequest
 from monitor.workflow.certificate.results import results_of
 from monitor.workflow.certificate.states import state_of
+from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import label, resolve
 
 
@@ -46,7 +52,7 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     InputError where the campaign states no tolerances or the key does not open.
     """
     stated = read_laboratory(request.laboratory)
-    campaign = load_campaign(db, request.campaign)
+    campaign = machine_campaign(db, request.campaign, "certificate issue", lambda method: method.certificate)
     present = today()
     day = request.issued_on or present
     measured = measured_runs(campaign, request.run, request.as_left)

@@ -24,7 +24,8 @@ from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAns
 from monitor.workflow.explain.machine_answer import machine_explanation
 from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sentence
 from monitor.workflow.explain.request import RATE, ExplainRequest
-from monitor.workflow.identify.fitting import curve_problem, load_measured, machine_problem
+from monitor.workflow.identify.fitting import curve_problem, machine_problem
+from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.

@@ -18,7 +18,8 @@ from monitor.workflow.explain.machine_answer import micrometres
 from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.version_answer import CurveVersion, HistoryAnswer, MachineVersion
 from monitor.workflow.identify.curve import in_micrometres, response_unit
-from monitor.workflow.identify.fitting import fit_of, load_measured
+from monitor.workflow.identify.fitting import fit_of
+from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve
 
 

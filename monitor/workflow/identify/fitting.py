@@ -10,7 +10,8 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import CurveProblem
 from monitor.records import Campaign, CurveCampaign
-from monitor.store import Database, StoredModel, is_curve, load_campaign, load_curve
+from monitor.store import Database, StoredModel
+from monitor.workflow.measured import load_measured
 from monitor.workflow.models import as_model, resolve
 
 
@@ -21,11 +22,6 @@ class FittedModel:
     campaign: Campaign | CurveCampaign
     model: StoredModel
     fit: Fit | CurveFit
-
-
-def load_measured(db: Database, name: str) -> Campaign | CurveCampaign:
-    """The campaign of that name, of a machine or a curve. Raises NotFoundError."""
-    return load_curve(db, name) if is_curve(db, name) else load_campaign(db, name)
 
 
 def machine_problem(campaign: Campaign, model: StoredModel) -> ChainProblem:

@@ -10,9 +10,10 @@ from monitor.store import Database, save_analysis, save_identification
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.identify.answer import IdentifyAnswer
 from monitor.workflow.identify.curve import curve_answer
-from monitor.workflow.identify.fitting import curve_problem, load_measured
+from monitor.workflow.identify.fitting import curve_problem
 from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve
 
 

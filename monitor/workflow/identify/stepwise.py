@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from monitor.exceptions import DataError
-from monitor.methods import Unable, campaign_method, methods
+from monitor.methods import Stepwise, campaign_method
 from monitor.methods.chain.identification import StepwiseCoefficient
 from monitor.methods.chain.problem import solve_problem
-from monitor.store import Database, load_campaign
+from monitor.store import Database
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.identify.answer import StepwiseAnswer, StepwiseParameter
 from monitor.workflow.identify.fitting import machine_problem
 from monitor.workflow.identify.request import StepwiseRequest
+from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import resolve
 
 
@@ -21,14 +21,9 @@ def identify_stepwise(db: Database, request: StepwiseRequest) -> StepwiseAnswer:
 
     Raises NotFoundError for an unknown campaign or run, DataError for a campaign of another method.
     """
-    campaign = load_campaign(db, request.campaign)
+    campaign = machine_campaign(db, request.campaign, "identify --stepwise", lambda method: method.stepwise)
     stepwise = campaign_method(campaign).stepwise
-    if isinstance(stepwise, Unable):
-        able = (name for name, method in methods().items() if not isinstance(method.stepwise, Unable))
-        raise DataError(
-            f"campaign {request.campaign} was measured by {campaign.method}; only {' and '.join(able)} has a "
-            "stepwise way"
-        )
+    assert isinstance(stepwise, Stepwise)  # required with the campaign
     number = max(run.run for run in campaign.runs) if request.run is None else request.run
     campaign = only_run(campaign, number)
     problem = machine_problem(campaign, resolve(db, request.model, campaign.method))

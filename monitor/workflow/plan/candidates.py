@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import fit
-from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods import campaign_method
 from monitor.methods.chain.touch import TouchProblem
@@ -103,11 +102,7 @@ def _indexations(problem: TouchProblem) -> tuple[Array, npt.NDArray[np.int64]]:
 def planned(campaign: Campaign, model: StoredModel, most_balls: int) -> PlannedCampaign:
     """The candidates of a campaign; where it has fewer than ``most_balls`` balls, places for more are added."""
     whole = campaign_method(campaign).problem_of(campaign, as_model(model))
-    if not isinstance(whole, TouchProblem):
-        raise DataError(
-            f"plan weighs where balls are touched, and campaign {campaign.name} was measured by {campaign.method}; what"
-            " its plan cannot tell apart, identify names with what to do"
-        )
+    assert isinstance(whole, TouchProblem)  # what a method with a TouchPlan has
     whole = _with_identified_tip(whole)
     problem = _first_run(whole)
     context, chain = problem.context, problem.context.chain

@@ -9,8 +9,9 @@ from monitor.methods import AnglePlan, campaign_method
 from monitor.methods.planning.candidates import Choice
 from monitor.methods.planning.search import best_plan, quickest_plan
 from monitor.records import Campaign
-from monitor.store import Database, StoredModel, load_campaign, save_analysis
+from monitor.store import Database, StoredModel, save_analysis
 from monitor.units import MICROMETRE
+from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import label, resolve
 from monitor.workflow.plan.angles import plan_angles
 from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, PlanAnswer, TimeAnswer
@@ -25,7 +26,7 @@ def plan(db: Database, request: PlanRequest) -> PlanAnswer:
 
     Raises InputError, DataError, NotFoundError, EffectError.
     """
-    campaign = load_campaign(db, request.campaign)
+    campaign = machine_campaign(db, request.campaign, "plan", lambda method: method.plan)
     model = resolve(db, request.model, campaign.method)
     method = campaign_method(campaign).plan
     answer: PlanAnswer = (

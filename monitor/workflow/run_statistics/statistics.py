@@ -12,20 +12,19 @@ import numpy.typing as npt
 
 from monitor.documents import to_document
 from monitor.exceptions import DataError, InputError, NotFoundError
-from monitor.methods import campaign_method, require
 from monitor.records import Array, Campaign
 from monitor.statistics import AnalysisOfVariance, FalseDiscoveries, GroupTest, Homogeneity, Pooling
 from monitor.store import (
     Database,
     StoredIdentification,
     find_selection,
-    load_campaign,
     load_identification,
     save_analysis,
 )
 from monitor.units import Unit
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import resolve
 from monitor.workflow.run_statistics.answer import (
     GroupCorrelation,
@@ -152,8 +151,7 @@ def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
     Identifies the campaign first where that has not been done. Raises InputError for a column, condition or selection
     that the runs do not have, DataError for fewer than two runs.
     """
-    campaign = load_campaign(db, request.campaign)
-    require(campaign_method(campaign).statistics, campaign, "stats")
+    campaign = machine_campaign(db, request.campaign, "stats", lambda method: method.statistics)
     labels = _groups(db, campaign, request.by)
     taken = _taken(db, campaign, request)
     runs = [run.run for run, take in zip(campaign.runs, taken, strict=True) if take]

@@ -19,7 +19,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.results import refusals
 from monitor.records import Array, Campaign
 from monitor.reporting.covariance_source import CovarianceSource, TakenAsKnown
-from monitor.store import Database, StoredModel, load_campaign
+from monitor.store import Database, StoredModel
 from monitor.uncertainty import (
     Inputs,
     MonteCarloOptions,
@@ -36,6 +36,7 @@ from monitor.uncertainty.row_run import measured_run
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
+from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import as_model, resolve
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
@@ -83,7 +84,13 @@ class _Propagated:
 
 def evaluate(db: Database, request: UncertaintyRequest) -> RunUncertainty:
     """Evaluate the uncertainty of one run. Raises InputError, DataError, NotFoundError."""
-    campaign = runs_before(load_campaign(db, request.campaign), request.before)
+    campaign = machine_campaign(db, request.campaign, "uncertainty", lambda method: method.uncertainty)
+    return evaluate_campaign(db, campaign, request)
+
+
+def evaluate_campaign(db: Database, whole: Campaign, request: UncertaintyRequest) -> RunUncertainty:
+    """As ``evaluate``, of a campaign that is loaded."""
+    campaign = runs_before(whole, request.before)
     model = resolve(db, request.model, campaign.method)
     fitted = fit(campaign_method(campaign).problem_of(campaign, as_model(model)))
     selected = None

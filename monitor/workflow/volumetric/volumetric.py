@@ -8,7 +8,8 @@ from datetime import datetime
 from monitor.documents import to_document
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
-from monitor.workflow.uncertainty.evaluation import evaluate
+from monitor.workflow.measured import machine_campaign
+from monitor.workflow.uncertainty.evaluation import evaluate_campaign
 from monitor.workflow.uncertainty.stating import statement
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 from monitor.workflow.volumetric.answer import VolumetricAnswer
@@ -19,7 +20,8 @@ from monitor.workflow.volumetric.stating import map_answer
 
 def map_run(db: Database, request: VolumetricRequest) -> VolumetricMap:
     """Map the volumetric error of one run; nothing is stored. Raises InputError, DataError, NotFoundError."""
-    result = evaluate(db, request.uncertainty)
+    campaign = machine_campaign(db, request.uncertainty.campaign, "map", lambda method: method.map)
+    result = evaluate_campaign(db, campaign, request.uncertainty)
     evaluated = StatedUncertainty(result.campaign, result.model, statement(result))
     return map_of(evaluated, result.fit, request.points, request.absolute)
 
