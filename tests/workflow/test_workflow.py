@@ -15,6 +15,7 @@ from monitor.store import Database, load_campaign, load_identification
 from monitor.workflow.events import EventRequest, event
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.explain import explain
+from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.explain.versions import latest_campaign
 from monitor.workflow.identify.identify import identify
@@ -157,7 +158,8 @@ def test_figures_of_a_comparison_and_of_an_explanation(db: Database, tmp_path: P
     }  # fmt: skip
     for file in files:
         assert Path(file).stat().st_size > 1000
-    first = answer.missing[0]
+    assert isinstance(answer.explanation, MachineExplanation)
+    first = answer.explanation.missing[0]
     # Beside the bar stands the size, short enough to be whole; the words are in the title.
     text = (tmp_path / "figures ü" / "missing-effects.svg").read_text(encoding="utf-8")
     assert first.effect in text
