@@ -133,7 +133,6 @@ def machine_history(
     campaigns = campaigns_of_machine(db, machine)
     identified = _identified(db, list(campaigns), model, version)
     recorded = runs_of_campaigns(db, campaigns)
-    counts = Counter(run.campaign_id for run in recorded)
     runs = [
         run
         for run in recorded
@@ -157,11 +156,21 @@ def machine_history(
         u=u,
         conditions=_conditions(db, runs),
         tolerances=_tolerances_of(db, max(campaigns, default=0) if latest is None else latest.campaign_id),
-        unidentified=tuple(
-            name
-            for number, (name, _) in campaigns.items()
-            if counts[number] > (identified[number].runs if number in identified else 0)
-        ),
+        unidentified=_unidentified(campaigns, recorded, identified),
+    )
+
+
+def _unidentified(
+    campaigns: Mapping[int, tuple[str, str]],
+    recorded: Iterable[RecordedRun],
+    identified: Mapping[int, _Identified],
+) -> tuple[str, ...]:
+    """Return the names of the campaigns of which no identification holds every run."""
+    counts = Counter(run.campaign_id for run in recorded)
+    return tuple(
+        name
+        for number, (name, _) in campaigns.items()
+        if counts[number] > (identified[number].runs if number in identified else 0)
     )
 
 
