@@ -24,9 +24,10 @@ def index_faults(db: Database) -> Iterator[str]:
     for index, table, expression in db.rows(_INDEXES):
         missed = _missed_rows(db, table, expression)
         loss = f" and does not find {missed} of them" if missed else ""
+        name = index if index.isidentifier() else '"' + index.replace('"', '""') + '"'
         yield (
             f"the index {index} over rows of {table} was not made by this software{loss}: DuckDB 1.5 can lose rows "
-            f"from an index after a crash, and queries then miss them; `DROP INDEX {index}` repairs it without loss"
+            f"from an index after a crash, and queries then miss them; `DROP INDEX {name}` repairs it without loss"
         )
 
 
