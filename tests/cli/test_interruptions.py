@@ -148,7 +148,7 @@ def test_ctrl_c_ends_with_one_line_and_nothing_stored(started: Any, db: Path) ->
     process.send_signal(signal.SIGINT)
     # A block of trials, or the compilation of the kernel on a busy machine, is finished first.
     out, err = process.communicate(timeout=450)
-    # Python ends itself by the signal where it was importing; a shell calls either 130.
+    # Started with -m, Python ends itself by the signal where Ctrl-C went through an exec; a shell calls either 130.
     assert process.returncode in (130, -signal.SIGINT)
     assert out == ""
     assert err == "monitor: stopped; what was not finished was not stored\n"

@@ -94,7 +94,9 @@ def test_ctrl_c_ends_the_workers_without_a_word_of_theirs(fleet: Path, tmp_path:
         # As a terminal does: to all processes of the group, while the workers still import.
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=120)
-    assert (process.returncode, out, err) == (130, "", STOPPED)
+    # Started with -m, Python ends itself by the signal where Ctrl-C went through an exec; a shell calls either 130.
+    assert process.returncode in (130, -signal.SIGINT)
+    assert (out, err) == ("", STOPPED)
     deadline = time.monotonic() + 30
     while any(Path(f"/proc/{one}").exists() for one in workers) and time.monotonic() < deadline:
         time.sleep(0.05)
