@@ -2,7 +2,7 @@
 
 from monitor.machine.chain import ChainPose, evaluate
 from monitor.machine.gravity import gravity_in_joint_frames, torques_in_joint_frames
-from monitor.machine.inverse import refuse_untouchable, touching_positions
+from monitor.machine.inverse import refuse_untouchable, touching_positions, travel_slopes
 from monitor.machine.terms import COMPONENTS, LOCATION, MOTION, Term, parse_term
 from monitor.machine.topology import Chain, Joint, chain_of_axes, parse_topology
 
@@ -22,4 +22,5 @@ __all__ = [
     "refuse_untouchable",
     "torques_in_joint_frames",
     "touching_positions",
+    "travel_slopes",
 ]

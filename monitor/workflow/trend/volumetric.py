@@ -103,7 +103,8 @@ def _vectors(
     # Loaded here: pages without a limit of the volumetric error start without the methods and all that they need.
     from monitor.discovery import fit
     from monitor.effects import ChainEffect
-    from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
+    from monitor.uncertainty.geometric_errors import GeometricErrors
+    from monitor.uncertainty.volumetric import grid, middle, volumetric_error
     from monitor.workflow.identify.fitting import machine_problem
     from monitor.workflow.models import resolve
     from monitor.workflow.volumetric.error_map import poses_of, ranges_of
