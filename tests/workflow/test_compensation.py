@@ -15,10 +15,14 @@ import pytest
 from monitor.effects import Context, parse_effect
 from monitor.exceptions import InputError
 from monitor.machine import parse_topology
+from monitor.store import Database
 from monitor.uncertainty.geometric_errors import GeometricErrors
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
+from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.volumetric.compensation import write_tables
 from monitor.workflow.volumetric.error_map import VolumetricMap, poses_of
+from monitor.workflow.volumetric.request import VolumetricRequest
+from monitor.workflow.volumetric.volumetric import volumetric_map
 
 #: Every topology of the examples, the documents and the tests of methods with three linear axes: rotary axes on the
 #: work side, on the tool side, on both, between linear axes and inside them.
@@ -59,6 +63,7 @@ class Truth:
     def __init__(self, simulator, topology, signs, size, *, only_positioning=False):
         self.chain = simulator.chain
         self.machine = simulator.chain.read_topology(topology, signs)
+        self.tip = TIP
         rng = np.random.default_rng(11)
         self.values = {}
         for axis in self.machine.axes:
@@ -98,7 +103,7 @@ class Truth:
         count = len(target)
         work = self.chain.branch_matrix(self.machine.work, readings, location, motion, count)
         tool = self.chain.branch_matrix(self.machine.tool, readings, location, motion, count)
-        in_bed = self.chain.carried(tool, np.tile(TIP, (count, 1)))
+        in_bed = self.chain.carried(tool, np.tile(self.tip, (count, 1)))
         return self.chain.carried(np.linalg.inv(work), in_bed) - target
 
     def programmed(self, readings):
@@ -306,3 +311,33 @@ def test_a_cyclic_error_gets_rows_enough_for_straight_lines(simulator, tmp_path)
     left = np.interp(readings, nodes, errors) - 3.0 * np.cos(2.0 * np.pi * readings / 20.0)
     assert 500 < len(rows) < 4097
     assert np.abs(left).max() < 0.02
+
+
+def test_all_the_way_from_a_measured_campaign_to_the_corrected_machine(simulator, tmp_path):
+    rng = np.random.default_rng(4)
+    plan, schedule = simulator.five_days_plan(), simulator.working_days(rng, 2, 3)
+    topology = "w C B X b Z Y (C1) t"
+    signs = _signs(topology, True)
+    machine = simulator.SimulatedMachine(topology=topology, signs=signs, terms=simulator.SAMBA_TERMS)
+    measured = simulator.simulate(plan, machine, schedule, rng, noise_um=0.05, bar_error_mm=0.0)
+    simulator.write_campaign(tmp_path / "m", "m", plan, machine, schedule, measured)
+    request = VolumetricRequest("m", 6, points=3, compensation="volumetric-csv", out=tmp_path)
+    with Database(tmp_path / "m.duckdb") as db:
+        import_folders(db, ImportRequest([tmp_path / "m"]))
+        answer = volumetric_map(db, request)
+    _, rows = _table(answer.tables[0])
+    truth = Truth(simulator, topology, signs, 1.0)
+    truth.values, truth.tip = simulator.SAMBA_TERMS, np.array(measured["tip_mm"])
+    commanded, corrected = _controlled(truth, rows)
+    target = truth.programmed(commanded)
+    at_zero = {
+        axis.name: np.array([(answer.datum or {}).get(axis.column, 0.0)]) for axis in truth.machine.axes
+    }
+    zero = truth.miss(at_zero, truth.programmed(at_zero))
+    before = np.linalg.norm(truth.miss(commanded, target) - zero, axis=1)
+    after = np.linalg.norm(truth.miss(corrected, target) - zero, axis=1)
+    assert before.max() > 0.020
+    # What is left is what the identification does not know: 1.2 µm a metre of the bar, and the noise.
+    u = np.array([np.linalg.norm([row[f"u_{axis}_um"] for axis in "xyz"]) for row in rows]) * 1e-3
+    assert np.all(after < 4.0 * u + 1e-5)
+    assert after.max() < before.max() / 10.0
