@@ -103,7 +103,9 @@ def test_the_inputs_are_stored_with_it_and_travel_inside_it(
 ) -> None:
     reader = pypdf.PdfReader(guarded)
     files = {name: content[0] for name, content in reader.attachments.items()}
-    assert sorted(files) == ["certificate.dcc.xml", "certificate.json", "covariance-1.csv", "results-1.csv"]
+    assert sorted(files) == [
+        "certificate.dcc.xml", "certificate.json", "covariance-1.csv", "machine-frame-1.csv", "results-1.csv"
+    ]  # fmt: skip
     whole = json.loads(files["certificate.json"])
     stored = load_certificate(db, "G-1").record
     assert whole["inputs"] == stored["inputs"]

@@ -99,6 +99,7 @@ class PrintedMachine:
     refused: tuple[tuple[str, str], ...]
     imports: tuple[PrintedRefusal, ...]
     pictures: PrintedPictures
+    reversal: str
 
 
 def fleet_context(fleet: Fleet) -> dict[str, Any]:
@@ -153,7 +154,18 @@ def _page(health: MachineHealth) -> PrintedMachine:
         refused=health.quality.refused,
         imports=tuple(printed_refusal(refusal) for refusal in health.quality.refused_imports),
         pictures=printed_pictures(health.model),
+        reversal=_reversal(health),
     )
+
+
+def _reversal(health: MachineHealth) -> str:
+    """The reversal value of the first missing effect, where that is a play; it stands beside what to do about it."""
+    missing = () if health.model is None else health.model.missing
+    if not missing or missing[0].reversal is None:
+        return ""
+    reversal = missing[0].reversal
+    value, u = in_words(reversal.value, reversal.u)
+    return f"{value} ± {u} {reversal.unit} (ISO 230-2: from one direction to the other, twice the amplitude)"
 
 
 def _range(condition: ConditionRange) -> str:
