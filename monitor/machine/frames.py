@@ -69,22 +69,37 @@ def machine_frame(parameters: Sequence[str], chain: Chain, unknown: Sequence[str
     """Return the location errors in the machine frame that m ``parameters`` determine, as their linear function.
 
     A row is made for each location error among the parameters that says where its axis is: not for one along or, of a
-    linear axis, about its own direction. One on which a parameter without a number (``unknown``) depends is left out.
-    First order: products of two errors, 1e-4 of an error for angles of 100 µrad, are neglected.
+    linear axis, about its own direction. A rotary axis of the workpiece's side has a row, too, for what only the axes
+    before it determine: on ``w C A ...`` the place of C along A is ``EX0A``. A row on which a parameter without a
+    number (``unknown``) has a part is left out. First order: products of two errors, 1e-4 of an error for angles of
+    100 µrad, are neglected.
     """
     terms = [term_of(name, chain) for name in parameters]
     lost = [term for name in unknown if (term := term_of(name, chain)) is not None]
-    origins = {joint: _origin(chain, joint) for joint in range(len(chain.joints))}
     names, units, rows = [], [], []
-    for row, own in zip(parameters, terms, strict=True):
-        if own is None or own.stage != LOCATION or not _places(own, chain.joints[own.joint]):
+    for wanted in _wanted([term for term in terms if term is not None], lost, chain):
+        if any(_share(term, wanted, chain) != 0.0 for term in lost):
             continue
-        if any(_share(term, own, chain, origins) != 0.0 for term in lost):
-            continue
-        names.append(row)
-        units.append(own.unit.name)
-        rows.append([0.0 if term is None else _share(term, own, chain, origins) for term in terms])
+        shares = [0.0 if term is None else _share(term, wanted, chain) for term in terms]
+        if any(shares):
+            names.append(wanted.symbol)
+            units.append(wanted.unit.name)
+            rows.append(shares)
     return MachineFrame(tuple(names), tuple(units), np.array(rows).reshape(len(rows), len(terms)))
+
+
+def _wanted(known: Sequence[Term], lost: Sequence[Term], chain: Chain) -> list[Term]:
+    """The location errors that could have a row: those among the parameters, and all of the work side's rotary axes."""
+    own = [term for term in known if term.stage == LOCATION]
+    symbols = {term.symbol for term in (*own, *lost)}
+    fixed = [
+        Term(f"E{component}0{joint.name}", index, LOCATION, number)
+        for index, joint in enumerate(chain.work)
+        for number, component in enumerate(COMPONENTS)
+        if joint.turns and joint.main != number % 3
+    ]
+    every = [*own, *(term for term in fixed if term.symbol not in symbols)]
+    return [term for term in every if _places(term, chain.joints[term.joint])]
 
 
 def _branch_to(chain: Chain, joint: int) -> list[int]:
@@ -106,7 +121,7 @@ def _places(term: Term, joint: Joint) -> bool:
     return not along or (joint.turns and term.is_rotation)
 
 
-def _share(term: Term, of: Term, chain: Chain, origins: dict[int, Array]) -> float:
+def _share(term: Term, of: Term, chain: Chain) -> float:
     """By how much the location error ``of`` in the machine frame grows with the parameter ``term``, in display
     units."""
     if term.stage != LOCATION or term.joint not in _branch_to(chain, of.joint):
@@ -117,7 +132,7 @@ def _share(term: Term, of: Term, chain: Chain, origins: dict[int, Array]) -> flo
         return 0.0
     turned = np.zeros(3)
     turned[term.component - COMPONENTS.index("A")] = 1.0
-    lever = origins[of.joint] - origins[term.joint]
+    lever = _origin(chain, of.joint) - _origin(chain, term.joint)
     shift = float(np.cross(turned, lever)[of.component])
     # µm by µrad: a lever of 1 mm shifts by 1e-3 µm a µrad.
     return shift * term.unit.factor / MICROMETRE.factor

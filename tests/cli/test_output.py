@@ -119,6 +119,8 @@ def test_identify_table_for_people(typed: Any, filled: Path) -> None:
     assert lines[1].split() == [
         "parameter",
         "unit",
+        "relative",
+        "to",
         *(word for run in range(15, 21) for word in ("run", str(run))),
         "u",
     ]

@@ -153,23 +153,29 @@ def results_of(
 def _in_machine_frame(
     evaluated: StatedUncertainty, chain: Chain, estimate: Array, covariance: Array
 ) -> MachineFrameResult:
-    # As ``uncertainty.coverage`` has it, without the half second that room takes to load: a stored result waits for
-    # none.
-    from scipy.special import ndtri, stdtrit
-
     answer = evaluated.answer
     unknown = [name for refused in answer.refused for name in refused.parameters]
     frame = in_machine_frame(evaluated.names, estimate, covariance, chain, unknown)
-    upper, dof = (1.0 + answer.p) / 2.0, evaluated.fewest_dof
     return MachineFrameResult(
         names=frame.parameters,
         units=tuple(frame.units[name] for name in frame.parameters),
         estimate=np.array([frame.estimate[name] for name in frame.parameters]),
         covariance=frame.covariance,
         sums=frame.sums,
-        k=float(stdtrit(dof, upper) if np.isfinite(dof) else ndtri(upper)),
+        k=_single_factor(evaluated),
         p=answer.p,
     )
+
+
+def _single_factor(evaluated: StatedUncertainty) -> float:
+    """The coverage factor of one number by itself; that of the answer where it has one."""
+    frame = evaluated.answer.machine_frame
+    if frame is not None and frame.k is not None:
+        return frame.k
+    # An answer of before there was one. Loaded here: what states a stored result waits for no library of formulas.
+    from monitor.uncertainty.coverage import single_factor
+
+    return single_factor(evaluated.answer.p, evaluated.fewest_dof)
 
 
 def _certifiable(evaluated: StatedUncertainty, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:

@@ -17,6 +17,8 @@ class MachineFrameAnswer:
 
     ``sums`` gives of each its terms, parameter by parameter with its factor; ``covariance`` (r, r) is that of the
     sums, in products of their units. It is singular where there are more of them than parameters that they rest on.
+    ``k`` is the coverage factor of one of them by itself (GUM G.3), for the probability of the answer that it stands
+    in.
     """
 
     parameters: tuple[str, ...]
@@ -25,6 +27,7 @@ class MachineFrameAnswer:
     u: Mapping[str, float]
     covariance: Array
     sums: Mapping[str, Mapping[str, float]]
+    k: float | None = None
 
     @property
     def moved(self) -> tuple[str, ...]:

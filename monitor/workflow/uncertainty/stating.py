@@ -13,7 +13,7 @@ from monitor.methods.model import chain_of
 from monitor.records import Array
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.reporting.refused import refused_parameters
-from monitor.uncertainty.coverage import ellipsoid_factor, joint_coverage, rectangle_factor
+from monitor.uncertainty.coverage import ellipsoid_factor, joint_coverage, rectangle_factor, single_factor
 from monitor.uncertainty.validation import Comparison, Validation
 from monitor.units import MICROMETRE
 from monitor.workflow.models import label
@@ -70,7 +70,9 @@ def _in_machine_frame(result: RunUncertainty, chain: Chain) -> MachineFrameAnswe
     factors = np.array([unit.factor for unit in result.units])
     covariance = framework.correlation * np.outer(framework.u / factors, framework.u / factors)
     unknown = [name for refusal in result.refused for name in refusal.parameters]
-    return in_machine_frame(framework.names, framework.estimate / factors, covariance, chain, unknown)
+    frame = in_machine_frame(framework.names, framework.estimate / factors, covariance, chain, unknown)
+    fewest = float(np.min(framework.dof_by_output, initial=np.inf))
+    return replace(frame, k=single_factor(framework.p, fewest))
 
 
 def _displayed(result: RunUncertainty, values: Iterable[float]) -> dict[str, float]:
