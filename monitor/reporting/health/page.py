@@ -220,7 +220,12 @@ def _drift(parameter: ParameterHealth) -> str:
         first, last = parameter.drift.crosses_between
         when = f" ({first} at the earliest)" if first else ""
         when = f" ({first} to {last})" if first and last else when
-        sentence += f"; tolerance reached about {parameter.drift.crosses_at}{when}"
+        past = parameter.history.times and parameter.drift.crosses_at <= parameter.history.times[-1].date()
+        sentence += (
+            f"; already beyond its tolerance since about {parameter.drift.crosses_at}"
+            if past
+            else f"; tolerance reached about {parameter.drift.crosses_at}{when}"
+        )
     return sentence
 
 
@@ -248,6 +253,14 @@ def _map(error_map: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
         ),
         ("root mean square", f"{plain(float(f'{error_map.rms_um:.3g}'))} µm over {error_map.region}"),
     ]
+    if error_map.limit_um is not None and error_map.probability_out is not None:
+        beyond = "beyond it" if error_map.worst_um > error_map.limit_um else "within it"
+        lines.append(
+            (
+                "limit",
+                f"{plain(error_map.limit_um)} µm for the worst: {beyond}; P(out) = {percent(error_map.probability_out)}",
+            )
+        )
     worst_poses = sorted(error_map.by_pose, key=lambda pose: -pose.worst_um)[:_POSES_SHOWN]
     if worst_poses:
         poses = "; ".join(

@@ -25,8 +25,9 @@ State = Literal[
 ]
 #: The states by urgency, the most urgent first, and what each means.
 STATES: dict[State, str] = {
-    "out of tolerance": "a parameter is more likely beyond its tolerance than within it",
-    "may be out of tolerance": "the probability that a parameter is beyond its tolerance exceeds the stated limit",
+    "out of tolerance": "a parameter or the volumetric error is more likely beyond its tolerance than within it",
+    "may be out of tolerance": "the probability that a parameter or the volumetric error is beyond its tolerance "
+    "exceeds the stated limit",
     "changed": "a parameter or an artefact changed this week",
     "model fails": "the model does not explain the measurements: an effect is missing",
     "suspect data": "bad points were found and left out; nothing else",
@@ -149,7 +150,8 @@ class VolumetricMap:
     """The stored volumetric error map: where it is worst, its expanded uncertainty there, and pose by pose (µm).
 
     ``slices`` are its middle with the rotary axes at zero; empty where the machine has no three linear axes. Their
-    expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``.
+    expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``. ``limit_um`` of the
+    machine's file for the worst of them, and the probability to be beyond it.
     """
 
     run: int
@@ -162,6 +164,8 @@ class VolumetricMap:
     slices: tuple[Slice, ...] = ()
     k: float = 2.0
     p: float = 0.95
+    limit_um: float | None = None
+    probability_out: float | None = None
 
 
 @dataclass(frozen=True)

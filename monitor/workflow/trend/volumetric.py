@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from datetime import timedelta
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,8 @@ from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import VolumetricForecast, VolumetricTest
 from monitor.workflow.trend.forecast import HORIZON_YEARS, interval_or_none
 
+#: Times between the begin of the drifts and now at which the error is compared with its limit, for the day since when.
+SINCE_STEPS = 400
 #: The tolerance of the machine file that is no parameter's.
 VOLUMETRIC = "volumetric"
 METHOD = (
@@ -197,6 +200,21 @@ def _backtest(
     ), None  # fmt: skip
 
 
+def _beyond_since(
+    parameters: _Extrapolated, vectors: _Vectors, limit: float, now: float, offset: timedelta
+) -> str | None:
+    """Since when the drifts put the error beyond its limit without a break; None where it is not beyond it now."""
+    begins = max(float(drift.piece.t[0]) for drift in parameters.drifts.values())
+    times = np.linspace(min(begins, now), now, SINCE_STEPS)
+    levels = np.column_stack(
+        [line.level_at + line.slope * (times - line.at) for line in parameters.lines.values()]
+    )
+    inside = np.flatnonzero(ErrorVectors(vectors.sensitivity, vectors.at_zero).longest(levels) <= limit)
+    if len(inside) and inside[-1] == len(times) - 1:
+        return None
+    return date(float(times[0 if not len(inside) else inside[-1] + 1]), offset)
+
+
 def volumetric_forecast(
     db: Database,
     history: MachineHistory,
@@ -244,6 +262,7 @@ def volumetric_forecast(
     return replace(
         none,
         latest_um=ahead.latest,
+        beyond_since=_beyond_since(parameters, vectors, limit, now, offset),
         crosses_limit_at=None if ahead.crossing.at is None else date(ahead.crossing.at, offset),
         crosses_limit_interval=interval_or_none(low, high),
         predicted_um=float(ahead.predicted[0]),
