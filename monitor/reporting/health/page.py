@@ -258,7 +258,8 @@ def _map(error_map: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
         lines.append(
             (
                 "limit",
-                f"{plain(error_map.limit_um)} µm for the worst: {beyond}; P(out) = {percent(error_map.probability_out)}",
+                f"{plain(error_map.limit_um)} µm for the worst: {beyond}, "
+                f"P(out): {percent(error_map.probability_out)}",
             )
         )
     worst_poses = sorted(error_map.by_pose, key=lambda pose: -pose.worst_um)[:_POSES_SHOWN]

@@ -121,7 +121,7 @@ def event_noted(event: MachineEvent, week: Week) -> Change:
 def _step_in_words(step: EventStep) -> str:
     """What a parameter stepped by at an event, and that one knows since when."""
     size, u = in_words(step.size, step.u, sign=True)
-    days = "" if step.by_days else ", one day before and one after"
+    days = "" if step.by_days else " by the runs; too few days to know how days differ"
     return (
         f"{step.parameter} stepped by {size} {step.unit} at the event '{step.event.description}' "
         f"(u = {u} {step.unit}{days})"

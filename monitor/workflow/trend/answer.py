@@ -77,7 +77,7 @@ class DatedChange:
 class StepAtEvent:
     """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
 
-    ``scatter_of`` says by what the uncertainty is: ``days`` or, with one day on either side, ``runs``.
+    ``scatter_of`` says by what the uncertainty is: ``days`` or, where they are too few, ``runs``.
     """
 
     at: str
