@@ -88,9 +88,13 @@ class ParameterHealth:
 
 @dataclass(frozen=True)
 class Change:
-    """Something that happened: found by the statistics (with its p-value) or recorded by people (kind ``event``)."""
+    """Something that happened: found by the statistics (with its p-value) or recorded by people (kind ``event``).
 
-    kind: Literal["change", "event"]
+    What a parameter stepped by at a recorded event is an ``event step``: said like a change, but explained, so that it
+    does not make the state of the machine.
+    """
+
+    kind: Literal["change", "event step", "event"]
     after: datetime | None
     at: datetime
     what: str

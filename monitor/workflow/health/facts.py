@@ -101,7 +101,7 @@ def changes_noted(
             noted.append(Change("change", after, at, sentence, change.p_value, week.holds(at)))
     for step in steps:
         at = step.event.at.replace(tzinfo=None)
-        noted.append(Change("change", None, at, _step_in_words(step), step.p_value, week.holds(at)))
+        noted.append(Change("event step", None, at, _step_in_words(step), step.p_value, week.holds(at)))
     starts = {run.run: run.local_start for run in runs}
     for move in () if explanation is None else explanation.changes:
         if not isinstance(move, ChangedParameter) and move.run in starts:

@@ -64,10 +64,11 @@ def with_volumetric(judged: Conformity, probability_out: float | None) -> Confor
 def changed_in_words(
     noted: Sequence[Change], explanation: MachineExplanation | None, quality: DataQuality
 ) -> str:
-    """What is new this week: changes, then events, what the model lacks, and data that never came in."""
+    """What is new this week: changes, then steps at events, then events, what the model lacks, and data that never
+    came in."""
     sentences = [
         change.what
-        for kind in ("change", "event")
+        for kind in ("change", "event step", "event")
         for change in noted
         if change.this_week and change.kind == kind
     ]
