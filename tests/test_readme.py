@@ -135,6 +135,15 @@ def test_readme_examples_do_what_it_says(tmp_path: Path) -> None:
     assert "$ monitor --db demo-output/demo.duckdb import " in demo
 
 
+def test_the_python_of_the_documents_runs(tmp_path: Path) -> None:
+    (tmp_path / "examples").symlink_to(CHECKOUT / "examples")
+    typed = examples((CHECKOUT / "docs/python.md").read_text(encoding="utf-8"))
+    assert len(typed) == 2
+    printed = [try_out(example, tmp_path) for example in typed]
+    assert "EZC1:const@warmup" in printed[0]
+    assert (tmp_path / "figures/missing-effects.svg").is_file()
+
+
 def test_readme_make_targets_exist_and_do_what_the_examples_run() -> None:
     makefile = (CHECKOUT / "Makefile").read_text(encoding="utf-8")
     targets = set(re.findall(r"^([a-z]+):", makefile, flags=re.MULTILINE))

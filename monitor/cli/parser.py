@@ -39,6 +39,7 @@ VERBS = {
     "audit": "who changed what and when",
     "backup": "a second file with everything, checked",
     "restore": "a database from a backup",
+    "sql": "a query of your own, which may only read",
     "export": "all tables as CSV or Parquet files",
 }
 DEFAULT_DATABASE = "monitor.duckdb"
