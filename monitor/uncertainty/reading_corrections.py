@@ -37,14 +37,14 @@ class PositioningError:
 class ReadingCorrections:
     """What is to be added to the readings of L linear axes at n commanded points, the rotary axes as commanded.
 
-    ``joints`` are their indices in the chain; ``corrections`` (n, L) mm with ``u`` (n, L); ``left`` (n, 3) mm is the
-    part of the error that no linear axis of the machine can move.
+    ``joints`` are their indices in the chain; ``corrections`` (n, L) mm with ``u`` (n, L); ``uncorrected`` (n, 3) mm
+    is the part of the error that no linear axis of the machine can move.
     """
 
     joints: tuple[int, ...]
     corrections: Array
     u: Array
-    left: Array
+    uncorrected: Array
 
 
 def positions_itself(geometric: GeometricErrors, axis: int) -> bool:
@@ -99,5 +99,5 @@ def reading_corrections(geometric: GeometricErrors, error: VolumetricError) -> R
         joints=joints,
         corrections=corrections,
         u=np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)),
-        left=error.vectors + np.einsum("nia,na->ni", by_reading, corrections),
+        uncorrected=error.vectors + np.einsum("nia,na->ni", by_reading, corrections),
     )

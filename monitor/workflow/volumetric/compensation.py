@@ -90,9 +90,9 @@ def _along(mapped: VolumetricMap, axis: int) -> tuple[Array, PositioningError, f
     while True:
         between, finer = _evenly(mapped, axis, 2 * count - 1)
         lines = (finer.errors[:-2:2] + finer.errors[2::2]) / 2.0
-        left = float(np.abs(finer.errors[1:-1:2] - lines).max())
-        if left <= max(PART_LEFT * np.abs(finer.errors).max(), LEAST_LEFT) or count >= MOST_POINTS:
-            return between[::2], PositioningError(finer.errors[::2], finer.u[::2]), left
+        remaining = float(np.abs(finer.errors[1:-1:2] - lines).max())
+        if remaining <= max(PART_LEFT * np.abs(finer.errors).max(), LEAST_LEFT) or count >= MOST_POINTS:
+            return between[::2], PositioningError(finer.errors[::2], finer.u[::2]), remaining
         count = 2 * count - 1
 
 
@@ -114,7 +114,9 @@ def _positioning(mapped: VolumetricMap) -> dict[str, tuple[Sequence[str], list[R
         axes = [axis for axis in known if joints[axis].turns == turns]
         if axes:
             along = {axis: _along(mapped, axis) for axis in axes}
-            header = positioning_header(mapped, {axis: left for axis, (_, _, left) in along.items()}, turns)
+            header = positioning_header(
+                mapped, {axis: remaining for axis, (_, _, remaining) in along.items()}, turns
+            )
             rows = [row for axis in axes for row in _axis_rows(joints[axis], *along[axis][:2])]
             columns = (
                 ["axis", "reading_deg", "error_urad", "correction_urad", "correction_deg", "u_urad"]
@@ -152,7 +154,7 @@ def _volumetric(mapped: VolumetricMap) -> Iterator[Row]:
         "not_corrected_um",
     ]
     u = np.sqrt(np.maximum(np.diagonal(error.covariance, axis1=1, axis2=2), 0.0))
-    left = np.linalg.norm(corrected.left, axis=1)
+    uncorrected = np.linalg.norm(corrected.uncorrected, axis=1)
     for row, position in enumerate(error.positions):
         readings = [
             chain.joints[i].sign
@@ -168,7 +170,7 @@ def _volumetric(mapped: VolumetricMap) -> Iterator[Row]:
                         corrected.corrections[row],
                         u[row],
                         corrected.u[row],
-                        left[row : row + 1],
+                        uncorrected[row : row + 1],
                     ]
                 )
                 / um

@@ -11,10 +11,10 @@ from monitor.workflow.models import label
 from monitor.workflow.volumetric.error_map import VolumetricMap
 
 
-def positioning_header(mapped: VolumetricMap, left: Mapping[int, float], turns: bool) -> list[str]:
+def positioning_header(mapped: VolumetricMap, remaining: Mapping[int, float], turns: bool) -> list[str]:
     """The lines above the tables of linear axes, or of the rotary ones.
 
-    ``left`` is what straight lines between the rows leave at most, mm or rad, by the index of the axis.
+    ``remaining`` is what straight lines between the rows leave at most, mm or rad, by the index of the axis.
     """
     unit, small = ("deg", "urad") if turns else ("mm", "um")
     correction = "correction_deg" if turns else "correction_um"
@@ -28,8 +28,8 @@ def positioning_header(mapped: VolumetricMap, left: Mapping[int, float], turns: 
         "Only the errors of each axis along itself are in this table.",
         "Use it or the volumetric table of the run, not both.",
         *_circumstances(mapped),
-        f"Between two rows: a straight line, which leaves at most {_left(mapped, left, turns)}.",
-        *_reversals(mapped, list(left)),
+        f"Between two rows: a straight line, which leaves at most {_left(mapped, remaining, turns)}.",
+        *_reversals(mapped, list(remaining)),
     ]
 
 
@@ -57,11 +57,12 @@ def volumetric_header(mapped: VolumetricMap) -> list[str]:
     ]
 
 
-def _left(mapped: VolumetricMap, left: Mapping[int, float], turns: bool) -> str:
+def _left(mapped: VolumetricMap, remaining: Mapping[int, float], turns: bool) -> str:
     unit, small = (MICRORADIAN, "urad") if turns else (MICROMETRE, "um")
     joints = mapped.errors.chain.joints
     return ", ".join(
-        f"{max(unit.to_display(size), 0.01):.2f} {small} ({joints[axis].name})" for axis, size in left.items()
+        f"{max(unit.to_display(size), 0.01):.2f} {small} ({joints[axis].name})"
+        for axis, size in remaining.items()
     )
 
 
