@@ -1,6 +1,6 @@
 """A limit of the volumetric error binds the weekly report and the fleet as it does the trend page."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,8 +8,10 @@ import pytest
 from scipy import stats
 
 from monitor.cli.trend_output import _volumetric
+from monitor.documents import from_document, to_document
 from monitor.readers import read_campaign
 from monitor.reporting.health.page import _map
+from monitor.reporting.health.records import VolumetricMap
 from monitor.store import Database, import_campaign
 from monitor.workflow.fleet import FleetRequest, fleet
 from monitor.workflow.health.map import probability_beyond, stated_map
@@ -19,6 +21,14 @@ from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.trend.answer import VolumetricForecast
 from monitor.workflow.volumetric.request import VolumetricRequest
 from monitor.workflow.volumetric.volumetric import volumetric_map
+
+
+@dataclass(frozen=True)
+class _Page:
+    """As a page of the report has its map."""
+
+    map: VolumetricMap | None
+
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "five-days"
 NOTHING = SimpleNamespace(suspect=())
@@ -84,3 +94,10 @@ def test_beyond_the_limit_is_said_as_since_when_and_not_as_a_day_that_is_past():
     assert first.endswith("limit 60 µm; already beyond it since 2026-02-20")
     later = replace(ahead, latest_um=55.0, crosses_limit_at="2026-05-01T00:00:00", beyond_since=None)
     assert "reaches its limit on 2026-05-01" in next(_volumetric(later, "2026-03-06T12:00:00"))
+
+
+def test_a_report_of_before_the_limit_is_still_read(limited):
+    mapped, _, _ = limited
+    document = to_document(_Page(stated_map(mapped)))
+    assert not {"limit_um", "probability_out"} & set(document["map"])
+    assert from_document(_Page, document).map == stated_map(mapped)

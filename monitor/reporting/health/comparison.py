@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from monitor.documents import OMITTED
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class MissingEffect:
     rms_before_um: float | None
     rms_after_um: float | None
     not_ruled_out: tuple[str, ...]
-    reversal: ReversalValue | None = None
+    reversal: ReversalValue | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

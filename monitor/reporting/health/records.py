@@ -6,10 +6,11 @@ that could not be made is a text that says why, never an empty place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from typing import Literal
 
+from monitor.documents import OMITTED
 from monitor.reporting.health.comparison import ModelHealth
 from monitor.reporting.svg.map_slices import Slice
 
@@ -168,8 +169,8 @@ class VolumetricMap:
     slices: tuple[Slice, ...] = ()
     k: float = 2.0
     p: float = 0.95
-    limit_um: float | None = None
-    probability_out: float | None = None
+    limit_um: float | None = field(default=None, metadata=OMITTED)
+    probability_out: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from monitor.documents import OMITTED
 from monitor.machine import Chain, frame_of, machine_frame
 from monitor.records import Array, FrameOfReference
 
@@ -27,7 +28,7 @@ class MachineFrameAnswer:
     u: Mapping[str, float]
     covariance: Array
     sums: Mapping[str, Mapping[str, float]]
-    k: float | None = None
+    k: float | None = field(default=None, metadata=OMITTED)
 
     @property
     def moved(self) -> tuple[str, ...]:
