@@ -168,7 +168,7 @@ def test_german_results_say_what_they_refer_to(found: RunUncertainty) -> None:
     assert rows["EB0Z"].endswith(", im Koordinatensystem der Maschine")
     assert printed.machine_frame is not None
     assert [row[:2] for row in printed.machine_frame.rows] == [("EA0C", "EA0B + EA0C")]
-    assert "Im Koordinatensystem der Maschine, wie ISO 230-1:2012" in printed.machine_frame.explained
+    assert "Im Koordinatensystem der Maschine (ISO 230-1:2012, 3.7" in printed.machine_frame.explained
 
 
 def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, found: RunUncertainty) -> None:
