@@ -26,7 +26,7 @@ from monitor.uncertainty.coverage import (
     single_factor,
 )
 from monitor.uncertainty.degrees_of_freedom import effective_dof
-from monitor.uncertainty.framework import BudgetLine, FrameworkResult, OutputContribution, gum_framework
+from monitor.uncertainty.framework import FrameworkResult, gum_framework
 from monitor.uncertainty.intervals import coverage_interval
 from monitor.uncertainty.marginals import (
     Arcsine,
@@ -39,6 +39,7 @@ from monitor.uncertainty.marginals import (
 )
 from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.montecarlo import RunEstimator, run_estimator
+from monitor.uncertainty.parts import BudgetLine, Estimated, OutputContribution
 from monitor.uncertainty.projection import Projection, nearest_correlation
 from monitor.uncertainty.propagation import Model, Summary
 from monitor.uncertainty.row_run import RowRun, measured_run, repeated_readings
@@ -61,6 +62,7 @@ __all__ = [
     "BudgetLine",
     "Comparison",
     "Empirical",
+    "Estimated",
     "FrameworkResult",
     "Inputs",
     "JointDistribution",

@@ -17,25 +17,8 @@ from monitor.records import Array
 from monitor.uncertainty.covariance import Inputs
 from monitor.uncertainty.coverage import ellipsoid_factor, rectangle_factor
 from monitor.uncertainty.degrees_of_freedom import effective_dof
+from monitor.uncertainty.parts import BudgetLine, OutputContribution
 from monitor.uncertainty.roots import checked_covariance, correlation_of, covariance_root
-
-
-@dataclass(frozen=True)
-class BudgetLine:
-    """What one source adds to the output covariance (m, m), and its degrees of freedom.
-
-    A line named ``a × b`` is the covariance between two sources, which may be negative. A source whose
-    degrees of freedom do not apply (a covariance between sources) has None.
-    """
-
-    source: str
-    covariance: Array
-    dof: float | None
-
-    @property
-    def variance(self) -> Array:
-        """What the source adds to each output's variance (m,)."""
-        return np.asarray(np.diag(self.covariance))
 
 
 @dataclass(frozen=True)
@@ -86,15 +69,6 @@ class FrameworkResult:
         """Every line's part of every output's variance (lines, m); the lines of an output add up to 1."""
         total = np.diag(self.covariance)
         return np.array([line.variance / np.where(total > 0.0, total, 1.0) for line in self.budget])
-
-
-@dataclass(frozen=True)
-class OutputContribution:
-    """A covariance (m, m) that acts on the outputs directly, such as what lack of fit leaves."""
-
-    source: str
-    covariance: Array
-    dof: float = math.inf
 
 
 def gum_framework(
@@ -165,6 +139,7 @@ def _input_lines(inputs: Inputs, sensitivity: Array) -> tuple[BudgetLine, ...]:
             source,
             sensitivity[:, at] @ inputs.covariance[np.ix_(at, at)] @ sensitivity[:, at].T,
             inputs.degrees_of_freedom(source),
+            inputs.estimated_of(source),
         )
         for source, at in places.items()
     ]
@@ -189,5 +164,5 @@ def _output_lines(
         covariance = checked_covariance(part.covariance)
         if covariance.shape != (outputs, outputs):
             raise DataError(f"'{part.source}' must have shape ({outputs}, {outputs}), not {covariance.shape}")
-        lines.append(BudgetLine(part.source, covariance, part.dof))
+        lines.append(BudgetLine(part.source, covariance, part.dof, part.estimated))
     return tuple(lines)
