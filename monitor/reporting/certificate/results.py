@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
@@ -43,7 +44,8 @@ class ResultSet:
     hyper-ellipsoid of ``rank`` dimensions, both for probability ``p`` (JCGM 102:2011 6.5). ``evaluation``
     names the way the uncertainty was found, with its clause. ``trials`` and ``validation`` belong to Monte
     Carlo. ``tolerances`` (m,) are limits of absolute values, NaN where there is none. ``dof``: degrees of freedom of
-    the covariance, for which the factors hold (Student, Hotelling); not finite where it is known.
+    the covariance as a whole; not finite where it is known. ``sampling`` is that of the factors; None in a result of
+    an earlier version, whose factors hold for ``dof`` (Student, Hotelling).
     """
 
     state: str
@@ -63,6 +65,17 @@ class ResultSet:
     validation: str | None = None
     tolerances: Array | None = None
     dof: float = math.inf
+    sampling: FactorSampling | None = None
+
+    @property
+    def k_p_error(self) -> float:
+        """Standard error of the sampling of k_p, which decides its digits; zero where none is stored."""
+        return 0.0 if self.sampling is None else self.sampling.k_p_standard_error
+
+    @property
+    def k_q_error(self) -> float:
+        """Standard error of the sampling of k_q, which decides its digits; zero where none is stored."""
+        return 0.0 if self.sampling is None else self.sampling.k_q_standard_error
 
     @property
     def u(self) -> Array:
@@ -118,6 +131,7 @@ class CoverageFactors:
     k_q: float
     rank: int
     dof: float = math.inf
+    sampling: FactorSampling | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,6 +196,7 @@ def result_set(
         validation=statements.validation,
         tolerances=None if limits is None else np.array([limits.get(name, math.nan) for name in names]),
         dof=factors.dof,
+        sampling=factors.sampling,
     )
 
 
