@@ -156,7 +156,7 @@ def test_a_german_laboratory_gets_a_german_certificate(db: Database, tmp_path: P
     )
     text = text_of(made.file)
     for words in (
-        "Nr. D-1, ausgestellt am 12.03.2026", "Auftraggeber", "Ergebnisse, wie vorgefunden", "k q = 2,94",
+        "Nr. D-1, ausgestellt am 12.03.2026", "Auftraggeber", "Ergebnisse, wie vorgefunden", "k q = 2,91",
         "Kein Ergebnis für EX0C1: mit diesem Messplan nicht zu trennen: EX0C1 von Tasterspitze x",
         "Volumetrische Abweichung, wie vorgefunden", "Ende des Kalibrierscheins D-1",
     ):  # fmt: skip

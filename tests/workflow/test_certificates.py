@@ -199,7 +199,7 @@ def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(gua
     assert "Simultaneous guard band of all 13 parameters together, w = U = k_q u" in text
     assert "Risk: all statements 'pass' hold at once with at least the coverage probability 95 %" in text
     assert "Joint probability that all 3 parameters lie within their tolerances" in text
-    assert "EXX ± 60.0 µm/m" in text
+    assert re.search(r"EXX ± 60\.0 \d+ µm/m", text)
     assert "conditional pass" in text
 
 
@@ -220,7 +220,7 @@ def test_jcgm106_9_5_the_global_risks_of_a_rule_are_those_of_drawn_machines(foun
         assert judged.consumers_risk == pytest.approx(float(np.mean(passed & outside)), abs=4e-4)
         assert judged.producers_risk == pytest.approx(float(np.mean(~passed & ~outside)), abs=8e-4)
         assert "EXX 40" in str(statement.process)
-    with pytest.raises(InputError, match="--process EYY: only EX0C, EXX, EA0B have a result and a tolerance"):
+    with pytest.raises(InputError, match="--process EYY: only EA0B, EX0C, EXX have a result and a tolerance"):
         statement_of(result, "ilac", texts_of(), campaign="limited", freedoms=freedoms, process={"EYY": 3.0})
 
 
