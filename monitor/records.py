@@ -25,6 +25,14 @@ Branch = Literal["work", "tool"]
 LINEAR_LETTERS = "XYZUVW"
 
 
+class ValidationVerdict(StrEnum):
+    """Whether Monte Carlo confirms a first-order result; the value is how documents store it."""
+
+    VALIDATED = "validated"
+    NOT_VALIDATED = "not validated"
+    UNDECIDED = "undecided"
+
+
 @dataclass(frozen=True)
 class AxisSettings:
     """What the machine file says of one axis; None where it says nothing.

@@ -71,13 +71,16 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
     """The parameters twice, with the ellipsoidal and with the rectangular region, each with the full covariance."""
     say(parent, "name", texts("dcc.result", state=result.state), texts.language)
     results = _results(parent, record, result.evaluation, texts)
-    for region, factor in (("ellipsoidal", result.k_p), ("rectangular", result.k_q)):
+    for region, factor, sampled in (
+        ("ellipsoidal", result.k_p, result.k_p_error > 0.0),
+        ("rectangular", result.k_q, result.k_q_error > 0.0),
+    ):
         element = add(results, "result")
         say(element, "name", texts(f"dcc.{region}"), texts.language)
         say(element, "description", texts(f"dcc.{region}_words", rank=result.rank), texts.language)
         quantity = add(add(element, "data"), "quantity")
         say(quantity, "name", "; ".join(result.descriptions), texts.language)
-        _values(quantity, result, region, factor)
+        _values(quantity, result, region, factor, sampled)
     for refusal in result.refused:
         element = add(results, "result")
         say(element, "name", texts("dcc.refused", parameters=", ".join(refusal.parameters)), texts.language)
@@ -124,7 +127,7 @@ def _results(parent: ET.Element, record: CertificateRecord, evaluation: str, tex
     return add(parent, "results")
 
 
-def _values(parent: ET.Element, result: ResultSet, region: str, factor: float) -> None:
+def _values(parent: ET.Element, result: ResultSet, region: str, factor: float, sampled: bool) -> None:
     units = [unit_of(unit) for unit in result.units]
     values = add(parent, "realListXMLList", space=SI)
     add(values, "labelXMLList", " ".join(result.names), SI)
@@ -140,7 +143,7 @@ def _values(parent: ET.Element, result: ResultSet, region: str, factor: float) -
             add(element, "unit", second + unit, SI)
     add(around, "coverageFactor", _number(factor), SI)
     add(around, "coverageProbability", _number(result.p), SI)
-    add(around, "distribution", _distribution(result), SI)
+    add(around, "distribution", "numerical" if sampled else _distribution(result), SI)
 
 
 def _distribution(result: ResultSet) -> str:

@@ -90,8 +90,9 @@ def _method(method: MethodUsed, texts: Texts) -> list[tuple[str, str]]:
 
 def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
     sign = texts.decimal_sign
-    k_q, k_p = written_factor(result.k_q, sign), written_factor(result.k_p, sign)
-    half_axes = "; ".join(written_factor(axis, sign) for axis in result.half_axes)
+    k_q = written_factor(result.k_q, sign, result.k_q_error)
+    k_p = written_factor(result.k_p, sign, result.k_p_error)
+    half_axes = "; ".join(written_factor(axis, sign, result.k_p_error) for axis in result.half_axes)
     rows = result_rows(result, texts)
     parameter = texts("page.parameter" if result.machine_frame is None else "page.parameter_referred")
     heads = (
@@ -104,7 +105,7 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
         rows=rows,
         widths=result_widths(rows, heads),
         explained=texts.markup(
-            "page.results_explained",
+            "page.results_explained" if result.sampling is None else "page.results_explained_sampled",
             k_q=k_q,
             k_p=k_p,
             count=len(result.names),

@@ -17,6 +17,7 @@ from monitor.documents import OMITTED
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.certificate.machine_frame_result import MachineFrameResult
+from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
@@ -43,10 +44,11 @@ class ResultSet:
     ``state`` of the machine that they describe: as found, as left. ``estimate`` (m,), ``covariance`` (m, m) in
     products of the display units. ``k_q`` is the coverage factor of the hyper-rectangle, ``k_p`` that of the
     hyper-ellipsoid of ``rank`` dimensions, both for probability ``p`` (JCGM 102:2011 6.5). ``evaluation`` names the
-    way the uncertainty was found, with its clause. ``trials`` and ``validation`` belong to Monte Carlo.
+    way the uncertainty was evaluated, with its clause. ``trials`` and ``validation`` belong to Monte Carlo.
     ``tolerances`` (m,) are limits of absolute values, NaN where there is none. ``dof``: degrees of freedom of the
-    covariance, for which the factors hold (Student, Hotelling); not finite where it is known. ``machine_frame`` has
-    the location errors in the frame of the machine; None in a result of an earlier version.
+    covariance as a whole; not finite where it is known. ``sampling`` is that of the factors; None in a result of an
+    earlier version, whose factors hold for ``dof`` (Student, Hotelling). ``machine_frame`` has the location errors in
+    the frame of the machine; None in a result of an earlier version.
     """
 
     state: str
@@ -67,6 +69,17 @@ class ResultSet:
     tolerances: Array | None = None
     dof: float = math.inf
     machine_frame: MachineFrameResult | None = field(default=None, metadata=OMITTED)
+    sampling: FactorSampling | None = None
+
+    @property
+    def k_p_error(self) -> float:
+        """Standard error of the sampling of k_p, which decides its digits; zero where none is stored."""
+        return 0.0 if self.sampling is None else self.sampling.k_p_standard_error
+
+    @property
+    def k_q_error(self) -> float:
+        """Standard error of the sampling of k_q, which decides its digits; zero where none is stored."""
+        return 0.0 if self.sampling is None else self.sampling.k_q_standard_error
 
     @property
     def u(self) -> Array:
@@ -122,6 +135,7 @@ class CoverageFactors:
     k_q: float
     rank: int
     dof: float = math.inf
+    sampling: FactorSampling | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,6 +202,7 @@ def result_set(
         tolerances=None if limits is None else np.array([limits.get(name, math.nan) for name in names]),
         dof=factors.dof,
         machine_frame=statements.machine_frame,
+        sampling=factors.sampling,
     )
 
 
