@@ -10,6 +10,7 @@ from monitor.readers.folder_names import names_in
 from monitor.readers.linear_axes import read_linear_axes
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, method_rules, read_campaign, readers
+from monitor.readers.sources_file import read_sources_file
 from monitor.readers.writer import write_campaign
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "names_in",
     "read_campaign",
     "read_linear_axes",
+    "read_sources_file",
     "readers",
     "write_campaign",
 ]
