@@ -13,6 +13,7 @@ import numpy as np
 
 from monitor.documents import OMITTED
 from monitor.records import Array
+from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.reporting.refused import RefusedParameters
 from monitor.workflow.uncertainty.request import Asked
@@ -37,7 +38,8 @@ class FrameworkAnswer:
 
     ``k_p`` and ``k_q`` are those of 6.5 for normal outputs; those ``with_degrees_of_freedom`` are what so few runs
     allow to claim, and belong to the ``expanded`` uncertainty. None: infinite, or no joint region. ``budget`` has the
-    part of every source in the variance of every parameter. ``joint_coverage_of_k_2_each`` takes half a second of
+    part of every source in the variance of every parameter, the largest first, ``budget_degrees_of_freedom`` those of
+    every line (None: known). ``joint_coverage_of_k_2_each`` takes half a second of
     sampling and is left out where nobody reads it.
     """
 
@@ -54,6 +56,7 @@ class FrameworkAnswer:
     k_q_with_degrees_of_freedom: float | None
     expanded: Mapping[str, float]
     budget: Mapping[str, Mapping[str, float]]
+    budget_degrees_of_freedom: Mapping[str, float | None] | None = field(default=None, metadata=OMITTED)
     joint_coverage_of_k_2_each: float | None = field(default=None, metadata=OMITTED)
 
 
@@ -106,7 +109,9 @@ class UncertaintyAnswer:
     ``units`` are the display units by parameter. ``input_covariance`` says in a sentence where the covariance of the
     readings comes from, ``input_covariance_source`` as data; None in an answer that an earlier version stored, until it
     is restored (``stored.restored``). ``refused`` are parameters without a number. ``mcm`` and ``validation`` are left
-    out where no Monte Carlo was asked for.
+    out where no Monte Carlo was asked for. ``holds_for`` says for which time it holds, ``day_to_day`` how runs and
+    days differ, ``sources`` which Type B sources were stated, ``length`` to what gains refer; all are None in an answer
+    of an earlier version.
     """
 
     campaign: str
@@ -125,6 +130,10 @@ class UncertaintyAnswer:
     lack_of_fit_causes: tuple[LackOfFitCause, ...] | None = field(default=None, metadata=OMITTED)
     mcm: MonteCarloAnswer | None = field(default=None, metadata=OMITTED)
     validation: ValidationAnswer | None = field(default=None, metadata=OMITTED)
+    holds_for: HoldsFor | None = field(default=None, metadata=OMITTED)
+    day_to_day: DayToDay | None = field(default=None, metadata=OMITTED)
+    sources: tuple[StatedSource, ...] | None = field(default=None, metadata=OMITTED)
+    length: LengthReference | None = field(default=None, metadata=OMITTED)
 
     @property
     def covariance(self) -> Array:

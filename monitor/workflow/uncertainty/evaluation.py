@@ -13,11 +13,13 @@ import numpy as np
 from monitor.discovery import Fit, fit
 from monitor.discovery.machine.model_uncertainty import model_uncertainty
 from monitor.discovery.machine.variants import variants_of
+from monitor.effects import ChainEffect
 from monitor.effects.catalogue import catalogue
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.results import refusals
 from monitor.records import Array, Campaign
+from monitor.reporting.budget import HoldsFor
 from monitor.reporting.covariance_source import CovarianceSource, TakenAsKnown
 from monitor.store import Database, StoredModel
 from monitor.uncertainty import (
@@ -34,15 +36,31 @@ from monitor.uncertainty import (
 from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.row_run import measured_run
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
+from monitor.uncertainty.sourced_trials import Moves, output_moves
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import as_model, resolve
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-from monitor.workflow.uncertainty.inputs import calibrated_inputs, reading_inputs, with_linear_axes
+from monitor.workflow.uncertainty.day_to_day import between_days, components_of, day_to_day
+from monitor.workflow.uncertainty.inputs import (
+    calibrated_inputs,
+    holding_for,
+    reading_inputs,
+    with_linear_axes,
+)
 from monitor.workflow.uncertainty.request import UncertaintyRequest
-from monitor.workflow.uncertainty.result import RunUncertainty
+from monitor.workflow.uncertainty.result import Behind, RunUncertainty
+from monitor.workflow.uncertainty.sources import (
+    all_sources,
+    axes_stated,
+    contained,
+    counted_columns,
+    length_reference,
+    refuse_twice,
+    stated,
+)
 from monitor.workflow.uncertainty.spreading import trials_of
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import LACK_OF_FIT, save_uncertainty
@@ -58,8 +76,9 @@ MOST_READINGS, MOST_READINGS_MCM = 4000, 1200
 class _Propagated:
     """What is propagated: a run, its inputs, where it is linearised, and the m outputs ``names`` with their ``units``.
 
-    ``readings`` are the inputs without the errors of the linear axes, which for the budget are ``contributions`` to the
-    outputs, as lack of fit is.
+    ``readings`` are the inputs without the errors of the linear axes and without sources, which for the budget are
+    ``contributions`` to the outputs, as lack of fit is. ``on_outputs`` are those of them that no input carries but a
+    Monte Carlo draws besides, ``moves`` what it draws.
     """
 
     run: MeasuredRun
@@ -70,6 +89,9 @@ class _Propagated:
     inputs: Inputs
     contributions: tuple[OutputContribution, ...]
     source: CovarianceSource
+    behind: Behind
+    moves: Moves
+    on_outputs: tuple[OutputContribution, ...]
 
     @property
     def unit_names(self) -> tuple[str, ...]:
@@ -139,6 +161,7 @@ def evaluate_fit(
         monte_carlo=sampled,
         validation=validation,
         causes=causes,
+        behind=propagated.behind,
     )
 
 
@@ -151,29 +174,64 @@ def _propagated(
     selected: SelectedReadings | None,
 ) -> tuple[_Propagated, tuple[tuple[str, float], ...]]:
     """What is propagated for the run at ``index`` of the fit, and the effects that lack of fit may come from."""
-    readings, source = reading_inputs(fit, campaign, run, selected)
+    asked = request.asked
+    readings, source = reading_inputs(fit, campaign, run, selected, asked.holds_for)
     calibrated = calibrated_inputs(run)
     inputs = joined(readings, calibrated) if calibrated is not None else readings
     at = sensitivity_of(run, start=fit.solution.local[index])
     names = tuple(name for name in fit.problem.base_names if at.determined[at.names.index(name)])
-    propagated = _Propagated(run, at, names, _units(fit, names), inputs, inputs, (), source)
+    units = _units(fit, names)
+    sources = all_sources(campaign, request.sources)
+    refuse_twice(sources, request.linear_axes, fit.problem.context.chain)
+    components = components_of(fit, campaign, run, at.rows(names), names)
+    holds = holding_for(source, components.days)
+    adds_days = asked.holds_for is HoldsFor.CAMPAIGN and holds is HoldsFor.DAY
+    days = (between_days(components),) if adds_days else ()
+    seen = contained(source.kind, components.days, adds_days)
+    counted = counted_columns(run, at.unknowns, campaign, int(fit.problem.runs[index]), sources, seen)
+    behind = Behind(
+        holds_for=HoldsFor.CAMPAIGN if adds_days else holds,
+        day_to_day=day_to_day(components, names, units),
+        sources=stated(sources, counted),
+        length=length_reference(campaign, int(fit.problem.runs[index]), _gains(fit, names)),
+    )
+    of_sources = tuple(part.contribution(at.rows(names)) for part in counted)
+    propagated = _Propagated(
+        run, at, names, units, inputs, inputs, (*of_sources, *days), source, behind,
+        Moves(counted, output_moves(days)), days,
+    )  # fmt: skip
     causes: tuple[tuple[str, float], ...] = ()
     if request.model_uncertainty:
         line, causes = _lack_of_fit(campaign, fit, index, names)
-        propagated = replace(propagated, contributions=() if line is None else (line,))
+        further = () if line is None else (line,)
+        propagated = replace(propagated, contributions=(*propagated.contributions, *further))
     if request.linear_axes is not None:
         inputs, of_axes = with_linear_axes(run, inputs, at, names, request.linear_axes)
         propagated = replace(propagated, inputs=inputs, contributions=(*of_axes, *propagated.contributions))
     method_knows = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
-    stated = request.linear_axes is not None
+    linear = {joint.name for joint in fit.problem.context.chain.of_kind("linear")}
+    axes_known = request.linear_axes is not None
+    covered = axes_known or (bool(linear) and linear <= axes_stated(sources, fit.problem.context.chain))
     source = replace(
         source,
-        linear_axes=stated,
+        linear_axes=axes_known,
         taken_as_known=tuple(
-            name for name in method_knows if not (stated and name is TakenAsKnown.LINEAR_AXES)
+            name for name in method_knows if not (covered and name is TakenAsKnown.LINEAR_AXES)
         ),
     )
     return replace(propagated, source=source), causes
+
+
+def _gains(fit: Fit, names: tuple[str, ...]) -> tuple[str, ...]:
+    """The positioning gains among the outputs."""
+    context = fit.problem.context
+    gains = [
+        name
+        for effect in fit.problem.base
+        if isinstance(effect, ChainEffect) and effect.is_gain
+        for name in effect.parameters(context)
+    ]
+    return tuple(name for name in names if name in gains)
 
 
 def _lack_of_fit(
@@ -217,7 +275,7 @@ def _units(fit: Fit, names: tuple[str, ...]) -> tuple[Unit, ...]:
 
 def _sampled(propagated: _Propagated, request: UncertaintyRequest) -> MonteCarloResult:
     tighten = VALIDATION_TIGHTENING if request.method == "both" else 1.0
-    with trials_of(propagated.run, propagated.inputs, propagated.names, request) as (
+    with trials_of(propagated.run, propagated.inputs, propagated.names, request, propagated.moves) as (
         trials,
         sampler,
         threads,
@@ -229,13 +287,14 @@ def _sampled(propagated: _Propagated, request: UncertaintyRequest) -> MonteCarlo
 def _validated(propagated: _Propagated, sampled: MonteCarloResult, request: UncertaintyRequest) -> Validation:
     """The framework of a known covariance, which is what a Monte Carlo samples, compared with it."""
     plain = gum_framework(
-        propagated.inputs,
+        propagated.moves.with_sources(propagated.inputs),
         propagated.sensitivity.rows(propagated.names),
         propagated.estimate,
         propagated.names,
         propagated.unit_names,
         p=request.p,
         finite_dof=False,
+        contributions=propagated.on_outputs,
     )
     return validate(plain, sampled, digits=request.digits)
 
