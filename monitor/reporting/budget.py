@@ -6,8 +6,8 @@ a table is printed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -98,13 +98,18 @@ class BudgetLine:
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """What a certificate prints beside its results; ``expanded`` (m,) is U. Lines with the largest share come first."""
+    """What a certificate prints beside its results. Lines with the largest share come first."""
 
     holds_for: HoldsFor
     lines: tuple[BudgetLine, ...]
     day_to_day: DayToDay | None = None
     sources: tuple[StatedSource, ...] = ()
     length: LengthReference | None = None
+
+    def of(self, places: Sequence[int]) -> Budget:
+        """The budget of the parameters at ``places`` alone."""
+        lines = tuple(replace(line, u=line.u[list(places)]) for line in self.lines)
+        return replace(self, lines=lines)
 
 
 #: Names of lines that are not the user's, and their key among the texts of section ``budget``.

@@ -28,22 +28,25 @@ def days_sentences(
         sentences.append(texts(f"budget.{days.not_known.replace(' ', '_')}", runs=days.runs, days=days.days))
     beyond = larger_than_u(days, expanded) if holds_for is not HoldsFor.CAMPAIGN else ()
     beyond = tuple(sorted(beyond, key=lambda name: -days.spread[name] / expanded[name]))
-    for name in beyond[:_NAMED]:
-        sentences.append(
+    if beyond:
+        named = [
             texts(
-                "budget.days_differ",
+                "budget.differs",
                 name=name,
                 spread=_at_place_of(days.spread[name], expanded[name], texts),
-                days=days.days,
                 expanded=_two_digits(expanded[name], texts),
                 unit=units[name],
             )
-        )
-    if len(beyond) > _NAMED:
-        sentences.append(texts("budget.days_differ_too", names=", ".join(beyond[_NAMED:])))
-    if days.not_from_zero:
-        sentences.append(texts("budget.negative", names=", ".join(days.not_from_zero)))
+            for name in beyond[:_NAMED]
+        ]
+        names = ", ".join([*named, *beyond[_NAMED:]])
+        sentences.append(texts("budget.days_differ", names=names, days=days.days))
     return tuple(sentences)
+
+
+def negative_sentence(days: DayToDay, texts: Texts) -> str:
+    """Which estimates of u_day were negative; empty where none was."""
+    return texts("budget.negative", names=", ".join(days.not_from_zero)) if days.not_from_zero else ""
 
 
 def length_sentence(length: LengthReference, texts: Texts) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from monitor.reporting.certificate.behind import PrintedBehind, printed_behind
 from monitor.reporting.certificate.completeness import check_complete
 from monitor.reporting.certificate.matrix import Block, correlation_blocks
 from monitor.reporting.certificate.pictures import Picture, beside, map_picture, pictures_of
@@ -34,6 +35,7 @@ class PrintedResult:
     blocks: tuple[Block, ...]
     beside: bool
     pictures: tuple[Picture, ...]
+    behind: PrintedBehind | None
 
 
 def certificate_context(record: CertificateRecord) -> dict[str, Any]:
@@ -119,4 +121,5 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
         ),
         beside=beside(result),
         pictures=pictures_of(result, texts),
+        behind=printed_behind(result, texts),
     )

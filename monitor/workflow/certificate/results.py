@@ -8,6 +8,7 @@ import numpy as np
 
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.records import Array
+from monitor.reporting.budget import Budget, budget_lines
 from monitor.reporting.certificate.results import (
     CoverageFactors,
     JointEstimate,
@@ -133,8 +134,24 @@ def results_of(
             trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
             validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
             tolerances={name: limits[name] for name in limits if name in evaluated.names} or None,
+            budget=_budget(answer),
         ),
         texts,
+    )
+
+
+def _budget(answer: UncertaintyAnswer) -> Budget | None:
+    """What stands behind the uncertainty; None for an answer that does not say it."""
+    if answer.holds_for is None:
+        return None
+    guf = answer.guf
+    u = {name: guf.u[name] for name in answer.parameters}
+    return Budget(
+        answer.holds_for,
+        budget_lines(guf.budget, u, guf.budget_degrees_of_freedom or {}),
+        answer.day_to_day,
+        answer.sources or (),
+        answer.length,
     )
 
 
