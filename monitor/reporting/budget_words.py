@@ -29,16 +29,11 @@ def days_sentences(
     beyond = larger_than_u(days, expanded) if holds_for is not HoldsFor.CAMPAIGN else ()
     beyond = tuple(sorted(beyond, key=lambda name: -days.spread[name] / expanded[name]))
     if beyond:
-        named = [
-            texts(
-                "budget.differs",
-                name=name,
-                spread=_at_place_of(days.spread[name], expanded[name], texts),
-                expanded=_two_digits(expanded[name], texts),
-                unit=units[name],
-            )
-            for name in beyond[:_NAMED]
-        ]
+        named = []
+        for name in beyond[:_NAMED]:
+            spread = _at_place_of(days.spread[name], expanded[name], texts)
+            limit = _two_digits(expanded[name], texts)
+            named.append(f"{name} ({spread} {units[name]}, U = {limit} {units[name]})")
         names = ", ".join([*named, *beyond[_NAMED:]])
         sentences.append(texts("budget.days_differ", names=names, days=days.days))
     return tuple(sentences)

@@ -123,7 +123,7 @@ def _lines(budget: Budget, texts: Texts) -> tuple[Markup, ...]:
         else:
             dof = texts.number(round_to_place(line.degrees_of_freedom, decimal_of(0.1)).normalize())
             words.append(texts("budget.freedom", dof=dof))
-        printed.append(texts.markup("budget.line", number=number, words="; ".join(words)))
+        printed.append(Markup("<strong>({})</strong> {}").format(number, "; ".join(words)))
     printed += [
         texts.markup("budget.not_added", name=source.name, words=source_words(source, texts))
         for source in budget.sources
