@@ -10,6 +10,7 @@ from monitor.exceptions import InputError
 from monitor.readers.axes import Axis
 from monitor.readers.faults import Faults, near, one_of, quoted
 from monitor.readers.files import LARGEST_TOML, decode, read_bytes
+from monitor.readers.toml_lines import line_of, lines_of_keys
 from monitor.readers.toml_table import Table, parse_toml
 from monitor.sources import HALF_WIDTHS, QUANTITIES, Law, Quantity, QuantityRule, Sharing, Source
 from monitor.units import Unit
@@ -59,6 +60,11 @@ def read_sources_file(path: Path) -> tuple[Source, ...]:
         listed = "\n".join(f"  {fault}" for fault in faults.sorted())
         raise InputError(f"{path} cannot be used:\n{listed}")
     return sources
+
+
+def line_of_source(content: bytes, index: int) -> int | None:
+    """The line of source number ``index`` (from 0) in the bytes of a file; None where it has none."""
+    return line_of(("sources", index), lines_of_keys(content.decode("utf-8-sig", errors="replace")))
 
 
 def _source(table: Table, axes: tuple[Axis, ...] | None) -> Source | None:
