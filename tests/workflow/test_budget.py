@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -17,13 +18,16 @@ from monitor.methods import campaign_method
 from monitor.readers import read_campaign, read_linear_axes, read_sources_file
 from monitor.records import LinearAxes, LinearAxisErrors
 from monitor.reporting.budget import HoldsFor, LengthKind
+from monitor.reporting.budget_words import days_sentences, length_sentence
+from monitor.reporting.texts import texts_of
 from monitor.store import Database, load_campaign, load_certificate
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
 from monitor.workflow.intake.importing import ImportRequest, import_folders
+from monitor.workflow.models import resolve
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-from monitor.workflow.uncertainty.evaluation import evaluate
+from monitor.workflow.uncertainty.evaluation import evaluate, evaluate_fit, fit
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.result import RunUncertainty
 from monitor.workflow.uncertainty.stating import statement
@@ -167,11 +171,6 @@ def test_what_so_few_runs_cannot_say_is_refused(db, campaign, holds_for, match):
 
 def test_one_day_and_two_days_of_many_runs(db):
     whole = load_campaign(db, "five-days")
-    from dataclasses import replace
-
-    from monitor.workflow.models import resolve
-    from monitor.workflow.uncertainty.evaluation import evaluate_fit, fit
-
     for days, word, match in (
         (1, "one day", "1 day of repeated runs say nothing"),
         (2, "two days", "2 days of repeated runs say too little"),
@@ -220,59 +219,47 @@ def pages(db: Database, number: str) -> str:
     return " ".join(" ".join(page.extract_text() for page in reader.pages).split())
 
 
-@pytest.mark.parametrize(
-    ("laboratory", "words"),
-    [
-        (
-            "laboratory.toml",
-            (
-                "The uncertainty holds within a day",
-                "EB0C (16.4 µrad, U = 4.5 µrad)",
-                "on another day these may lie outside of estimate ± U",
-                "Uncertainty budget, as found",
-                "they are not referred to 20 °C",
-                "between runs of a day, between days",
-            ),
-        ),
-        (
-            "laboratory-de.toml",
-            (
-                "Die Messunsicherheit gilt innerhalb eines Tages",
-                "EB0C (16,4 µrad, U = 4,5 µrad)",
-                "Messunsicherheitsbudget, wie vorgefunden",
-                "sie sind nicht auf 20 °C bezogen",
-            ),
-        ),
-    ],
-)
-def test_the_certificate_says_that_day_means_span_more_than_u(db, tmp_path, laboratory, words):
-    number = f"B-{laboratory[10:12]}"
+def issued(db: Database, tmp_path: Path, campaign: str, run: int, laboratory: str, **options: object) -> str:
+    """What the pages of a new certificate say; it is made again byte for byte."""
+    number = f"B-{campaign}"
     issue(
         db,
         CertificateRequest(
-            "five-days", 20, laboratory=EXAMPLES / laboratory, out=tmp_path, number=number,
-            issued_on=date(2026, 3, 12),
+            campaign, run, laboratory=EXAMPLES / laboratory, out=tmp_path, number=number,
+            issued_on=date(2026, 3, 12), **options,
         ),
     )  # fmt: skip
-    text = pages(db, number)
-    # German words are hyphenated at the ends of lines.
-    for phrase in words:
-        assert phrase in text or phrase in text.replace("‐ ", "").replace("- ", "")
     assert remake(db, RemakeRequest(number)).identical is True
+    return pages(db, number)
 
 
-def test_a_certificate_over_the_campaign_has_every_source_and_is_made_again(db, tmp_path):
-    issue(
-        db,
-        CertificateRequest(
-            "steel-bar", 12, laboratory=EXAMPLES / "laboratory.toml", out=tmp_path, number="S-1",
-            issued_on=date(2026, 3, 12), holds_for="campaign",
-        ),
-    )  # fmt: skip
-    text = pages(db, "S-1")
-    assert "The uncertainty holds over the campaign" in text
+def test_the_certificate_says_that_day_means_span_more_than_u(db, tmp_path):
+    text = issued(db, tmp_path, "five-days", 20, "laboratory.toml")
+    for phrase in (
+        "The uncertainty holds within a day",
+        "EB0C (16.4 µrad, U = 4.5 µrad)",
+        "on another day these may lie outside of estimate ± U",
+        "Uncertainty budget, as found",
+        "they are not referred to 20 °C",
+        "between runs of a day, between days",
+    ):
+        assert phrase in text
+
+
+def test_it_is_said_in_german_too(db):
+    answer, texts = answered(db, "five-days", run=20), texts_of("de")
+    said = " ".join(days_sentences(HoldsFor.DAY, answer.day_to_day, answer.guf.expanded, answer.units, texts))
+    assert "Die Messunsicherheit gilt innerhalb eines Tages" in said
+    assert "EB0C (16,4 µrad, U = 4,5 µrad)" in said
+    assert "sie sind nicht auf 20 °C bezogen" in length_sentence(answer.length, texts)
+
+
+def test_a_german_certificate_over_the_campaign_has_every_source(db, tmp_path):
+    text = issued(db, tmp_path, "steel-bar", 12, "laboratory-de.toml", holds_for="campaign")
+    # Words are hyphenated at the ends of lines.
+    text = text.replace("\N{HYPHEN} ", "").replace("- ", "")
+    assert "Die Messunsicherheit gilt über die Messreihe" in text
     for source in read_campaign(EXAMPLES / "steel-bar").sources:
         assert source.name in text
-    assert "± 1 K, rectangular, the same in all runs" in text
-    assert "the length of the bar was corrected from 20 °C to 22.22 °C" in text
-    assert remake(db, RemakeRequest("S-1")).identical is True
+    assert "± 1 K, rechteckverteilt, gleich in allen Läufen" in text
+    assert "Die Länge des Maßstabs wurde mit 11,5 · 10⁻⁶/K von 20 °C auf 22,22 °C umgerechnet" in text

@@ -52,15 +52,13 @@ def printed_behind(result: ResultSet, texts: Texts) -> PrintedBehind | None:
     budget = result.budget
     if budget is None:
         return None
-    expanded = dict(zip(result.names, map(float, result.expanded), strict=True))
-    units = dict(zip(result.names, result.units, strict=True))
-    sentences = days_sentences(budget.holds_for, budget.day_to_day, expanded, units, texts)
+    expanded = _expanded(result)
     days = budget.day_to_day
     shown = days if days is not None and days.runs > 1 else None
     blocks = -(-len(budget.lines) // _ABREAST)
     abreast = -(-len(budget.lines) // max(blocks, 1))
     return PrintedBehind(
-        sentences,
+        behind_sentences(result, budget, texts),
         tuple(
             _block(result, budget.lines[first : first + abreast], first, texts)
             for first in range(0, len(budget.lines), max(abreast, 1))
@@ -70,6 +68,16 @@ def printed_behind(result: ResultSet, texts: Texts) -> PrintedBehind | None:
         None if shown is None else _days(result, shown, expanded, texts),
         Markup("") if shown is None else _days_explained(shown, texts),
     )
+
+
+def behind_sentences(result: ResultSet, budget: Budget, texts: Texts) -> tuple[str, ...]:
+    """For which time the uncertainty holds, and which day means span more than U."""
+    units = dict(zip(result.names, result.units, strict=True))
+    return days_sentences(budget.holds_for, budget.day_to_day, _expanded(result), units, texts)
+
+
+def _expanded(result: ResultSet) -> dict[str, float]:
+    return dict(zip(result.names, map(float, result.expanded), strict=True))
 
 
 def _days_explained(days: DayToDay, texts: Texts) -> Markup:

@@ -13,11 +13,10 @@ from monitor.statistics.nested import DayComponents, day_components
 from monitor.uncertainty import Estimated, OutputContribution
 from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.units import Unit
+from monitor.workflow.uncertainty.inputs import FEWEST_DAYS
 
 #: The line of the budget for what days add.
 BETWEEN_DAYS = "between days"
-#: Between-day scatter from two days may be 32 times as large (chi-square, one degree of freedom, 95 %); from three 6.
-FEWEST_DAYS = 3
 
 
 def components_of(

@@ -13,13 +13,11 @@ import numpy as np
 from monitor.discovery import Fit, fit
 from monitor.discovery.machine.model_uncertainty import model_uncertainty
 from monitor.discovery.machine.variants import variants_of
-from monitor.effects import ChainEffect
 from monitor.effects.catalogue import catalogue
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.results import refusals
 from monitor.records import Array, Campaign
-from monitor.reporting.budget import HoldsFor
 from monitor.reporting.covariance_source import CovarianceSource, TakenAsKnown
 from monitor.store import Database, StoredModel
 from monitor.uncertainty import (
@@ -36,31 +34,21 @@ from monitor.uncertainty import (
 from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.row_run import measured_run
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
-from monitor.uncertainty.sourced_trials import Moves, output_moves
+from monitor.uncertainty.sourced_trials import Moves
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import as_model, resolve
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-from monitor.workflow.uncertainty.day_to_day import between_days, components_of, day_to_day
+from monitor.workflow.uncertainty.beside import Linearised, beside_readings
 from monitor.workflow.uncertainty.inputs import (
     calibrated_inputs,
-    holding_for,
     reading_inputs,
     with_linear_axes,
 )
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.result import Behind, RunUncertainty
-from monitor.workflow.uncertainty.sources import (
-    all_sources,
-    axes_stated,
-    contained,
-    counted_columns,
-    length_reference,
-    refuse_twice,
-    stated,
-)
 from monitor.workflow.uncertainty.spreading import trials_of
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import LACK_OF_FIT, save_uncertainty
@@ -181,24 +169,10 @@ def _propagated(
     at = sensitivity_of(run, start=fit.solution.local[index])
     names = tuple(name for name in fit.problem.base_names if at.determined[at.names.index(name)])
     units = _units(fit, names)
-    sources = all_sources(campaign, request.sources)
-    refuse_twice(sources, request.linear_axes, fit.problem.context.chain)
-    components = components_of(fit, campaign, run, at.rows(names), names)
-    holds = holding_for(source, components.days)
-    adds_days = asked.holds_for is HoldsFor.CAMPAIGN and holds is HoldsFor.DAY
-    days = (between_days(components),) if adds_days else ()
-    seen = contained(source.kind, components.days, adds_days)
-    counted = counted_columns(run, at.unknowns, campaign, int(fit.problem.runs[index]), sources, seen)
-    behind = Behind(
-        holds_for=HoldsFor.CAMPAIGN if adds_days else holds,
-        day_to_day=day_to_day(components, names, units),
-        sources=stated(sources, counted),
-        length=length_reference(campaign, int(fit.problem.runs[index]), _gains(fit, names)),
-    )
-    of_sources = tuple(part.contribution(at.rows(names)) for part in counted)
+    added = beside_readings(campaign, fit, Linearised(run, at, index, names, units), source, asked)
     propagated = _Propagated(
-        run, at, names, units, inputs, inputs, (*of_sources, *days), source, behind,
-        Moves(counted, output_moves(days)), days,
+        run, at, names, units, inputs, inputs, (*added.of_sources, *added.of_days), source, added.behind,
+        added.moves, added.of_days,
     )  # fmt: skip
     causes: tuple[tuple[str, float], ...] = ()
     if request.model_uncertainty:
@@ -208,30 +182,18 @@ def _propagated(
     if request.linear_axes is not None:
         inputs, of_axes = with_linear_axes(run, inputs, at, names, request.linear_axes)
         propagated = replace(propagated, inputs=inputs, contributions=(*of_axes, *propagated.contributions))
-    method_knows = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
-    linear = {joint.name for joint in fit.problem.context.chain.of_kind("linear")}
-    axes_known = request.linear_axes is not None
-    covered = axes_known or (bool(linear) and linear <= axes_stated(sources, fit.problem.context.chain))
     source = replace(
         source,
-        linear_axes=axes_known,
-        taken_as_known=tuple(
-            name for name in method_knows if not (covered and name is TakenAsKnown.LINEAR_AXES)
-        ),
+        linear_axes=request.linear_axes is not None,
+        taken_as_known=_taken_as_known(campaign, added.axes_covered or request.linear_axes is not None),
     )
     return replace(propagated, source=source), causes
 
 
-def _gains(fit: Fit, names: tuple[str, ...]) -> tuple[str, ...]:
-    """The positioning gains among the outputs."""
-    context = fit.problem.context
-    gains = [
-        name
-        for effect in fit.problem.base
-        if isinstance(effect, ChainEffect) and effect.is_gain
-        for name in effect.parameters(context)
-    ]
-    return tuple(name for name in names if name in gains)
+def _taken_as_known(campaign: Campaign, axes_covered: bool) -> tuple[TakenAsKnown, ...]:
+    """What the method takes as known, less the linear axes where their errors are stated."""
+    known = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
+    return tuple(name for name in known if not (axes_covered and name is TakenAsKnown.LINEAR_AXES))
 
 
 def _lack_of_fit(

@@ -30,6 +30,8 @@ BAR = "scale bar"
 CALIBRATED = "calibrated quantities"
 # A covariance from fewer degrees of freedom than this says little about itself; then the next choice is taken.
 FEWEST_DEGREES_OF_FREEDOM = 8
+#: Between-day scatter from two days may be 32 times as large (chi-square, one degree of freedom, 95 %); from three 6.
+FEWEST_DAYS = 3
 
 
 def reading_inputs(
@@ -88,7 +90,7 @@ def holding_for(source: CovarianceSource, days: int) -> HoldsFor:
     if source.kind is CovarianceKind.POOLED_BY_DAY:
         return HoldsFor.DAY
     if source.kind is CovarianceKind.ALL_RUNS:
-        return HoldsFor.CAMPAIGN if days > 1 else HoldsFor.DAY
+        return HoldsFor.CAMPAIGN if days >= FEWEST_DAYS else HoldsFor.DAY
     return HoldsFor.RUN
 
 
