@@ -1,9 +1,9 @@
 """How often an uncertainty that holds within a day, and one that holds over the campaign, cover the long-run value.
 
-``python tests/benchmarks/trial_days.py [SEEDS]`` prints the table of docs/trials-uncertainty-days.md. One
-parameter, 95 % for it alone: estimate of the last run plus minus t u, u² of the scatter within days and, over the
-campaign, of the day component, t with their effective degrees of freedom (Welch-Satterthwaite, days - 1 for the days). What is simulated besides normal
-and independent days: heavy tails, days that follow each other, unequal days.
+``python tests/benchmarks/trial_days.py [SEEDS]`` prints the table of docs/trials-uncertainty-days.md. One parameter, 95 %
+for it alone: U is t u, u² of the scatter within days and, over the campaign, of the day component, t with their effective
+degrees of freedom (Welch-Satterthwaite, days - 1 for the days). What is simulated besides normal and independent days:
+heavy tails, days that follow each other, unequal days.
 """
 
 from __future__ import annotations
