@@ -42,6 +42,7 @@ from monitor.uncertainty.montecarlo import RunEstimator, run_estimator
 from monitor.uncertainty.parts import BudgetLine, Estimated, OutputContribution
 from monitor.uncertainty.projection import Projection, nearest_correlation
 from monitor.uncertainty.propagation import Model, Summary
+from monitor.uncertainty.regions import RegionFactors, region_factors
 from monitor.uncertainty.row_run import RowRun, measured_run, repeated_readings
 from monitor.uncertainty.sampling import (
     BlockSampler,
@@ -75,6 +76,7 @@ __all__ = [
     "OutputContribution",
     "Projection",
     "Rectangular",
+    "RegionFactors",
     "RowRun",
     "RunEstimator",
     "Sampled",
@@ -104,6 +106,7 @@ __all__ = [
     "overall",
     "pooled_by_day",
     "rectangle_factor",
+    "region_factors",
     "repeated_readings",
     "run_estimator",
     "sample_ellipsoid_factor",

@@ -8,7 +8,8 @@ add up, each with its degrees of freedom and with what these degrees are of.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -60,3 +61,8 @@ class OutputContribution:
     covariance: Array
     dof: float = math.inf
     estimated: Estimated = Estimated.SCALE
+
+
+def known(parts: Sequence[BudgetLine]) -> tuple[BudgetLine, ...]:
+    """Return the parts as if nothing of them were estimated."""
+    return tuple(replace(part, dof=math.inf) for part in parts)
