@@ -1,7 +1,7 @@
 """How often an uncertainty that holds within a day, and one that holds over the campaign, cover the long-run value.
 
-``python tests/benchmarks/trial_days.py [SEEDS]`` prints the table of docs/trials-uncertainty-days.md. One parameter, 95 %
-for it alone: U is t u, u² of the scatter within days and, over the campaign, of the day component, t with their effective
+``python tests/benchmarks/trial_days.py [SEEDS]`` prints the table of docs/trials-uncertainty-days.md. One parameter, 95
+% for it alone: U is t u, u² of the scatter within days and, over the campaign, of the day component, t with effective
 degrees of freedom (Welch-Satterthwaite, days - 1 for the days). What is simulated besides normal and independent days:
 heavy tails, days that follow each other, unequal days.
 """

@@ -255,7 +255,7 @@ def test_it_is_said_in_german_too(db):
 
 
 def test_a_german_certificate_over_the_campaign_has_every_source(db, tmp_path):
-    text = issued(db, tmp_path, "steel-bar", 12, "laboratory-de.toml", holds_for="campaign")
+    text = issued(db, tmp_path, "steel-bar", 20, "laboratory-de.toml", holds_for="campaign")
     # Words are hyphenated at the ends of lines.
     text = text.replace("\N{HYPHEN} ", "").replace("- ", "")
     assert "Die Messunsicherheit gilt über die Messreihe" in text

@@ -73,7 +73,8 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
     say(parent, "name", texts("dcc.result", state=result.state), texts.language)
     sentences = () if result.budget is None else behind_sentences(result, result.budget, texts)
     results = _results(parent, record, ". ".join([result.evaluation, *sentences]), texts)
-    for region, factor in (("ellipsoidal", result.k_p), ("rectangular", result.k_q)):
+    regions = (("ellipsoidal", result.k_p), ("rectangular", result.k_q))
+    for region, factor in regions if result.has_ellipsoid else regions[1:]:
         element = add(results, "result")
         say(element, "name", texts(f"dcc.{region}"), texts.language)
         say(element, "description", texts(f"dcc.{region}_words", rank=result.rank), texts.language)

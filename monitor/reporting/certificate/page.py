@@ -89,8 +89,9 @@ def _method(method: MethodUsed, texts: Texts) -> list[tuple[str, str]]:
 
 def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
     sign = texts.decimal_sign
-    k_q, k_p = written_factor(result.k_q, sign), written_factor(result.k_p, sign)
-    half_axes = "; ".join(written_factor(axis, sign) for axis in result.half_axes)
+    k_q = written_factor(result.k_q, sign)
+    k_p = written_factor(result.k_p, sign) if result.has_ellipsoid else ""
+    half_axes = "; ".join(written_factor(axis, sign) for axis in result.half_axes) if result.has_ellipsoid else ""
     rows = result_rows(result, texts)
     heads = (
         texts("page.symbol"), texts("page.parameter"), texts("page.estimate"), "u", f"U = {k_q} u", texts("page.unit")
@@ -101,7 +102,7 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
         rows=rows,
         widths=result_widths(rows, heads),
         explained=texts.markup(
-            "page.results_explained",
+            "page.results_explained" if result.has_ellipsoid else "page.results_explained_intervals",
             k_q=k_q,
             k_p=k_p,
             count=len(result.names),
@@ -115,7 +116,7 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
             )
             for refusal in result.refused
         ),
-        half_axes=texts.markup("page.half_axes", half_axes=half_axes),
+        half_axes=texts.markup("page.half_axes", half_axes=half_axes) if result.has_ellipsoid else Markup(""),
         blocks=correlation_blocks(
             result.names, result.correlation, texts, texts("page.correlation", state=result.state)
         ),

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from monitor.documents import OMITTED
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.reporting.budget import Budget
+from monitor.reporting.budget import Budget, HoldsFor
 from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
@@ -85,6 +85,11 @@ class ResultSet:
         matrix = self.covariance / np.outer(u, u)
         np.fill_diagonal(matrix, 1.0)
         return np.asarray(matrix)
+
+    @property
+    def has_ellipsoid(self) -> bool:
+        """Whether the covariance is known well enough for a hyper-ellipsoid."""
+        return math.isfinite(self.k_p)
 
     @property
     def half_axes(self) -> Array:
@@ -166,7 +171,8 @@ def result_set(
     estimate = estimate[printed] / factor
     covariance = covariance[np.ix_(printed, printed)] / np.outer(factor, factor)
     _check_numbers(names, estimate, covariance)
-    _check_factors(factors)
+    over_campaign = statements.budget is not None and statements.budget.holds_for is HoldsFor.CAMPAIGN
+    _check_factors(factors, ellipsoid=not over_campaign)
     limits = statements.tolerances
     descriptions = statements.descriptions
     return ResultSet(
@@ -201,9 +207,11 @@ def _check_numbers(names: tuple[str, ...], estimate: Array, covariance: Array) -
             )
 
 
-def _check_factors(factors: CoverageFactors) -> None:
+def _check_factors(factors: CoverageFactors, *, ellipsoid: bool) -> None:
     if not 0.0 < factors.p < 1.0:
         raise DataError(f"the coverage probability p must lie between 0 and 1, but is {factors.p}")
     for symbol, factor in (("k_p", factors.k_p), ("k_q", factors.k_q)):
-        if not (math.isfinite(factor) and factor > 0.0):
+        # A few days bound intervals and no ellipsoid.
+        unbounded = symbol == "k_p" and not ellipsoid and factor == math.inf
+        if not (math.isfinite(factor) and factor > 0.0) and not unbounded:
             raise DataError(f"the coverage factor {symbol} must be positive and finite, but is {factor}")

@@ -8,7 +8,7 @@ import numpy as np
 
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.records import Array
-from monitor.reporting.budget import Budget, budget_lines
+from monitor.reporting.budget import Budget, HoldsFor, budget_lines
 from monitor.reporting.certificate.results import (
     CoverageFactors,
     JointEstimate,
@@ -103,7 +103,9 @@ def results_of(
     (Hotelling, Student), which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where
     the method cannot be certified, DataError where there are too few runs for any joint region.
     """
-    if not np.isfinite(evaluated.k_p):
+    # Few days bound no ellipsoid, but the intervals over the campaign, which are stated without it.
+    over_campaign = evaluated.answer.holds_for is HoldsFor.CAMPAIGN and np.isfinite(evaluated.k_q)
+    if not (np.isfinite(evaluated.k_p) or over_campaign):
         raise DataError(
             f"{evaluated.dof:.0f} degrees of freedom bound no joint region of {len(evaluated.names)} parameters; "
             "a certificate needs more repeated runs"
