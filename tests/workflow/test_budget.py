@@ -265,4 +265,4 @@ def test_a_german_certificate_over_the_campaign_has_every_source(db, tmp_path):
     for source in read_campaign(EXAMPLES / "steel-bar").sources:
         assert source.name in text
     assert "± 1 K, rechteckverteilt, gleich in allen Läufen" in text
-    assert "Die Länge des Maßstabs wurde mit 11,5 · 10⁻⁶/K von 20 °C auf 22,22 °C umgerechnet" in text
+    assert "Die Länge des Maßstabs wurde mit 11,5 · 10⁻⁶/K von 20 °C auf 22,27 °C umgerechnet" in text
