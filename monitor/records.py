@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from enum import StrEnum
 from typing import Literal
 
 import numpy as np
@@ -24,6 +25,14 @@ Branch = Literal["work", "tool"]
 
 #: ISO 841: X, Y, Z and U, V, W, parallel to them, are linear axes; A, B, C turn.
 LINEAR_LETTERS = "XYZUVW"
+
+
+class ValidationVerdict(StrEnum):
+    """Whether Monte Carlo confirms a first-order result; the value is how documents store it."""
+
+    VALIDATED = "validated"
+    NOT_VALIDATED = "not validated"
+    UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True)

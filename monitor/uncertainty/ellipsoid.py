@@ -244,12 +244,12 @@ def ellipsoid_law(parts: Sequence[BudgetLine], p: float) -> EllipsoidLaw | SizeL
     white = [entry for entry in white if np.trace(entry[0]) > _NEGLIGIBLE]
     if not white:
         return ellipsoid_factor(rank, p)
+    if any(kind is Estimated.MATRIX and dof < _rank(matrix) + 1.0 for matrix, dof, kind in white):
+        return math.inf
     known = _symmetric(np.eye(rank) - np.sum([matrix for matrix, _, _ in white], axis=0))
     if len(white) == 1 and float(np.abs(np.linalg.eigvalsh(known)).max()) < _NEGLIGIBLE:
         of_one = ellipsoid_factor if white[0][2] is Estimated.MATRIX else ellipsoid_factor_of_size
         return of_one(rank, p, white[0][1])
-    if any(kind is Estimated.MATRIX and dof < _rank(matrix) + 1.0 for matrix, dof, kind in white):
-        return math.inf
     if len(white) == 1 and white[0][2] is Estimated.SCALE:
         return SizeLaw(np.clip(np.linalg.eigvalsh(white[0][0]), 0.0, 1.0), white[0][1])
     return _law(white, known, rank)

@@ -73,14 +73,17 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
     say(parent, "name", texts("dcc.result", state=result.state), texts.language)
     sentences = () if result.budget is None else behind_sentences(result, result.budget, texts)
     results = _results(parent, record, ". ".join([result.evaluation, *sentences]), texts)
-    regions = (("ellipsoidal", result.k_p), ("rectangular", result.k_q))
-    for region, factor in regions if result.has_ellipsoid else regions[1:]:
+    regions = (
+        ("ellipsoidal", result.k_p, result.k_p_error > 0.0),
+        ("rectangular", result.k_q, result.k_q_error > 0.0),
+    )
+    for region, factor, sampled in regions if result.has_ellipsoid else regions[1:]:
         element = add(results, "result")
         say(element, "name", texts(f"dcc.{region}"), texts.language)
         say(element, "description", texts(f"dcc.{region}_words", rank=result.rank), texts.language)
         quantity = add(add(element, "data"), "quantity")
         say(quantity, "name", "; ".join(result.descriptions), texts.language)
-        _values(quantity, result, region, factor)
+        _values(quantity, result, region, factor, sampled)
     for refusal in result.refused:
         element = add(results, "result")
         say(element, "name", texts("dcc.refused", parameters=", ".join(refusal.parameters)), texts.language)
@@ -127,7 +130,7 @@ def _results(parent: ET.Element, record: CertificateRecord, evaluation: str, tex
     return add(parent, "results")
 
 
-def _values(parent: ET.Element, result: ResultSet, region: str, factor: float) -> None:
+def _values(parent: ET.Element, result: ResultSet, region: str, factor: float, sampled: bool) -> None:
     units = [unit_of(unit) for unit in result.units]
     values = add(parent, "realListXMLList", space=SI)
     add(values, "labelXMLList", " ".join(result.names), SI)
@@ -143,7 +146,7 @@ def _values(parent: ET.Element, result: ResultSet, region: str, factor: float) -
             add(element, "unit", second + unit, SI)
     add(around, "coverageFactor", _number(factor), SI)
     add(around, "coverageProbability", _number(result.p), SI)
-    add(around, "distribution", _distribution(result), SI)
+    add(around, "distribution", "numerical" if sampled else _distribution(result), SI)
 
 
 def _distribution(result: ResultSet) -> str:

@@ -87,11 +87,25 @@ def _method(method: MethodUsed, texts: Texts) -> list[tuple[str, str]]:
     ]
 
 
+def _ellipsoid(result: ResultSet, sign: str) -> tuple[str, str]:
+    """The factor and the half-axes of the hyper-ellipsoid; empty where a few days bound none."""
+    if not result.has_ellipsoid:
+        return "", ""
+    axes = (written_factor(axis, sign, result.k_p_error) for axis in result.half_axes)
+    return written_factor(result.k_p, sign, result.k_p_error), "; ".join(axes)
+
+
+def _explained_by(result: ResultSet) -> str:
+    """The key of the text that says what U is."""
+    if not result.has_ellipsoid:
+        return "page.results_explained_intervals"
+    return "page.results_explained" if result.sampling is None else "page.results_explained_sampled"
+
+
 def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
     sign = texts.decimal_sign
-    k_q = written_factor(result.k_q, sign)
-    k_p = written_factor(result.k_p, sign) if result.has_ellipsoid else ""
-    half_axes = "; ".join(written_factor(axis, sign) for axis in result.half_axes) if result.has_ellipsoid else ""
+    k_q = written_factor(result.k_q, sign, result.k_q_error)
+    k_p, half_axes = _ellipsoid(result, sign)
     rows = result_rows(result, texts)
     heads = (
         texts("page.symbol"), texts("page.parameter"), texts("page.estimate"), "u", f"U = {k_q} u", texts("page.unit")
@@ -102,7 +116,7 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
         rows=rows,
         widths=result_widths(rows, heads),
         explained=texts.markup(
-            "page.results_explained" if result.has_ellipsoid else "page.results_explained_intervals",
+            _explained_by(result),
             k_q=k_q,
             k_p=k_p,
             count=len(result.names),

@@ -17,6 +17,7 @@ from monitor.documents import OMITTED
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.budget import Budget, HoldsFor
+from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
@@ -45,8 +46,9 @@ class ResultSet:
     hyper-ellipsoid of ``rank`` dimensions, both for probability ``p`` (JCGM 102:2011 6.5). ``evaluation``
     names the way the uncertainty was found, with its clause. ``trials`` and ``validation`` belong to Monte
     Carlo. ``tolerances`` (m,) are limits of absolute values, NaN where there is none. ``dof``: degrees of freedom of
-    the covariance, for which the factors hold (Student, Hotelling); not finite where it is known. ``budget`` is what
-    stands behind u; None in a record of an earlier version.
+    the covariance as a whole; not finite where it is known. ``sampling`` is that of the factors; None in a result of
+    an earlier version, whose factors hold for ``dof`` (Student, Hotelling). ``budget`` is what stands
+    behind u; None in a record of an earlier version.
     """
 
     state: str
@@ -67,6 +69,17 @@ class ResultSet:
     tolerances: Array | None = None
     dof: float = math.inf
     budget: Budget | None = field(default=None, metadata=OMITTED)
+    sampling: FactorSampling | None = None
+
+    @property
+    def k_p_error(self) -> float:
+        """Standard error of the sampling of k_p, which decides its digits; zero where none is stored."""
+        return 0.0 if self.sampling is None else self.sampling.k_p_standard_error
+
+    @property
+    def k_q_error(self) -> float:
+        """Standard error of the sampling of k_q, which decides its digits; zero where none is stored."""
+        return 0.0 if self.sampling is None else self.sampling.k_q_standard_error
 
     @property
     def u(self) -> Array:
@@ -127,6 +140,7 @@ class CoverageFactors:
     k_q: float
     rank: int
     dof: float = math.inf
+    sampling: FactorSampling | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,6 +208,7 @@ def result_set(
         tolerances=None if limits is None else np.array([limits.get(name, math.nan) for name in names]),
         dof=factors.dof,
         budget=None if statements.budget is None else statements.budget.of(printed),
+        sampling=factors.sampling,
     )
 
 

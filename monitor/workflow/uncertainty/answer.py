@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from monitor.documents import OMITTED
-from monitor.records import Array
+from monitor.records import Array, ValidationVerdict
 from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource
 from monitor.reporting.covariance_source import CovarianceSource
+from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import RefusedParameters
 from monitor.workflow.uncertainty.request import Asked
 
@@ -36,11 +37,13 @@ class RunResiduals:
 class FrameworkAnswer:
     """Results of the GUM framework (JCGM 102:2011, 6) by parameter; ``correlation`` (m, m) in their order.
 
-    ``k_p`` and ``k_q`` are those of 6.5 for normal outputs; those ``with_degrees_of_freedom`` are what so few runs
-    allow to claim, and belong to the ``expanded`` uncertainty. None: infinite, or no joint region. ``budget`` has the
+    ``k_p`` and ``k_q`` are those of 6.5 for normal outputs of known covariance; those ``with_degrees_of_freedom`` are
+    what so few runs allow to claim, for the sum of the budget's lines with what is known of each, and belong to the
+    ``expanded`` uncertainty; ``coverage_sampling`` is theirs. None: infinite, or no joint region. ``budget`` has the
     part of every source in the variance of every parameter, the largest first, ``budget_degrees_of_freedom`` those of
-    every line (None: known). ``joint_coverage_of_k_2_each`` takes half a second of
-    sampling and is left out where nobody reads it.
+    every line (None: known), ``degrees_of_freedom_by_parameter`` the effective ones of
+    every variance (None: infinite). ``joint_coverage_of_k_2_each`` takes half a second of sampling and is left out
+    where nobody reads it.
     """
 
     estimate: Mapping[str, float]
@@ -58,6 +61,8 @@ class FrameworkAnswer:
     budget: Mapping[str, Mapping[str, float]]
     budget_degrees_of_freedom: Mapping[str, float | None] | None = field(default=None, metadata=OMITTED)
     joint_coverage_of_k_2_each: float | None = field(default=None, metadata=OMITTED)
+    degrees_of_freedom_by_parameter: Mapping[str, float | None] | None = field(default=None, metadata=OMITTED)
+    coverage_sampling: FactorSampling | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,7 +87,7 @@ class ValidationAnswer:
     """Whether Monte Carlo confirms the framework (JCGM 102:2011, 8), quantity by quantity: ``u EA0B``, ``k_q``."""
 
     passed: bool
-    verdict: str
+    verdict: ValidationVerdict
     differences: Mapping[str, float]
     tolerances: Mapping[str, float]
 
@@ -92,6 +97,13 @@ class ValidationAnswer:
         return tuple(
             name for name, difference in self.differences.items() if abs(difference) > self.tolerances[name]
         )
+
+    @property
+    def confirmed(self) -> tuple[str, ...]:
+        """Return the kinds of quantity of which none differs: ``estimate``, ``u``, ``lambda_max``, ``k_p``, ``k_q``."""
+        kinds = dict.fromkeys(name.split()[0] for name in self.differences)
+        differing = {name.split()[0] for name in self.failed}
+        return tuple(kind for kind in kinds if kind not in differing)
 
 
 @dataclass(frozen=True)

@@ -94,6 +94,14 @@ class StatedUncertainty:
         return _or_infinite(self.answer.guf.fewest_degrees_of_freedom)
 
     @property
+    def dof_by_parameter(self) -> Array:
+        """Degrees of freedom (m,) of every variance; those of the covariance as a whole where none are stored."""
+        by_name = self.answer.guf.degrees_of_freedom_by_parameter
+        if by_name is None:
+            return np.full(len(self.names), self.dof)
+        return np.array([_or_infinite(by_name[name]) for name in self.names])
+
+    @property
     def counts_lack_of_fit(self) -> bool:
         """Whether the budget has a line for lack of fit of the model."""
         return LACK_OF_FIT in self.answer.guf.budget
@@ -160,5 +168,8 @@ def stored_uncertainty(
         same = analysis.document.get("asked") == wanted and "holds_for" in analysis.document
         if same and analysis.software_version == __version__:
             check_analysis(db, analysis.number)
-            return StatedUncertainty(campaign, model, restored(analysis.document), analysis.number)
+            answer = restored(analysis.document)
+            # Factors of a former kind, from one number of degrees of freedom for all directions, are not stated again.
+            if answer.guf.coverage_sampling is not None:
+                return StatedUncertainty(campaign, model, answer, analysis.number)
     return None
