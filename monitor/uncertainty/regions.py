@@ -19,7 +19,7 @@ from monitor.uncertainty.smoothed import Quantile, scattered
 SEED = 102
 #: Groups are added until the standard error is below half of the second decimal, or this part of the factor.
 _ERROR, _RELATIVE_ERROR = 0.005, 5e-4
-_FEWEST_GROUPS, MOST_GROUPS = 10, 40
+_FEWEST_GROUPS, MOST_GROUPS = 10, 60
 
 
 @dataclass(frozen=True)

@@ -137,7 +137,12 @@ def _record(
     if request.conformity is not None:
         # Of the state in which the machine is handed back.
         statement = statement_of(
-            results[-1], request.conformity, texts, campaign=last.campaign.name, dof=last.dof
+            results[-1],
+            request.conformity,
+            texts,
+            campaign=last.campaign.name,
+            freedoms=dict(zip(last.names, map(float, last.dof_by_parameter), strict=True)),
+            process=request.process,
         )
         record = dataclasses.replace(record, conformity=statement)
     if request.draft and record.title:

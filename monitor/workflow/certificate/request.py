@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from datetime import date
 from pathlib import Path
 
@@ -15,7 +17,7 @@ from monitor.workflow.uncertainty.request import Asked, holds_for
 METHODS = ("guf", "mcm")
 #: Decision rules of a statement of conformity. Each has its words and its risk among the texts: conformity.rule_simple,
 #: conformity.risk_simple, ...
-RULES = ("simple", "guard", "probability")
+RULES = ("simple", "guard", "iso14253", "ilac", "probability")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +30,9 @@ class CertificateOptions:
     are those of `monitor uncertainty`, for a method that takes these axes as known, and so are ``sources`` and
     ``holds_for``. ``method``: guf, or mcm for the
     stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the laboratory's word on
-    conformity. ``with_map`` adds the volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key``
-    signs it.
+    conformity. ``process`` are standard deviations by parameter, in its unit, with which the true values of machines
+    of this kind scatter about zero: the statement then has the global risks of its rule. ``with_map`` adds the
+    volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key`` signs it.
 
     Raises InputError for a method or a rule that there is not.
     """
@@ -46,6 +49,7 @@ class CertificateOptions:
     method: str = "guf"
     draft: bool = False
     conformity: str | None = None
+    process: Mapping[str, float] = field(default_factory=dict)
     with_map: bool = False
     fonts: tuple[Path, ...] = ()
     key: Key | None = None
@@ -55,6 +59,11 @@ class CertificateOptions:
             raise InputError(f"--method {self.method}: a certificate states guf or mcm")
         if self.conformity not in (None, *RULES):
             raise InputError(f"there is no decision rule '{self.conformity}'; there are {', '.join(RULES)}")
+        if self.process and self.conformity is None:
+            raise InputError("--process belongs to a statement of conformity: name its rule by --conformity")
+        for name, spread in self.process.items():
+            if not 0.0 < spread < math.inf:
+                raise InputError(f"--process {name}={spread:g}: a standard deviation is positive")
         holds_for(self.holds_for)
 
     @property
