@@ -16,6 +16,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from monitor.sources import Source
+
 Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
 Kind = Literal["linear", "rotary", "spindle"]
@@ -280,7 +282,7 @@ class SourceFile:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign: one machine, one artefact, one probe, and the runs of one plan."""
+    """A campaign: one machine, one artefact, one probe, the runs of one plan, and the stated sources of uncertainty."""
 
     name: str
     method: str
@@ -290,6 +292,7 @@ class Campaign:
     runs: tuple[Run, ...]
     probings: Probings
     files: tuple[SourceFile, ...] = ()
+    sources: tuple[Source, ...] = ()
 
 
 @dataclass(frozen=True)

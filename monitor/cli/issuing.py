@@ -9,6 +9,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from monitor.cli.behind import add_behind, further_sources
 from monitor.exceptions import InputError
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
 from monitor.workflow.certificate.request import METHODS, RULES
@@ -38,6 +39,7 @@ def add_issuing(parser: ArgumentParser) -> None:
         "--linear-axes", type=Path, metavar="FILE",
         help="errors of the linear axes (TOML), for methods that take these axes as known",
     )  # fmt: skip
+    add_behind(parser)
     parser.add_argument(
         "--method", choices=METHODS, default="guf",
         help="state the GUM framework's result, or the stored Monte Carlo result (default guf)",
@@ -109,6 +111,8 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "issued_on": options.date,
         "model": options.model,
         "linear_axes": axes,
+        "sources": further_sources(options.sources),
+        "holds_for": options.holds_for,
         "method": options.method,
         "conformity": options.conformity,
         "process": _process(options.process),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from monitor.documents import from_document, to_document
 from monitor.records import (
     Artefact,
     AxisSettings,
@@ -21,6 +23,7 @@ from monitor.records import (
     ScaleBar,
     SelfCalibration,
 )
+from monitor.sources import Source
 
 
 def machine_json(machine: Machine) -> str:
@@ -75,8 +78,11 @@ def probe_record(text: str) -> Probe:
     return Probe(**{**data, "tip": _tuple(data["tip"])})
 
 
-def artefact_json(artefact: Artefact) -> str:
-    """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C."""
+def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
+    """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C.
+
+    The stated ``sources`` of uncertainty stand beside it, where there are any.
+    """
     data = asdict(artefact)
     # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
     if artefact.self_calibration is None:
@@ -85,7 +91,14 @@ def artefact_json(artefact: Artefact) -> str:
         del data["reflectors"]
     if artefact.l_shape is None:
         del data["l_shape"]
+    if sources:
+        data["sources"] = [to_document(source) for source in sources]
     return _text(data)
+
+
+def sources_record(text: str) -> tuple[Source, ...]:
+    """The sources of ``artefact_json``."""
+    return tuple(from_document(Source, source) for source in json.loads(text).get("sources", ()))
 
 
 def artefact_record(text: str) -> Artefact:

@@ -7,6 +7,8 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
+from monitor.cli.behind import add_behind, further_sources
+from monitor.cli.budget_output import behind
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.readers import read_linear_axes
@@ -52,6 +54,7 @@ def options(parser: ArgumentParser) -> None:
         "--linear-axes", type=Path, metavar="FILE",
         help="errors of the linear axes as standard uncertainties (TOML), for methods that take these axes as known",
     )  # fmt: skip
+    add_behind(parser)
     parser.add_argument("--workers", type=int, metavar="N", help="spread the trials over N processes")
     parser.add_argument(
         "--cluster", metavar="ADDRESS", help="spread them over a Dask cluster, such as tcp://host:8786"
@@ -72,6 +75,8 @@ def run(options: Namespace) -> int:
         workers=options.workers,
         cluster=options.cluster,
         linear_axes=None if options.linear_axes is None else read_linear_axes(options.linear_axes),
+        sources=further_sources(options.sources),
+        holds_for=options.holds_for,
     )
     with opened(options) as db, output.working("propagating"):
         answer = uncertainty(db, request)
@@ -81,6 +86,7 @@ def run(options: Namespace) -> int:
     _parameters(answer)
     _machine_frame(answer)
     _coverage(answer)
+    behind(answer)
     if answer.mcm is not None:
         _monte_carlo(answer.mcm)
     if answer.validation is not None:

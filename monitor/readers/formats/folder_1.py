@@ -14,8 +14,10 @@ from monitor.readers.files import LARGEST_CSV, LARGEST_TOML, decode, read_bytes
 from monitor.readers.machine_file import MachinePart, read_machine
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, method_rules
+from monitor.readers.sources_file import read_sources
 from monitor.readers.toml_table import Table, parse_toml
 from monitor.records import Artefact, Campaign, Probe, SourceFile
+from monitor.sources import Source
 
 TOML = "campaign.toml"
 FILES = (TOML, runs_file.FILE, probings_file.FILE)
@@ -38,6 +40,7 @@ class _Head:
     probe: Probe | None
     artefact: Artefact | None
     balls: list[str] | None
+    sources: tuple[Source, ...] = ()
 
 
 _EMPTY = _Head(None, None, None, MachinePart(None, None, {}), None, None, None)
@@ -86,7 +89,7 @@ def _campaign(
     assert part is not None
     return Campaign(
         head.name, head.method, head.machine.machine, head.probe, head.artefact, runs.runs, part.probings,
-        files,
+        files, head.sources,
     )  # fmt: skip
 
 
@@ -102,8 +105,9 @@ def _head(text: str | None, faults: Faults) -> _Head:
     probe = read_probe(top)
     artefact, balls = read_artefact(top)
     fits = _artefact_fits(top, artefact, rules)
+    sources = read_sources(top, machine.axes)
     top.finish()
-    return _Head(name, method, rules, machine, probe, artefact if fits else None, balls)
+    return _Head(name, method, rules, machine, probe, artefact if fits else None, balls, sources)
 
 
 def _check_plan(head: _Head, part: probings_file.ProbingsPart, faults: Faults) -> None:

@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.behind import behind_sentences
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric import printed_map
@@ -70,11 +71,13 @@ def say(parent: ET.Element, tag: str, text: str, language: str) -> ET.Element:
 def geometric_errors(parent: ET.Element, record: CertificateRecord, result: ResultSet, texts: Texts) -> None:
     """The parameters twice, with the ellipsoidal and with the rectangular region, each with the full covariance."""
     say(parent, "name", texts("dcc.result", state=result.state), texts.language)
-    results = _results(parent, record, result.evaluation, texts)
-    for region, factor, sampled in (
+    sentences = () if result.budget is None else behind_sentences(result, result.budget, texts)
+    results = _results(parent, record, ". ".join([result.evaluation, *sentences]), texts)
+    regions = (
         ("ellipsoidal", result.k_p, result.k_p_error > 0.0),
         ("rectangular", result.k_q, result.k_q_error > 0.0),
-    ):
+    )
+    for region, factor, sampled in regions if result.has_ellipsoid else regions[1:]:
         element = add(results, "result")
         say(element, "name", texts(f"dcc.{region}"), texts.language)
         say(element, "description", texts(f"dcc.{region}_words", rank=result.rank), texts.language)

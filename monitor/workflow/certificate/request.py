@@ -11,6 +11,8 @@ from pathlib import Path
 from monitor.exceptions import InputError
 from monitor.records import LinearAxes
 from monitor.reporting.signature.signing import Key
+from monitor.sources import Source
+from monitor.workflow.uncertainty.request import Asked, holds_for
 
 METHODS = ("guf", "mcm")
 #: Decision rules of a statement of conformity. Each has its words and its risk among the texts: conformity.rule_simple,
@@ -25,7 +27,8 @@ class CertificateOptions:
     ``laboratory`` is the file of what the laboratory states. ``as_left`` is the run that was measured after an
     adjustment or repair: its results stand beside those as found (ISO/IEC 17025:2017, 7.8.4.1 d), or alone. ``out`` is
     a folder or a file. ``number`` is the next free one of the year and ``issued_on`` today where None. ``linear_axes``
-    are those of `monitor uncertainty`, for a method that takes these axes as known. ``method``: guf, or mcm for the
+    are those of `monitor uncertainty`, for a method that takes these axes as known, and so are ``sources`` and
+    ``holds_for``. ``method``: guf, or mcm for the
     stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the laboratory's word on
     conformity. ``process`` are standard deviations by parameter, in its unit, with which the true values of machines
     of this kind scatter about zero: the statement then has the global risks of its rule. ``with_map`` adds the
@@ -41,6 +44,8 @@ class CertificateOptions:
     issued_on: date | None = None
     model: str | None = None
     linear_axes: LinearAxes | None = None
+    sources: tuple[Source, ...] | None = None
+    holds_for: str | None = None
     method: str = "guf"
     draft: bool = False
     conformity: str | None = None
@@ -59,6 +64,12 @@ class CertificateOptions:
         for name, spread in self.process.items():
             if not 0.0 < spread < math.inf:
                 raise InputError(f"--process {name}={spread:g}: a standard deviation is positive")
+        holds_for(self.holds_for)
+
+    @property
+    def asked(self) -> Asked:
+        """What decides the numbers of the evaluation besides run and model."""
+        return Asked(linear_axes=self.linear_axes, holds_for=holds_for(self.holds_for), sources=self.sources)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods.model import chain_of
 from monitor.records import Array, ValidationVerdict
+from monitor.reporting.budget import Budget, HoldsFor, budget_lines
 from monitor.reporting.certificate.machine_frame_result import MachineFrameResult
 from monitor.reporting.certificate.results import (
     CoverageFactors,
@@ -108,7 +109,9 @@ def results_of(
     which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where the method cannot be
     certified, DataError where there are too few runs for any joint region.
     """
-    if not np.isfinite(evaluated.k_p):
+    # Few days bound no ellipsoid, but the intervals over the campaign, which are stated without it.
+    over_campaign = evaluated.answer.holds_for is HoldsFor.CAMPAIGN and np.isfinite(evaluated.k_q)
+    if not (np.isfinite(evaluated.k_p) or over_campaign):
         raise DataError(
             f"the runs behind the covariance of the readings are too few for a joint region of "
             f"{len(evaluated.names)} parameters: they need more degrees of freedom than there are parameters; "
@@ -153,6 +156,7 @@ def results_of(
             },
             machine_frame=_in_machine_frame(evaluated, chain, estimate, covariance),
             tolerances={name: limits[name] for name in limits if name in evaluated.names} or None,
+            budget=_budget(answer),
         ),
         texts,
     )
@@ -184,6 +188,21 @@ def _single_factor(evaluated: StatedUncertainty) -> float:
     from monitor.uncertainty.coverage import single_factor
 
     return single_factor(evaluated.answer.p, evaluated.fewest_dof)
+
+
+def _budget(answer: UncertaintyAnswer) -> Budget | None:
+    """What stands behind the uncertainty; None for an answer that does not say it."""
+    if answer.holds_for is None:
+        return None
+    guf = answer.guf
+    u = {name: guf.u[name] for name in answer.parameters}
+    return Budget(
+        answer.holds_for,
+        budget_lines(guf.budget, u, guf.budget_degrees_of_freedom or {}),
+        answer.day_to_day,
+        answer.sources or (),
+        answer.length,
+    )
 
 
 def _certifiable(evaluated: StatedUncertainty, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:

@@ -13,6 +13,7 @@ import numpy as np
 
 from monitor.documents import OMITTED
 from monitor.records import Array, FrameOfReference, ValidationVerdict
+from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import RefusedParameters
@@ -40,7 +41,8 @@ class FrameworkAnswer:
     ``k_p`` and ``k_q`` are those of 6.5 for normal outputs of known covariance; those ``with_degrees_of_freedom`` are
     what so few runs allow to claim, for the sum of the budget's lines with what is known of each, and belong to the
     ``expanded`` uncertainty; ``coverage_sampling`` is theirs. None: infinite, or no joint region. ``budget`` has the
-    part of every source in the variance of every parameter, ``degrees_of_freedom_by_parameter`` the effective ones of
+    part of every source in the variance of every parameter, the largest first, ``budget_degrees_of_freedom`` those of
+    every line (None: known), ``degrees_of_freedom_by_parameter`` the effective ones of
     every variance (None: infinite). ``joint_coverage_of_k_2_each`` takes half a second of sampling and is left out
     where nobody reads it.
     """
@@ -58,6 +60,7 @@ class FrameworkAnswer:
     k_q_with_degrees_of_freedom: float | None
     expanded: Mapping[str, float]
     budget: Mapping[str, Mapping[str, float]]
+    budget_degrees_of_freedom: Mapping[str, float | None] | None = field(default=None, metadata=OMITTED)
     joint_coverage_of_k_2_each: float | None = field(default=None, metadata=OMITTED)
     degrees_of_freedom_by_parameter: Mapping[str, float | None] | None = field(default=None, metadata=OMITTED)
     coverage_sampling: FactorSampling | None = field(default=None, metadata=OMITTED)
@@ -121,6 +124,8 @@ class UncertaintyAnswer:
     it is restored (``stored.restored``). ``frames`` say what each parameter of the chain is stated relative to,
     ``machine_frame`` has the location errors in the frame of the machine; None in earlier answers. ``refused`` are
     parameters without a number. ``mcm`` and ``validation`` are left out where no Monte Carlo was asked for.
+    ``holds_for`` says for which time the uncertainty holds, ``day_to_day`` how runs and days differ, ``sources`` which
+    Type B sources were stated, ``length`` to what gains refer; all are None in an answer of an earlier version.
     """
 
     campaign: str
@@ -141,6 +146,10 @@ class UncertaintyAnswer:
     lack_of_fit_causes: tuple[LackOfFitCause, ...] | None = field(default=None, metadata=OMITTED)
     mcm: MonteCarloAnswer | None = field(default=None, metadata=OMITTED)
     validation: ValidationAnswer | None = field(default=None, metadata=OMITTED)
+    holds_for: HoldsFor | None = field(default=None, metadata=OMITTED)
+    day_to_day: DayToDay | None = field(default=None, metadata=OMITTED)
+    sources: tuple[StatedSource, ...] | None = field(default=None, metadata=OMITTED)
+    length: LengthReference | None = field(default=None, metadata=OMITTED)
 
     @property
     def covariance(self) -> Array:

@@ -65,6 +65,10 @@ def statement(result: RunUncertainty) -> UncertaintyAnswer:
         lack_of_fit_causes=causes or None,
         mcm=_monte_carlo(result),
         validation=None if result.validation is None else _validation(result, result.validation),
+        holds_for=result.behind.holds_for,
+        day_to_day=result.behind.day_to_day,
+        sources=result.behind.sources or None,
+        length=result.behind.length,
     )
 
 
@@ -92,6 +96,9 @@ def _finite(value: float) -> float | None:
 
 def _framework(result: RunUncertainty) -> FrameworkAnswer:
     framework = result.framework
+    pairs = list(zip(framework.budget, framework.budget_shares(), strict=True))
+    # The line that matters most for any parameter first; none is dropped.
+    lines = sorted(pairs, key=lambda pair: -float(np.max(np.abs(pair[1]), initial=0.0)))
     factors, of_known = framework.factors, region_factors(known(framework.budget), framework.p)
     return FrameworkAnswer(
         estimate=_displayed(result, framework.estimate),
@@ -108,8 +115,10 @@ def _framework(result: RunUncertainty) -> FrameworkAnswer:
         k_q_with_degrees_of_freedom=_finite(framework.k_q),
         expanded=_displayed(result, framework.expanded),
         budget={
-            line.source: dict(zip(framework.names, map(float, shares), strict=True))
-            for line, shares in zip(framework.budget, framework.budget_shares(), strict=True)
+            line.source: dict(zip(framework.names, map(float, shares), strict=True)) for line, shares in lines
+        },
+        budget_degrees_of_freedom={
+            line.source: None if line.dof is None else _finite(line.dof) for line, _ in lines
         },
         degrees_of_freedom_by_parameter={
             name: _finite(float(dof))

@@ -15,7 +15,7 @@ import numpy as np
 
 from monitor import __version__
 from monitor.documents import from_document, to_document
-from monitor.records import Array, Campaign, LinearAxes
+from monitor.records import Array, Campaign
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.store import Database, StoredModel, check_analysis, save_analysis, stored_analyses
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -152,18 +152,21 @@ def covariance_source(document: Mapping[str, Any]) -> CovarianceSource:
 
 
 def stored_uncertainty(
-    db: Database, campaign: Campaign, run: int, model: StoredModel, linear_axes: LinearAxes | None = None
+    db: Database, campaign: Campaign, run: int, model: StoredModel, asked: Asked | None = None
 ) -> StatedUncertainty | None:
-    """The latest stored answer about a run by this model that was asked for nothing else; None where there is none.
+    """The latest stored answer about a run by this model to what was ``asked`` (default: nothing but the run); None
+    where there is none.
 
     Only what this version of the software evaluated is taken: another may have evaluated otherwise. Raises StoreError
     where it was altered since it was stored.
     """
-    asked = to_document(Asked(linear_axes=linear_axes))
+    wanted = to_document(asked or Asked())
     for analysis in stored_analyses(
         db, KIND, campaign=campaign.name, run=run, model=model.name, model_version=model.version
     ):
-        if analysis.document.get("asked") == asked and analysis.software_version == __version__:
+        # An answer that does not say for which time it holds is of before that was evaluated.
+        same = analysis.document.get("asked") == wanted and "holds_for" in analysis.document
+        if same and analysis.software_version == __version__:
             check_analysis(db, analysis.number)
             answer = restored(analysis.document)
             # Factors of a former kind, from one number of degrees of freedom for all directions, are not stated again.
