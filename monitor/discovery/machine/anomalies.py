@@ -130,7 +130,7 @@ def _statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], 
     )
 
 
-def _as_reading(fit: Fit, row: int, vector: Array) -> tuple[str, float]:
+def as_reading(fit: Fit, row: int, vector: Array) -> tuple[str, float]:
     """The reading that explains most of a residual (d,), and by how much it is off, in mm."""
     chain = fit.problem.context.chain
     linear = fit.problem.measured_joints
@@ -167,7 +167,7 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
         p = float(scipy.special.chdtrc(rank[worst], chi_square[worst]))
         row, size = int(rows[worst]), sizes[worst]
         if p * tests <= alpha:
-            axis, off = _as_reading(fit, row, size * fit.problem.sigma[row])
+            axis, off = as_reading(fit, row, size * fit.problem.sigma[row])
             points.append(
                 BadPoint(
                     row=row,
