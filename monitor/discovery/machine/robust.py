@@ -6,15 +6,21 @@ linearised problem, before a search could run away with them, and marked anew wh
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from monitor.discovery.machine.anomalies import BadPoint, as_reading
+from monitor.discovery.machine.anomalies import BadPoint
 from monitor.discovery.machine.fit import Fit, fit
-from monitor.exceptions import DataError
-from monitor.methods.chain.gross import LEAST_TIMES, GrossReading, against_other_runs, gross_readings
+from monitor.methods.chain.gross import (
+    LEAST_TIMES,
+    Deviation,
+    GrossReading,
+    against_other_runs,
+    as_reading,
+    deviations,
+)
 from monitor.methods.chain.problem import ChainProblem
 
 #: Marking and fitting in turn; two suffice where the errors of the machine are small.
@@ -30,62 +36,58 @@ class RobustFit:
 
     @property
     def points(self) -> tuple[BadPoint, ...]:
-        """The gross readings as bad points: which reading is off, and by how much."""
-        return tuple(_point(self.fit, reading) for reading in self.gross)
+        """The gross readings as bad points; that they are right has no probability worth a number."""
+        return tuple(
+            BadPoint(
+                reading.row, reading.run, reading.sequence, reading.target, reading.axis, reading.size,
+                p_value=0.0, chi_square=reading.chi_square,
+            )
+            for reading in self.gross
+        )  # fmt: skip
 
 
 def robust_fit(problem: ChainProblem) -> RobustFit:
     """Fit a problem without its gross readings. Raises DataError where it cannot be fitted without them either."""
-    gross = {reading.row: reading for reading in gross_readings(problem, problem.start, problem.common_start)}
-    for row in np.flatnonzero(problem.far_off).tolist():
-        gross.setdefault(row, GrossReading(row, (0.0,) * len(problem.components), np.inf))
-    current = _fitted(problem, gross)
+    gross = {row: _far_off(problem, row) for row in np.flatnonzero(problem.far_off).tolist()}
+    gross |= {
+        deviation.row: deviation for deviation in deviations(problem, problem.start, problem.common_start)
+    }
+    current = _without(problem, gross)
     for _ in range(MOST_ROUNDS):
         solution = current.solution
-        more = gross_readings(current.problem, solution.local, solution.common)
+        more = deviations(current.problem, solution.local, solution.common)
         more += against_other_runs(current.problem, solution)
         fitting = _fitting(current, gross)
         if not more and not fitting:
             break
-        gross = {row: reading for row, reading in gross.items() if row not in fitting}
-        gross |= {reading.row: reading for reading in more}
-        current = _fitted(problem, gross)
-    return RobustFit(current, tuple(_sized(current, gross[row]) for row in sorted(gross)))
+        gross = {row: deviation for row, deviation in gross.items() if row not in fitting}
+        gross |= {deviation.row: deviation for deviation in more}
+        current = _without(problem, gross)
+    if not gross:
+        return RobustFit(current, ())
+    return RobustFit(
+        current, tuple(as_reading(current.problem, current.by_error, gross[row]) for row in sorted(gross))
+    )
 
 
-def _fitted(problem: ChainProblem, gross: dict[int, GrossReading]) -> Fit:
-    return fit(problem, _marks(problem, gross) if gross else None)
+def _far_off(problem: ChainProblem, row: int) -> Deviation:
+    """A row that is no touch of its target: off by what the start leaves of it."""
+    vector = problem.vectors(problem.start, problem.common_start)[row]
+    return Deviation(row, tuple(map(float, vector)), np.inf)
 
 
-def _marks(problem: ChainProblem, gross: dict[int, GrossReading]) -> npt.NDArray[np.bool_]:
+def _without(problem: ChainProblem, gross: Mapping[int, Deviation]) -> Fit:
     marks = np.zeros(len(problem.context), dtype=bool)
     marks[list(gross)] = True
-    return marks
+    return fit(problem, marks if gross else None)
 
 
-def _fitting(current: Fit, gross: dict[int, GrossReading]) -> set[int]:
-    """Rows marked too early: the fit without them comes as close to them as to others."""
-    rows = [row for row, reading in gross.items() if np.isfinite(reading.chi_square)]
-    near = np.linalg.norm(current.vectors[rows], axis=1) < LEAST_TIMES * current.sigma * max(current.scale, 1.0)
-    determined = np.linalg.norm(current.vectors[rows], axis=1) > 0.0
-    return {row for row, is_near, has_residual in zip(rows, near, determined, strict=True) if is_near and has_residual}
-
-
-def _sized(current: Fit, reading: GrossReading) -> GrossReading:
-    return reading
-
-
-def _point(under: Fit, reading: GrossReading) -> BadPoint:
-    context, row = under.problem.context, reading.row
-    vector = np.array(reading.vector)
-    axis, size = as_reading(under, row, vector)
-    return BadPoint(
-        row=row,
-        run=int(context.run[row]),
-        sequence=int(context.sequence[row]),
-        target=str(context.target[row]),
-        axis=axis,
-        size=size,
-        p_value=0.0,
-        chi_square=reading.chi_square,
-    )
+def _fitting(current: Fit, gross: Mapping[int, Deviation]) -> set[int]:
+    """Rows marked too early: where the fit stands without them, they lie as near to it as the others do."""
+    limit = LEAST_TIMES * current.sigma * max(current.scale, 1.0)
+    off = {row: float(np.linalg.norm(current.vectors[row])) for row in gross}
+    return {
+        row
+        for row, deviation in gross.items()
+        if np.isfinite(deviation.chi_square) and 0.0 < off[row] < limit
+    }

@@ -6,8 +6,8 @@ Such rows are named before anything rests on them. Least squares with one row le
 of squares most is the wrong one wherever the plan can tell. A row that its own unknowns follow (a ball of the scale bar
 that is touched once a run) leaves no residual; it is held against the same row of the other runs.
 
-Use this for readings that are wrong beyond doubt. Smaller deviations, that only the other runs contradict, are bad points
-(``monitor.discovery``).
+Use this for readings that are wrong beyond doubt. Smaller deviations, that only the other runs contradict, are bad
+points (``monitor.discovery``).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
+from monitor.machine import MOTION
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
@@ -46,10 +47,10 @@ AS_LIKELY = 0.95
 
 
 @dataclass(frozen=True)
-class GrossReading:
-    """A row that is grossly off: ``vector`` (d,) mm is by how much, ``chi_square`` in stated standard uncertainties.
+class Deviation:
+    """How far a row is off: ``vector`` (d,) mm, ``chi_square`` in stated standard uncertainties.
 
-    ``others`` are rows of the same run that would explain the same residual: the plan cannot say which it was.
+    ``others`` are rows of the same run that explain the same residual as well: the plan cannot say which it was.
     """
 
     row: int
@@ -59,9 +60,37 @@ class GrossReading:
 
 
 @dataclass(frozen=True)
+class JointReading:
+    """Where a joint stood: its reading in rad where it ``turns``, else in mm."""
+
+    joint: str
+    reading: float
+    turns: bool
+
+
+@dataclass(frozen=True)
+class GrossReading:
+    """A row that is grossly off, as people find it: its ``axis`` or column is off by ``size`` mm.
+
+    ``pose`` are the joints that the plan moved. ``others`` are the sequences
+    of rows of the same run that may be wrong instead.
+    """
+
+    row: int
+    run: int
+    sequence: int
+    target: str
+    pose: tuple[JointReading, ...]
+    axis: str
+    size: float
+    chi_square: float
+    others: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class _Rows:
-    """The m rows of a run: whitened residual (N,) and derivatives (N, p), N = m d, its calibrated quantities, and one row
-    for each angle and gain that says how large these usually are.
+    """The m rows of a run: whitened residual (N,) and derivatives (N, p), N = m d, its calibrated quantities, and one
+    row for each angle and gain that says how large these usually are.
 
     ``index`` (m,) are the rows' places in the campaign, ``numbers`` their d. Of the unknowns, the first k of which are
     at ``base`` (k,), those of ``is_limited`` (k,) cannot exceed ``largest``.
@@ -158,11 +187,11 @@ def _grossest(rows: _Rows, deletion: _Deletion, tests: int) -> list[int]:
     return [row for row in candidates if deletion.drop[row] >= AS_LIKELY * deletion.drop[candidates[0]]]
 
 
-def _of_run(rows: _Rows, sigma: Array, tests: int) -> list[GrossReading]:
+def _of_run(rows: _Rows, sigma: Array, tests: int) -> list[Deviation]:
     """The gross rows of a run, the grossest first; none where they are so many that they are no single mistakes."""
     most = max(1, min(MOST_ROWS, int(MOST_PART * len(rows.index))))
     out = np.zeros(len(rows.index), dtype=bool)
-    readings: list[GrossReading] = []
+    readings: list[Deviation] = []
     while True:
         # Where a run collapses rather than bear a row, its angles and gains are held until that row is out.
         considered = rows if rows.is_plausible else rows.held
@@ -175,7 +204,7 @@ def _of_run(rows: _Rows, sigma: Array, tests: int) -> list[GrossReading]:
         worst, *alike = gross
         vector = deletion.vectors[worst] * sigma[rows.index[worst]]
         readings.append(
-            GrossReading(
+            Deviation(
                 row=int(rows.index[worst]),
                 vector=tuple(map(float, vector)),
                 chi_square=float(deletion.drop[worst]),
@@ -208,8 +237,8 @@ def _rows_of(problem: ChainProblem, at: Linearisation, run: int, local: Array) -
     )
 
 
-def gross_readings(problem: ChainProblem, local: Array, common: Array) -> list[GrossReading]:
-    """The gross readings by the problem linearised at ``local`` (R, p) and ``common`` (c,), run by run.
+def deviations(problem: ChainProblem, local: Array, common: Array) -> list[Deviation]:
+    """The gross rows by the problem linearised at ``local`` (R, p) and ``common`` (c,), run by run.
 
     At the start of a search, where no error of the machine is assumed yet, products of errors are neglected: some
     micrometres for targets that stand some millimetres elsewhere.
@@ -224,8 +253,8 @@ def gross_readings(problem: ChainProblem, local: Array, common: Array) -> list[G
     ]
 
 
-def against_other_runs(problem: ChainProblem, solution: Solution) -> list[GrossReading]:
-    """The gross readings among rows that the run's own unknowns follow, by the places that the other runs find.
+def against_other_runs(problem: ChainProblem, solution: Solution) -> list[Deviation]:
+    """The gross rows among those that the run's own unknowns follow, by the places that the other runs give.
 
     Between runs the targets may be placed anew as a whole (``problem.moved_together``), but not each by itself. Empty for
     problems whose targets have no places, and with fewer than three runs.
@@ -234,10 +263,10 @@ def against_other_runs(problem: ChainProblem, solution: Solution) -> list[GrossR
     count = len(problem.base_names)
     if placement is None or len(problem.runs) < FEWEST_RUNS:
         return []
-    usual = np.where(solution.local_free, solution.local, np.nan)
-    if np.isnan(usual).all(axis=0).any():
+    determined = np.where(solution.local_free, solution.local, np.nan)
+    if np.isnan(determined).all(axis=0).any():
         return []
-    median = np.nanmedian(usual, axis=0)
+    median = np.nanmedian(determined, axis=0)
     at = problem.linearise(np.tile(median, (len(problem.runs), 1)), solution.common)
     followed = ~_checked(problem, solution)
     sigma = np.where(np.isfinite(problem.sigma), problem.sigma, 0.0)
@@ -247,19 +276,17 @@ def against_other_runs(problem: ChainProblem, solution: Solution) -> list[GrossR
         size = len(rows.index) * rows.numbers
         by_placement = rows.columns[:size, count : count + len(placement)] @ placement
         columns = np.concatenate([rows.columns[:size, :count], by_placement], axis=1)
-        # Calibrated distances do not change where all targets move together: usual sizes alone stand behind the rows.
-        usual = int(np.count_nonzero(rows.is_limited))
-        behind = rows.columns[len(rows.columns) - usual :]
-        by_usual = np.concatenate([behind[:, :count], np.zeros((usual, placement.shape[1]))], axis=1)
+        # Calibrated distances stay as they are where all targets move together.
+        limited = int(np.count_nonzero(rows.is_limited))
+        behind = rows.columns[len(rows.columns) - limited :, :count]
+        by_usual = np.concatenate([behind, np.zeros((limited, placement.shape[1]))], axis=1)
         held = replace(
             rows,
-            residual=np.concatenate([rows.residual[:size], rows.residual[len(rows.residual) - usual :]]),
+            residual=np.concatenate([rows.residual[:size], rows.residual[len(rows.residual) - limited :]]),
             columns=np.concatenate([columns, by_usual]),
         )
         readings += [
-            reading
-            for reading in _of_run(held, sigma, len(problem.context))
-            if followed[reading.row]
+            reading for reading in _of_run(held, sigma, len(problem.context)) if followed[reading.row]
         ]
     return readings
 
@@ -272,3 +299,59 @@ def _checked(problem: ChainProblem, solution: Solution) -> npt.NDArray[np.bool_]
         deletion = _deletion(rows, np.zeros(len(rows.index), dtype=bool))
         checked[rows.index] = deletion.rank == rows.numbers
     return checked
+
+
+def off_reading(problem: ChainProblem, by_error: Array, row: int, vector: Array) -> tuple[str, float]:
+    """The reading that explains most of the residual (d,) of a row, and by how much it is off, in mm.
+
+    ``by_error`` (n, 3, J, 2, 6) are the derivatives of the chain's vectors by its errors.
+    """
+    chain = problem.context.chain
+    linear = problem.measured_joints
+    if not linear:
+        most = int(np.abs(vector).argmax())
+        return problem.components[most], float(vector[most])
+    directions = np.array(
+        [np.array(chain.joints[joint].direction) * chain.joints[joint].sign for joint in linear]
+    )
+    shifts = np.einsum("nrac,ac->nra", by_error[:, :, linear, MOTION, :3], directions)
+    off = np.linalg.pinv(problem.observe(shifts)[row]) @ vector
+    most = int(np.abs(off).argmax())
+    return chain.joints[linear[most]].name.lower(), float(off[most])
+
+
+def as_reading(problem: ChainProblem, by_error: Array, deviation: Deviation) -> GrossReading:
+    """A deviation as people find it in the file."""
+    context, row = problem.context, deviation.row
+    measured = problem.measured_joints
+    axis, size = off_reading(problem, by_error, row, np.array(deviation.vector))
+    return GrossReading(
+        row=row,
+        run=int(context.run[row]),
+        sequence=int(context.sequence[row]),
+        target=str(context.target[row]),
+        pose=tuple(
+            JointReading(joint.name, float(joint.sign * context.positions[row, index]), joint.turns)
+            for index, joint in enumerate(context.chain.joints)
+            if index not in measured and np.ptp(context.positions[:, index]) > 0.0
+        ),
+        axis=axis,
+        size=size,
+        chi_square=deviation.chi_square,
+        others=tuple(int(context.sequence[other]) for other in deviation.others),
+    )
+
+
+def gross_readings(problem: ChainProblem, solution: Solution | None = None) -> tuple[GrossReading, ...]:
+    """The gross readings of a problem, before any fit of it and, where there is a ``solution``, under that."""
+    local, common = problem.start, problem.common_start
+    by_row = {deviation.row: deviation for deviation in deviations(problem, local, common)}
+    if solution is not None:
+        local, common = solution.local, solution.common
+        later = [*deviations(problem, local, common), *against_other_runs(problem, solution)]
+        by_row |= {deviation.row: deviation for deviation in later}
+    if not by_row:
+        return ()
+    by_error = problem.evaluated(local, common, jacobian=True).by_error
+    assert by_error is not None
+    return tuple(as_reading(problem, by_error, by_row[row]) for row in sorted(by_row))

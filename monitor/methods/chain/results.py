@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from monitor.methods.chain.gross import gross_readings
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.least_squares import MEMBER_SHARE, Solution
 from monitor.methods.chain.problem import ChainProblem
@@ -97,4 +98,5 @@ def identification(
         added_covariance=shared.covariance,
         added_refused=shared.refused,
         iterations=solution.iterations,
+        gross=gross_readings(problem, solution),
     )

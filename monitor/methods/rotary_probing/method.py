@@ -27,7 +27,8 @@ def refuse(campaign: Campaign, problem: ChainProblem) -> None:
         return
     context = problem.context
     touches = ", ".join(
-        f"run {context.run[row]}, sequence {context.sequence[row]} (point {context.target[row]})" for row in apart
+        f"run {context.run[row]}, sequence {context.sequence[row]} (point {context.target[row]})"
+        for row in apart
     )
     raise DataError(
         f"touches stand more than {FARTHEST_APART:g} mm apart from the others of their point: {touches}; correct the "

@@ -140,7 +140,9 @@ def _normals(campaign: Campaign) -> Array:
     return np.asarray(normal / length[:, None])
 
 
-def _references(context: Context, tips: Array, ball: npt.NDArray[np.bool_]) -> tuple[Array, npt.NDArray[np.bool_]]:
+def _references(
+    context: Context, tips: Array, ball: npt.NDArray[np.bool_]
+) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Where each touched point lies (n, 3), the mean over its run and target, a sphere's nominal centre; and the
     touches (n,) that stand apart from the others of their point, which have no part in the mean.
 
