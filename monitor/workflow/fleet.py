@@ -12,7 +12,7 @@ from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
 from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
-from monitor.store import Database, FleetSums, fleet_sums, latest_tolerances
+from monitor.store import Database, FleetSums, fleet_sums, latest_tolerances, not_identified
 from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.drift import SHORTEST_DAYS
 from monitor.workflow.models import resolve
@@ -31,7 +31,10 @@ STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
 
 @dataclass(frozen=True)
 class FleetRequest:
-    """Every machine and parameter under a model (the method's own by default); ``top`` rows are listed (0: all)."""
+    """Every machine and parameter under a model (by default that which each machine is followed by).
+
+    ``top`` rows are listed (0: all).
+    """
 
     model: str | None = None
     top: int = 20
@@ -75,13 +78,18 @@ class FleetTableRow:
 
 @dataclass(frozen=True)
 class FleetAnswer:
-    """The most urgent rows of ``rows``, and how many of all need attention, by kind."""
+    """The most urgent rows of ``rows``, and how many of all need attention, by kind.
+
+    ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
+    part in it.
+    """
 
     machines: int
     rows: int
     values: int
     false_discovery_rate: float
     attention: Mapping[str, int]
+    not_identified: tuple[str, ...]
     table: tuple[FleetTableRow, ...]
 
 
@@ -226,5 +234,6 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         values=int(sums.runs.sum()),
         false_discovery_rate=RATE,
         attention={label: int((kind == number).sum()) for number, label in enumerate(ATTENTION)},
+        not_identified=not_identified(db) if request.model is None else (),
         table=tuple(rows),
     )

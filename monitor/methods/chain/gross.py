@@ -256,8 +256,8 @@ def deviations(problem: ChainProblem, local: Array, common: Array) -> list[Devia
 def against_other_runs(problem: ChainProblem, solution: Solution) -> list[Deviation]:
     """The gross rows among those that the run's own unknowns follow, by the places of the other runs.
 
-    Between runs the targets may be placed anew as a whole (``problem.moved_together``), but not each by itself. Empty for
-    problems whose targets have no places, and with fewer than three runs.
+    Between runs the targets may be placed anew as a whole (``problem.moved_together``), but not each by itself. Empty
+    for problems whose targets have no places, and with fewer than three runs.
     """
     placement = problem.moved_together
     count = len(problem.base_names)

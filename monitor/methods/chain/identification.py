@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.methods.chain.gross import GrossReading
+from monitor.methods.chain.shared_effects import FollowedEffects
 from monitor.records import Array
 from monitor.refusal import Refusal
 from monitor.units import Unit
@@ -40,6 +41,7 @@ class Identification:
     ``parameters`` names the k base parameters, ``units`` their display units. ``added`` names the parameters
     common to all runs, with ``added_estimate`` (c,) and ``added_covariance`` (c, c) in internal units. ``gross``
     readings are wrong beyond doubt, and so are the numbers of their runs: they have weight here like all others.
+    ``followed`` are the added effects as every run alone determines them.
     """
 
     campaign: str
@@ -55,6 +57,7 @@ class Identification:
     added_refused: tuple[Refusal, ...]
     iterations: int
     gross: tuple[GrossReading, ...]
+    followed: FollowedEffects
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ from monitor.workflow.certificate.request import AmendmentRequest, CertificateRe
 from monitor.workflow.certificate.results import results_of
 from monitor.workflow.certificate.states import state_of
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import label, resolve
+from monitor.workflow.models import label, resolve_for
 
 
 def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
@@ -93,7 +93,7 @@ def today() -> date:
 def _certified(
     db: Database, campaign: Campaign, measured: Sequence[Measured], request: CertificateRequest
 ) -> list[CertifiedRun]:
-    model = resolve(db, request.model, campaign.method)
+    model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     return [certified_run(db, campaign, model, run, request.linear_axes) for run in measured]
 
 

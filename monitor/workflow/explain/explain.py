@@ -35,7 +35,7 @@ from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sent
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.measured import load_measured
-from monitor.workflow.models import label, resolve
+from monitor.workflow.models import label, resolve_for, subject_of
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.
 SEED = 20260302
@@ -86,7 +86,7 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
     Raises NotFoundError, DataError where the model cannot be fitted, InputError for a folder that cannot be made.
     """
     measured = load_measured(db, request.campaign)
-    model = resolve(db, request.model, measured.method)
+    model = resolve_for(db, request.model, measured.method, subject_of(measured))
     explanation, draw = (
         _search_curve(measured, model, request.rate)
         if isinstance(measured, CurveCampaign)

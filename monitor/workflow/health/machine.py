@@ -45,7 +45,7 @@ from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.past import machine_past, splitting_events
 from monitor.workflow.history.runs import only_runs
-from monitor.workflow.models import resolve
+from monitor.workflow.models import resolve_for
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,9 @@ def read_week(db: Database, name: MachineName, week: Week, options: ReportOption
     last = next((run for run in reversed(runs) if week.holds(run.local_start)), None)
     if last is not None:
         measured = MeasuredWeek(
-            last, campaign_span(every, last.campaign, week), resolve(db, options.model, last.method)
+            last,
+            campaign_span(every, last.campaign, week),
+            resolve_for(db, options.model, last.method, name.machine),
         )
         results = stored_results(db, measured)
         task = task_of(db, name.machine, runs, measured, results)
