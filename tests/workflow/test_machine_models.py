@@ -57,7 +57,7 @@ def test_the_backlash_that_grows_is_a_trend_of_the_machine_that_has_the_model(wo
     followed = trend(worn, TrendRequest("V")).parameters
     drift = followed[BACKLASH].drift
     # The truth: 0.8 µm in 30 days; the effect is the sign of the last travel times the coefficient.
-    assert drift.slope_per_year == pytest.approx(MORE_UM / 30.0 * 365.25, abs=3.0 * drift.u_slope_per_year)
+    assert drift.slope_per_year == pytest.approx(MORE_UM / 30.0 * 365.25, abs=3.0 * drift.u_slope)
     assert followed[BACKLASH].q_value < 1e-3
     rows = {row.parameter: row for row in fleet(worn, FleetRequest(top=0)).table if row.machine == "V"}
     assert rows[BACKLASH].attention in ("drifts", "drifts out of tolerance within a year")
@@ -125,3 +125,22 @@ def test_refusals(worn):
         use_model(worn, UseModelRequest("none", "V", WHY))
     with pytest.raises(EffectError):
         add_effect(worn, AddEffectRequest("EQQ:reversal", "samba", "wrong"))
+
+
+def test_the_weekly_report_follows_the_added_effect(worn, tmp_path):
+    from datetime import date, datetime
+
+    from monitor.workflow.health.report import report, stored_health
+    from monitor.workflow.health.request import ReportRequest
+
+    use_model(worn, UseModelRequest("with-backlash", "V", WHY))
+    ((started,),) = worn.rows("SELECT max(started_at) FROM run")
+    day: date = started.date()
+    week = f"{day.isocalendar().year}-W{day.isocalendar().week:02d}"
+    report(worn, ReportRequest(week=week, machine="V", out=tmp_path, workers=1, made_at=datetime(2027, 6, 1)))
+    ((stored,),) = worn.rows("SELECT max(analysis_id) FROM analysis WHERE kind = 'health'")
+    health = stored_health(worn, stored)
+    (backlash,) = [parameter for parameter in health.parameters if parameter.name == BACKLASH]
+    assert backlash.estimate == pytest.approx(FIRST_UM + MORE_UM * (MONTHS - 1), abs=4.0 * backlash.u)
+    assert len(backlash.history.values) == 4 * MONTHS
+    assert backlash.drift

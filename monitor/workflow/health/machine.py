@@ -124,7 +124,8 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     limits = campaign_tolerances(db, last.campaign)
     judged = conformity_of(stated, limits)
     parameters, drifts = [], {}
-    for name in () if stated is None else stated.parameters:
+    added = [name for name in parameter_pasts if name.startswith(model.effects)]
+    for name in () if stated is None else (*stated.parameters, *added):
         if stated is None or name not in parameter_pasts:
             continue
         parameter = parameter_pasts[name]

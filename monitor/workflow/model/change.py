@@ -42,10 +42,12 @@ def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
 def affected(db: Database, request: AddEffectRequest) -> AffectedAnswer:
     """For whom adding an effect changes the model that is meant: for nobody under a new name.
 
-    Nothing is written. Raises NotFoundError.
+    Nothing is written. Raises EffectError, NotFoundError.
     """
     parent = resolve(db, request.to)
-    if request.new_name not in (None, parent.name):
+    # What would be refused changes nothing for anybody.
+    subjects_of(db, parent).canonical(request.effect, request.campaign)
+    if request.new_name is not None and request.new_name != parent.name:
         return AffectedAnswer(request.new_name, 1, False, (), ())
     latest = load_model(db, parent.name)
     # Only a method's own model is taken by machines for which none was chosen.
