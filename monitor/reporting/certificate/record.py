@@ -8,10 +8,12 @@ What does not apply is said by the laboratory in words, with ``NotApplicable``.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
 
+from monitor.documents import OMITTED
+from monitor.reporting.certificate.grounds import AcceptedGround
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.texts import ENGLISH
@@ -164,7 +166,8 @@ class CertificateRecord:
     that asks for each field. ``accreditation`` is printed where a laboratory has one;
     ``country`` (ISO 3166-1, two letters) is what a digital certificate asks for besides.
     ``replaces`` is the certificate that this one amends. ``volumetric`` maps follow from the ``results``; they are
-    printed where one was asked for.
+    printed where one was asked for. ``accepted`` are the grounds against it that the laboratory answers for; None where
+    there were none.
     """
 
     title: str | None
@@ -195,3 +198,4 @@ class CertificateRecord:
     replaces: Replaced | None = None
     volumetric: tuple[VolumetricResult, ...] = ()
     language: str = ENGLISH
+    accepted: tuple[AcceptedGround, ...] | None = field(default=None, metadata=OMITTED)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from datetime import date
 from pathlib import Path
 
 from monitor.exceptions import InputError
 from monitor.records import LinearAxes
+from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import Key
 
 METHODS = ("guf", "mcm")
@@ -26,9 +28,10 @@ class CertificateOptions:
     are those of `monitor uncertainty`, for a method that takes these axes as known. ``method``: guf, or mcm for the
     stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the laboratory's word on
     conformity. ``with_map`` adds the volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key``
-    signs it.
+    signs it. ``accept`` names the grounds against the certificate that the laboratory answers for, each with the reason
+    that is printed on it.
 
-    Raises InputError for a method or a rule that there is not.
+    Raises InputError for a method or a rule that there is not, or a blank reason.
     """
 
     laboratory: Path
@@ -44,12 +47,16 @@ class CertificateOptions:
     with_map: bool = False
     fonts: tuple[Path, ...] = ()
     key: Key | None = None
+    accept: Mapping[GroundKind, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise InputError(f"--method {self.method}: a certificate states guf or mcm")
         if self.conformity not in (None, *RULES):
             raise InputError(f"there is no decision rule '{self.conformity}'; there are {', '.join(RULES)}")
+        for kind, reason in self.accept.items():
+            if not reason.strip():
+                raise InputError(f"--accept {kind}=REASON: say why the laboratory accepts it; it is printed")
 
 
 @dataclass(frozen=True)
