@@ -120,7 +120,7 @@ def _add(options: Namespace) -> int:
     request = AddEffectRequest(options.effect, options.to, options.as_, options.note, options.campaign)
     with opened(options) as db:
         changed = affected(db, request)
-        if not options.json:
+        if not options.json and (changed.in_use or options.dry_run):
             _will_change(changed)
         if options.dry_run:
             if options.json:
