@@ -39,13 +39,31 @@ SELECT row_number() OVER () AS heading, parameters, identifications,
 FROM heading, every
 """
 
+# Models of single machines, by campaign, and the latest version of each method's own: few rows both.
+_MODELS = """
+CREATE OR REPLACE TEMP TABLE fleet_model AS
+SELECT c.campaign_id, m.method, m.model, m.model_version FROM v_machine_models AS m JOIN campaign AS c USING (machine)
+"""
+
+_OWN = """
+CREATE OR REPLACE TEMP TABLE fleet_own AS
+SELECT model, max(version) AS version FROM model
+WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model
+"""
+
 _CHOSEN = """
 CREATE OR REPLACE TEMP TABLE fleet_chosen AS
 WITH latest AS (
     -- Of each campaign the identification with the most runs, the later of two: what load_identification takes.
     SELECT campaign_id, max((CAST(run_count AS BIGINT) << 32) | identification_id) & 4294967295 AS identification_id
     FROM identification
-    WHERE ($model IS NULL AND model = method OR model = $model) AND ($version IS NULL OR model_version = $version)
+    LEFT JOIN fleet_model AS f USING (campaign_id, method)
+    LEFT JOIN fleet_own AS o ON o.model = identification.method
+    WHERE CASE WHEN $model IS NULL
+          -- That which the machine is followed by, else the latest version of the method's own.
+          THEN identification.model = coalesce(f.model, identification.method)
+               AND identification.model_version = coalesce(f.model_version, o.version, identification.model_version)
+          ELSE identification.model = $model AND ($version IS NULL OR identification.model_version = $version) END
     GROUP BY campaign_id
 ), span AS (
     SELECT campaign_id, min(day) <> max(day) AS several_days, epoch(min(started_at)) / 86400.0 AS began_d
@@ -188,7 +206,7 @@ JOIN shown AS s ON s.k = p.cell & ((1 << {_PARAMETER_BITS}) - 1)
 ORDER BY m.machine, s.parameter
 """
 
-_TABLES = ("machine", "heading", "chosen", "group", "since", "latest", "origin", "part")
+_TABLES = ("machine", "heading", "model", "own", "chosen", "group", "since", "latest", "origin", "part")
 
 
 @dataclass(frozen=True)
@@ -235,11 +253,12 @@ def fleet_sums(db: Database, model: str | None = None, version: int | None = Non
     """Sums of all machines and parameters, of the latest identification of every campaign under one model.
 
     Of each machine since its last recorded event, where runs followed it (a day counts whole, by its first run).
-    Without ``model`` the method's own. A parameter that a machine refused both in its first campaign and on its last
-    day has zero for its origin and loses 2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the
-    last bits from one time to the next. Raises NotFoundError where nothing was identified.
+    Without ``model`` that which each machine is followed by, the method's own where none was chosen. A parameter that
+    a machine refused both in its first campaign and on its last day has zero for its origin and loses
+    2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the last bits from one time to the next.
+    Raises NotFoundError where nothing was identified.
     """
-    for statement in (_MACHINES, _HEADINGS):
+    for statement in (_MACHINES, _HEADINGS, _MODELS, _OWN):
         db.execute(statement)
     db.execute(_CHOSEN, {"model": model, "version": version})
     ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")

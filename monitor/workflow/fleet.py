@@ -12,7 +12,7 @@ from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
 from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
-from monitor.store import Database, FleetSums, fleet_sums, latest_maps, latest_tolerances
+from monitor.store import Database, FleetSums, fleet_sums, latest_maps, latest_tolerances, not_identified
 from monitor.units import MICROMETRE
 from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.drift import SHORTEST_DAYS
@@ -33,7 +33,10 @@ STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
 
 @dataclass(frozen=True)
 class FleetRequest:
-    """Every machine and parameter under a model (the method's own by default); ``top`` rows are listed (0: all)."""
+    """Every machine and parameter under a model (by default that which each machine is followed by).
+
+    ``top`` rows are listed (0: all).
+    """
 
     model: str | None = None
     top: int = 20
@@ -77,13 +80,18 @@ class FleetTableRow:
 
 @dataclass(frozen=True)
 class FleetAnswer:
-    """The most urgent rows of ``rows``, and how many of all need attention, by kind."""
+    """The most urgent rows of ``rows``, and how many of all need attention, by kind.
+
+    ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
+    part in it.
+    """
 
     machines: int
     rows: int
     values: int
     false_discovery_rate: float
     attention: Mapping[str, int]
+    not_identified: tuple[str, ...]
     table: tuple[FleetTableRow, ...]
 
 
@@ -242,6 +250,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
             label: int((kind == number).sum()) + sum(row.attention == label for row in volumetric)
             for number, label in enumerate(ATTENTION)
         },
+        not_identified=not_identified(db) if request.model is None else (),
         table=tuple(
             replace(row, rank=rank) for rank, row in enumerate(ranked[: request.top or None], start=1)
         ),

@@ -90,18 +90,21 @@ def explain(
     rate: float = 0.01,
     rng: np.random.Generator,
     first: Fit | None = None,
+    gross: Sequence[BadPoint] = (),
 ) -> Explanation:
     """Explain what a model lacks. ``rate`` is the false discovery rate of each scan; ``rng`` serves the step search;
-    ``first`` is the fit of ``problem`` where it is known.
+    ``first`` is the fit of ``problem`` where it is known, with the ``gross`` readings left out.
 
     Raises DataError where the model cannot be fitted.
     """
     foreseen = problem.for_search()
     # The fit of the problem as it is serves only where nothing else is foreseen.
-    first = fit(foreseen) if first is None or foreseen is not problem else first
+    certain = Suspects({point.row: point for point in gross})
+    if first is None or foreseen is not problem:
+        first = fit(foreseen, certain.left_out(foreseen) if gross else None)
     surroundings = surroundings_of(campaign, foreseen)
     variants = _variants(campaign, foreseen, surroundings.drivers)
-    search = _search(first, foreseen, variants, surroundings.drivers, rate)
+    search = _search(first, foreseen, variants, surroundings.drivers, rate, certain)
     suspects = search.suspects
     missing = missing_effects(search.scene, search.result, search.refined, surroundings)
     if suspects.varying:
@@ -126,13 +129,20 @@ def explain(
 
 
 def _search(
-    first: Fit, problem: ChainProblem, variants: Sequence[ChainVariant], drivers: Sequence[str], rate: float
+    first: Fit,
+    problem: ChainProblem,
+    variants: Sequence[ChainVariant],
+    drivers: Sequence[str],
+    rate: float,
+    suspects: Suspects,
 ) -> _Search:
-    """Search effects and suspects in turn, each under the others, until nothing changes."""
-    suspects = Suspects()
+    """Search effects and suspects in turn, each under the others and the ``suspects`` that ``first`` leaves out, until
+    nothing changes."""
+    left_out_first = suspects
     for _ in range(MOST_ROUNDS):
         out, single = suspects.left_out(problem), suspects.effects(problem)
-        current = fit(with_effects(problem, single), out, first) if suspects.any else first
+        is_first = suspects.same_as(left_out_first)
+        current = first if is_first else fit(with_effects(problem, single), out, first)
         scene, result = search_chain(scene_of(current, variants), drivers, rate)
         refined = refine_all(scene, result.candidates)
         effects = [finding.candidate.effect for finding in refined]

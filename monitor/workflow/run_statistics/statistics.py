@@ -25,7 +25,7 @@ from monitor.units import Unit
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import resolve
+from monitor.workflow.models import resolve_for
 from monitor.workflow.run_statistics.answer import (
     GroupCorrelation,
     NoVarianceComponents,
@@ -105,7 +105,7 @@ def _parameter(
 
 def _identified(db: Database, campaign: Campaign, model: str | None) -> StoredIdentification:
     """The identification of every run of a campaign; computed where it is not stored yet."""
-    stored = resolve(db, model, campaign.method)
+    stored = resolve_for(db, model, campaign.method, campaign.machine.id)
     try:
         identification = load_identification(db, campaign.name, stored.name, stored.version)
         if len(identification.runs) == len(campaign.runs):

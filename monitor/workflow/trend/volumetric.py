@@ -109,12 +109,12 @@ def _vectors(
     from monitor.uncertainty.geometric_errors import GeometricErrors
     from monitor.uncertainty.volumetric import grid, middle, volumetric_error
     from monitor.workflow.identify.fitting import machine_problem
-    from monitor.workflow.models import resolve
+    from monitor.workflow.models import resolve_for
     from monitor.workflow.volumetric.error_map import poses_of, ranges_of
     from monitor.workflow.volumetric.request import POINTS
 
     campaign = load_campaign(db, str(history.campaign[-1]))
-    fitted = fit(machine_problem(campaign, resolve(db, model, campaign.method)))
+    fitted = fit(machine_problem(campaign, resolve_for(db, model, campaign.method, campaign.machine.id)))
     problem, run = fitted.problem, int(history.run[-1])
     effects = [
         effect
