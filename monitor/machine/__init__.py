@@ -1,6 +1,6 @@
 """The machine as a serial chain: topology string, ISO 230-1 terms, tip-to-target vector and its Jacobian."""
 
-from monitor.machine.chain import ChainPose, evaluate
+from monitor.machine.chain import ChainPose, Orientation, evaluate, orientation
 from monitor.machine.gravity import gravity_in_joint_frames, torques_in_joint_frames
 from monitor.machine.inverse import refuse_untouchable, touching_positions
 from monitor.machine.terms import COMPONENTS, LOCATION, MOTION, Term, parse_term
@@ -13,10 +13,12 @@ __all__ = [
     "Chain",
     "ChainPose",
     "Joint",
+    "Orientation",
     "Term",
     "chain_of_axes",
     "evaluate",
     "gravity_in_joint_frames",
+    "orientation",
     "parse_term",
     "parse_topology",
     "refuse_untouchable",
