@@ -83,7 +83,8 @@ def _variants(campaign: Campaign, problem: ChainProblem, drivers: Sequence[str])
     texts = [effect.text for effect in (*problem.base, *problem.added)]
     chain = problem.context.chain
     effects = catalogue(chain, texts, drivers, pitches, problem.method_effects(drivers))
-    variants = [variant for effect in effects for variant in variants_of(effect)]
+    shown = filter(problem.can_show, effects)
+    variants = [variant for effect in shown for variant in variants_of(effect)]
     if problem.needs_whole_periods:
         variants = without_part_periods(variants, problem.context)
     return [*variants, *resolvable(cycles_of_unknown_pitch(chain), problem.context)]

@@ -12,8 +12,9 @@ from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, WarmUp, parse_driver
+from monitor.effects.drivers.gravity import Gravity
 from monitor.effects.shapes import Compliance, Cyclic, Harmonic
-from monitor.effects.weight import Load
+from monitor.effects.weight import LinkWeights, Load
 from monitor.machine import COMPONENTS, Chain
 from monitor.records import Array
 
@@ -39,16 +40,21 @@ WHOLE_PERIOD = 0.95
 
 
 def without_part_periods(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
-    """The variants, with harmonics of which the axis did not travel one period never found, only named as rivals.
+    """The variants, with what an axis did not travel one period of never found, only named as rivals.
 
-    Over a part of a period a cosine and a sine are a bend of any cause.
+    Over a part of a period a cosine and a sine are a bend of any cause, and so are the components of gravity in the
+    frame of an axis, each with a coefficient of its own.
     """
     travel = np.ptp(context.positions, axis=0)
     checked = []
     for variant in variants:
-        effect = variant.effect
-        if isinstance(effect, ChainEffect) and isinstance(effect.shape, Harmonic):
-            part = effect.shape.order * travel[effect.term.joint] < WHOLE_PERIOD * 2.0 * np.pi
+        effect, periods = variant.effect, 0.0
+        if isinstance(effect, ChainEffect):
+            if isinstance(effect.shape, Harmonic):
+                periods = effect.shape.order
+            elif isinstance(effect.driver, Gravity | LinkWeights):
+                periods = 1.0
+            part = 0.0 < periods * travel[effect.term.joint] < WHOLE_PERIOD * 2.0 * np.pi
             variant = replace(variant, odds=NEVER_FOUND) if part else variant
         checked.append(variant)
     return checked

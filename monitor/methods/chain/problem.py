@@ -130,6 +130,10 @@ class ChainProblem(ABC):
         """Displacement (mm at the tool) and angle (rad) of the largest effect that such a machine is likely to hide."""
         return LARGEST_DISPLACEMENT, LARGEST_ANGLE
 
+    def can_show(self, effect: Effect) -> bool:
+        """Whether readings of this kind could show an effect at all, whatever the plan."""
+        return True
+
     @property
     def needs_whole_periods(self) -> bool:
         """Whether a harmonic has to repeat within the travel of its axis to be told apart from what bends once."""

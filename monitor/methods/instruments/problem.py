@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
+from monitor.effects import ChainEffect, Effect
 from monitor.effects.catalogue import of_drives, of_sight
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.added_effects import columns_of
@@ -103,6 +104,11 @@ class InstrumentProblem(ChainProblem):
     def largest_effect(self) -> tuple[float, float]:
         """More where a mount or a robot is looked at from outside than on a machine tool."""
         return LARGEST_OUTSIDE if self.kinds & {"direction", "point"} else super().largest_effect
+
+    def can_show(self, effect: Effect) -> bool:
+        """Angles alone show no displacement."""
+        angular = all(part.reading.angular for part in self.parts)
+        return not angular or not isinstance(effect, ChainEffect) or effect.term.is_rotation
 
     @property
     def needs_whole_periods(self) -> bool:
