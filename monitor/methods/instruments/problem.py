@@ -28,6 +28,10 @@ LARGEST_TURN = 0.35
 CONTRADICTS = 0.1
 
 
+# What is read of an error's displacement is at least this part, else it comes from products of errors alone.
+SECOND_ORDER = 5e-3
+
+
 @dataclass(frozen=True)
 class Part:
     """The rows of one setup: its ``reading``, its ``rows`` as its kind knows them, and their indices ``at`` (m,) among
@@ -165,8 +169,31 @@ class InstrumentProblem(ChainProblem):
             if shown.by_own is not None:
                 by_own[at, :kinds, columns] = shown.by_own
             if by_error is not None:
-                by_error[at, :kinds] = self._by_error(shown, pose, sides, at)
+                derivatives = self._by_error(shown, pose, sides, at)
+                by_error[at, :kinds] = derivatives * self._first_order(part.id, shown, derivatives, pose, at)
         return InstrumentPose(residual, pose.by_tip, pose.work_rotation, by_error, by_own)
+
+    @cached_property
+    def _masks(self) -> dict[str, npt.NDArray[np.bool_]]:
+        """Which errors each setup reads, by its id, as they were first looked at."""
+        return {}
+
+    def _first_order(
+        self, setup: str, shown: Shown, derivatives: Array, pose: ChainPose, at: npt.NDArray[np.int64]
+    ) -> npt.NDArray[np.bool_]:
+        """Which errors (J, 2, 6) a setup of lengths reads more of than products of errors.
+
+        One that moves the tool along the line of sight alone, or across the one direction that is read, shows only
+        through products with other errors. Its derivatives are taken as zero: they are as large as the other errors let
+        them be, and turn with every step.
+        """
+        assert pose.by_error is not None
+        if shown.by_shift is None or shown.by_turn is not None:
+            return np.ones(derivatives.shape[2:], dtype=bool)
+        if setup not in self._masks:
+            moved = np.sum(pose.by_error[at] ** 2, axis=(0, 1))
+            self._masks[setup] = np.sum(derivatives**2, axis=(0, 1)) > SECOND_ORDER**2 * moved
+        return self._masks[setup]
 
     def _by_error(
         self, shown: Shown, pose: ChainPose, sides: Orientation, at: npt.NDArray[np.int64]

@@ -1,7 +1,7 @@
 """``point``: where a point of the tool is, in the frame of the instrument that looks at it (a tracker, a CMM, a plate).
 
-Or, of a part that the machine cut, where it was cut. Unknown in every run are the frame (three turns, three shifts
-away from a first guess) and a place on the tool for each target, unless they are known. A row whose third number is
+Or, of a part that the machine cut, where it was cut. Unknown in every run are the frame (three turns and three
+shifts in its own directions, away from a first guess) and a place on the tool for each target, unless they are known. A row whose third number is
 empty has two: the plane of a part is no reading, and neither is a third number that is the same in all rows.
 """
 
@@ -13,20 +13,26 @@ from typing import ClassVar, Self
 import numpy as np
 import numpy.typing as npt
 
-from monitor.methods.instruments.frames import first_frame
+from monitor.methods.instruments.frames import first_frame, seen_points
 from monitor.methods.instruments.reading import SHIFT, TURN, Plain, Rows, Seen, Shown
 from monitor.methods.instruments.readings.direction import frame_turn
 from monitor.records import Array, Setup
 
 
+# Where the points vary along the line of sight by less than this part of what they vary across it, two numbers show a
+# tilt of the frame only through products of errors.
+FLAT = 5e-3
+
+
 @dataclass(frozen=True)
 class Point(Plain):
     """A point with ``targets`` (T), their first ``places`` (T, 3) mm on the tool, in ``plane`` where no row has a third
-    number."""
+    number, ``flat`` where all of them lie in a plane across the line of sight then."""
 
     targets: tuple[str, ...] = ()
     places: tuple[tuple[float, ...], ...] = ()
     plane: bool = False
+    flat: bool = False
 
     name: ClassVar[str] = "point"
     columns: ClassVar[tuple[str, ...]] = ("point_x_mm", "point_y_mm", "point_z_mm")
@@ -42,21 +48,38 @@ class Point(Plain):
         guess = np.tile(np.concatenate([np.eye(3).reshape(9), np.zeros(3)]), (len(rows), 1))
         if "frame" not in setup.known:
             guess, places = first_frame(rows, places, held="targets" in setup.known)
-        reading = cls(setup, targets, tuple(map(tuple, places.tolist())), plane)
-        return reading, replace(rows, guess=guess)
+        seen = seen_points(rows, guess, places)
+        spread = seen.std(axis=0)
+        flat = plane and bool(spread[2] < FLAT * spread[:2].max())
+        middle = np.zeros_like(seen)
+        for run in np.unique(rows.run):
+            middle[rows.run == run] = seen[rows.run == run].mean(axis=0)
+        reading = cls(setup, targets, tuple(map(tuple, places.tolist())), plane, flat)
+        return reading, replace(rows, guess=np.concatenate([guess, middle], axis=1))
 
     @property
     def numbers(self) -> tuple[str, ...]:
         return ("x", "y") if self.plane else ("x", "y", "z")
 
     @property
+    def _free(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The turns and shifts of the frame that are unknown, by their axes in the instrument's frame."""
+        if self.holds("frame"):
+            return (), ()
+        return ((2,) if self.flat else (0, 1, 2)), ((0, 1) if self.plane else (0, 1, 2))
+
+    @property
     def unknowns(self) -> tuple[str, ...]:
-        frame = () if self.holds("frame") else (*TURN, *SHIFT)
+        turns, shifts = self._free
         targets = () if self.holds("targets") else self.targets
-        return (*frame, *(f"target {name} {axis}" for name in targets for axis in "xyz"))
+        return (
+            *(TURN[axis] for axis in turns),
+            *(SHIFT[axis] for axis in shifts),
+            *(f"target {name} {axis}" for name in targets for axis in "xyz"),
+        )
 
     def start(self, runs: int) -> Array:
-        frame = np.zeros(0 if self.holds("frame") else 6)
+        frame = np.zeros(sum(map(len, self._free)))
         places = np.zeros(0) if self.holds("targets") else np.array(self.places).reshape(-1)
         return np.tile(np.concatenate([frame, places]), (runs, 1))
 
@@ -73,25 +96,33 @@ class Point(Plain):
 
     def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
         count, kinds = len(rows), len(self.numbers)
-        turn, shift = rows.guess[:, :9].reshape(-1, 3, 3), rows.guess[:, 9:]
-        back = np.swapaxes(turn, 1, 2)
-        arm = seen.r - shift
+        turns, shifts = self._free
+        turned, shift = np.zeros((2, count, 3))
+        turned[:, turns] = own[:, : len(turns)]
+        shift[:, shifts] = own[:, len(turns) : len(turns) + len(shifts)]
+        moved, axes = frame_turn(turned)
+        into = np.swapaxes(rows.guess[:, :9].reshape(-1, 3, 3), 1, 2)
+        middle = rows.guess[:, 12:]
+        arm = np.einsum(
+            "nij,nj->ni", moved, np.einsum("nij,nj->ni", into, seen.r - rows.guess[:, 9:12]) - middle
+        )
+        by_shift = moved @ into
         by_own = np.zeros((count, 3, own.shape[1]))
-        if not self.holds("frame"):
-            moved, axes = frame_turn(own[:, :3])
-            arm = arm - own[:, 3:6]
-            back = back @ np.swapaxes(moved, 1, 2)
-            by_own[:, :, :3] = -back @ np.swapaxes(np.cross(axes, arm[:, None, :]), 1, 2)
-            by_own[:, :, 3:6] = -back
+        for column, axis in enumerate(turns):
+            by_own[:, :, column] = np.cross(axes[:, axis], arm)
+        for column, axis in enumerate(shifts, start=len(turns)):
+            by_own[:, axis, column] = 1.0
         if not self.holds("targets"):
-            first = own.shape[1] - 3 * len(self.targets)
-            on_tool, at = back @ seen.turned, self._target(rows)
+            first, at = own.shape[1] - 3 * len(self.targets), self._target(rows)
+            on_tool = by_shift @ seen.turned
+            if self.plane:
+                # Along the line of sight a place shows only through products of errors.
+                on_tool = np.where(np.linalg.norm(on_tool[:, :2], axis=1, keepdims=True) < FLAT, 0.0, on_tool)
             for axis in range(3):
                 by_own[np.arange(count), :, first + 3 * at + axis] = on_tool[:, :, axis]
-        shown = np.einsum("nij,nj->ni", back, arm)
         return Shown(
-            residual=shown[:, :kinds] - rows.measured,
-            by_shift=back[:, :kinds],
+            residual=(arm + middle + shift)[:, :kinds] - rows.measured,
+            by_shift=by_shift[:, :kinds],
             by_own=by_own[:, :kinds],
         )
 
