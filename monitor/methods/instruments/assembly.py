@@ -53,6 +53,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
         added=added,
         sigma=_sigma(context, setups, number, parts),
         parts=parts,
+        setups=used,
         gear_ratios=tuple((name, ratio) for name, ratio in ratios.items() if ratio is not None),
     )
 

@@ -8,7 +8,7 @@ the collimation, a constant turn of the tool (P. T. Wallace, TPOINT: IH, ID, ME,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -17,6 +17,7 @@ import numpy as np
 from monitor.effects import Context
 from monitor.machine import COMPONENTS, MOTION, Chain
 from monitor.methods.chain.base_effects import location_candidates
+from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.instruments.problem import InstrumentProblem, Part
 from monitor.methods.instruments.reading import Rows
@@ -74,30 +75,52 @@ def instrument_base(chain: Chain, setups: tuple[Setup, ...]) -> tuple[str, ...]:
     return (*locations, *constant, *sorted(f"E{COMPONENTS[axis]}{names[j]}:poly1" for j, axis in seen_gains))
 
 
-def taken_up(chain: Chain, setups: tuple[Setup, ...]) -> dict[str, tuple[str, ...]]:
-    """Location errors and turns of the tool that have no number of their own, and the free errors that do the same;
-    none where a reading does not see them at all."""
+@cache
+def taken_up(chain: Chain, setups: tuple[Setup, ...]) -> tuple[TakenUp, ...]:
+    """Location errors, turns of the tool and outer frames that have no number of their own, with the free errors that
+    do the same, or unknown frames and places; with none where the setups see nothing of them."""
     by_error, known = _generic(chain, setups)
     by_error = _without_rounding(by_error)
     base = instrument_base(chain, setups)
     names = [joint.name for joint in chain.joints]
-    terms = {_name(names, term): term for term in _candidates(chain, setups)}
-    free = {name: by_error[:, j, s, c] for name, (j, s, c) in terms.items() if name in base}
-    groups: dict[str, tuple[str, ...]] = {}
-    for name, (j, s, c) in terms.items():
-        column = by_error[:, j, s, c]
-        if name in base:
-            continue
-        if not np.any(column):
-            groups[name] = ()
-            continue
-        others = np.column_stack([*free.values(), known])
-        scale = np.linalg.norm(others, axis=0)
-        shares = np.linalg.lstsq(others / np.where(scale == 0, 1.0, scale), column, rcond=1e-9)[0]
-        large = np.abs(shares) > 1e-6 * np.abs(shares).max()
-        members = [other for other, is_large in zip(free, large, strict=False) if is_large]
-        groups[name] = (*members, *(("frame or places of the setup",) if large[len(free) :].any() else ()))
-    return groups
+    columns = {_name(names, term): by_error[:, *term] for term in _candidates(chain, setups)}
+    free = {name: column for name, column in columns.items() if name in base}
+    others = np.column_stack([*free.values(), known])
+    length = np.linalg.norm(others, axis=0)
+    others = others / np.where(length == 0, 1.0, length)
+    groups = [
+        TakenUp(name, _members(column, others, tuple(free)))
+        for name, column in columns.items()
+        if name not in base
+    ]
+    return (*groups, *_frames(chain, setups, free))
+
+
+def _members(column: Array, others: Array, names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names of the columns (N, q) that make up a column (N,); those beyond the names are unknowns of setups."""
+    if not np.any(column):
+        return ()
+    shares = np.linalg.lstsq(others, column / np.linalg.norm(column), rcond=1e-9)[0]
+    large = np.abs(shares) > ROUNDING**0.5
+    members = [name for name, is_large in zip(names, large[: len(names)], strict=True) if is_large]
+    return (*members, *(("the unknowns of the setups",) if large[len(names) :].any() else ()))
+
+
+def _frames(chain: Chain, setups: tuple[Setup, ...], free: dict[str, Array]) -> Iterator[TakenUp]:
+    """The outer frame of the first direction: no unknown of its own, because location errors turn it."""
+    first = next((setup for setup in setups if setup.reading == "direction"), None)
+    if first is None or "frame" in first.known or not free:
+        return
+    problem = _generic_problem(chain, setups, floating=first.id)
+    pose = problem.evaluated(problem.start, np.zeros(0), jacobian=True)
+    index = [part.id for part in problem.parts].index(first.id)
+    turns = pose.by_own[:, :, problem.own_columns[index]].reshape(
+        pose.by_own.shape[0] * pose.by_own.shape[1], -1
+    )
+    others = np.column_stack(list(free.values()))
+    others = others / np.linalg.norm(others, axis=0)
+    members = dict.fromkeys(name for column in turns.T for name in _members(column, others, tuple(free)))
+    yield TakenUp(f"the frame of {first.id}", tuple(members))
 
 
 def _name(names: Sequence[str], term: tuple[int, int, int]) -> str:
@@ -134,11 +157,22 @@ def _positions(chain: Chain) -> Array:
 
 def _generic(chain: Chain, setups: tuple[Setup, ...]) -> tuple[Array, Array]:
     """Derivatives (N, J, 2, 6) of all readings by every error, and by the unknowns of the setups (N, q)."""
+    problem = _generic_problem(chain, setups)
+    pose = problem.evaluated(problem.start, np.zeros(0), jacobian=True)
+    assert pose.by_error is not None
+    rows = pose.residual.size
+    return pose.by_error.reshape(rows, len(chain.joints), 2, 6), pose.by_own.reshape(rows, -1)
+
+
+def _generic_problem(
+    chain: Chain, setups: tuple[Setup, ...], floating: str | None = None
+) -> InstrumentProblem:
+    """All setups at generic poses; ``floating`` is the id of a direction whose frame is unknown besides."""
     rng = np.random.default_rng(SEED + 1)
     positions = _positions(chain)
     count = len(positions)
     parts = []
-    floating = False
+    is_first = True
     for number, setup in enumerate(setups):
         work, tool, nominal = rng.uniform(-PLACES, PLACES, (3, 3))
         placed = replace(
@@ -159,8 +193,11 @@ def _generic(chain: Chain, setups: tuple[Setup, ...]) -> tuple[Array, Array]:
         )
         reading, rows = kind.of(placed, rows)
         if isinstance(reading, Direction):
-            reading = replace(reading, floating=floating and "frame" not in setup.known)
-            floating = True
+            # What is seen is what the tool points at, as on a machine without errors.
+            rows = replace(rows, measured=reading.pointed(rows))
+            unknown = not is_first and "frame" not in setup.known
+            reading = replace(reading, floating=unknown or setup.id == floating)
+            is_first = False
         at = number * count + np.arange(count)
         parts.append(Part(setup.id, reading, rows, at))
     rows_in_all = count * len(setups)
@@ -177,11 +214,7 @@ def _generic(chain: Chain, setups: tuple[Setup, ...]) -> tuple[Array, Array]:
         columns={},
     )
     numbers = max(len(part.reading.numbers) for part in parts)
-    problem = InstrumentProblem(context, (), (), np.ones((rows_in_all, numbers)), parts=tuple(parts))
-    pose = problem.evaluated(problem.start, np.zeros(0), jacobian=True)
-    assert pose.by_error is not None
-    own = pose.by_own.reshape(rows_in_all * numbers, -1)
-    return pose.by_error.reshape(rows_in_all * numbers, len(chain.joints), 2, 6), own
+    return InstrumentProblem(context, (), (), np.ones((rows_in_all, numbers)), parts=tuple(parts))
 
 
 def _without_rounding(by_error: Array) -> Array:

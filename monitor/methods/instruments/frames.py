@@ -66,8 +66,8 @@ def first_frame(rows: Rows, places: Array, *, held: bool) -> tuple[Array, Array]
 
 
 def seen_points(rows: Rows, frames: Array, places: Array) -> Array:
-    """The points (m, 3) of targets at ``places`` (T, 3) in the instrument's frame, by frames (m, 12) and a chain without
-    errors."""
+    """The points (m, 3) of targets at ``places`` (T, 3) in the instrument's frame, by frames (m, 12) and a chain
+    without errors."""
     at = np.unique(rows.target, return_inverse=True)[1].reshape(-1)
     none = np.zeros((len(rows), len(rows.chain.joints), 2, 6))
     points = evaluate(rows.chain, rows.positions, none, np.zeros((len(rows), 3)), places[at]).residual

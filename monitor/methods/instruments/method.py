@@ -6,10 +6,12 @@ import numpy as np
 
 from monitor.exceptions import DataError
 from monitor.machine import Chain
+from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.instruments.assembly import NAME, problem_of
-from monitor.methods.instruments.base import instrument_base, usual_setups
+from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
+from monitor.methods.instruments.problem import InstrumentProblem
 from monitor.methods.method import ChainMethod, Nouns, Unable
 from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
@@ -41,6 +43,12 @@ def refuse(campaign: Campaign, problem: ChainProblem) -> None:
             )
 
 
+def without_numbers(problem: ChainProblem) -> tuple[TakenUp, ...]:
+    """What these setups cannot give a number, whatever the plan."""
+    assert isinstance(problem, InstrumentProblem)
+    return taken_up(problem.context.chain, problem.setups)
+
+
 METHOD = ChainMethod(
     name=NAME,
     title="instruments",
@@ -51,6 +59,7 @@ METHOD = ChainMethod(
     advice=advice,
     base_effects=usual_base,
     trial_rows=150,
+    taken_up=without_numbers,
     coordinates=Unable("readings of instruments are no coordinates that could stand side by side"),
     certificate=Unable(
         "a certificate states a probe and an artefact, and does not know several instruments yet; identify, "

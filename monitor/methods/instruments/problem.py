@@ -17,7 +17,7 @@ from monitor.methods.chain.added_effects import columns_of
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.reading import Reading, Rows, Seen, Shown
-from monitor.records import Array
+from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
 # mount sags by a degree's fraction, a joint gives way by millimetres.
@@ -54,10 +54,11 @@ class InstrumentPose(ChainPose):
 class InstrumentProblem(ChainProblem):
     """Readings of the setups ``parts``; a row of a kind with fewer than d numbers has no weight in the others.
 
-    ``gear_ratios`` are those that the machine file gives.
+    ``setups`` are those that have rows, ``gear_ratios`` those that the machine file gives.
     """
 
     parts: tuple[Part, ...] = ()
+    setups: tuple[Setup, ...] = ()
     gear_ratios: tuple[tuple[str, float], ...] = ()
 
     @cached_property

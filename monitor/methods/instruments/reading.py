@@ -1,8 +1,8 @@
 """What a kind of reading is: numbers that an instrument shows, by how tool side and work side stand.
 
-A kind is one file of ``readings`` with a ``READING``: a class that is made from a setup and its rows. Everything is seen
-from the work side: r leads from the work point to the tool point in the frame of the last work axis. Angles are read
-as what they come to at ``LEVER``: a microradian is a micrometre at one metre, so that lengths and angles of one
+A kind is one file of ``readings`` with a ``READING``: a class that is made from a setup and its rows. Everything is
+seen from the work side: r leads from the work point to the tool point in the frame of the last work axis. Angles are
+read as what they come to at ``LEVER``: a microradian is a micrometre at one metre, so that lengths and angles of one
 campaign stand in one table.
 """
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED
+from monitor.methods.chain.identification import TakenUp
 from monitor.reporting.refused import RefusedParameters
 
 
@@ -96,7 +97,8 @@ class ResponseOverInputs:
 
 @dataclass(frozen=True, kw_only=True)
 class IdentifyAnswer:
-    """The runs of a campaign under a model; ``added`` are the effects that all runs share.
+    """The runs of a campaign under a model; ``added`` are the effects that all runs share, ``taken_up`` the errors that
+    no plan gives a number of their own, where the method names them.
 
     A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither.
     """
@@ -110,6 +112,7 @@ class IdentifyAnswer:
     added: Mapping[str, Estimate | CurveEstimate]
     added_refused: tuple[RefusedParameters, ...]
     autocorrelation: CurveNoise | None = field(default=None, metadata=OMITTED)
+    taken_up: tuple[TakenUp, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

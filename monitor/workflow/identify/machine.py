@@ -42,6 +42,7 @@ def machine_answer(machine: Machine, identification: Identification) -> Identify
             identification.added_covariance,
         ),
         added_refused=tuple(map(refused_parameters, identification.added_refused)),
+        taken_up=identification.taken_up or None,
     )
 
 

@@ -43,10 +43,7 @@ class Direction(Plain):
         reading = cls(setup)
         outer = np.eye(3)
         if not reading.holds("frame"):
-            none = np.zeros((len(rows), len(rows.chain.joints), 2, 6))
-            sides = orientation(rows.chain, rows.positions, none)
-            pointed = np.swapaxes(sides.work, 1, 2) @ sides.tool @ reading.pointing
-            best = nearest_rotation(pointed, rows.measured)
+            best = nearest_rotation(reading.pointed(rows), rows.measured)
             turned = float(np.arccos(np.clip(0.5 * (np.trace(best) - 1.0), -1.0, 1.0)))
             outer = best if turned > NEAR else outer
         return reading, replace(rows, guess=np.tile(outer.reshape(9), (len(rows), 1)))
@@ -56,6 +53,12 @@ class Direction(Plain):
         """The tool's direction (3,) in the frame of the last tool axis."""
         assert self.setup.tool_direction is not None  # the reader asks for it
         return np.array(self.setup.tool_direction)
+
+    def pointed(self, rows: Rows) -> Array:
+        """Where the tool of a machine without errors points (m, 3), in the frame of the last work axis."""
+        none = np.zeros((len(rows), len(rows.chain.joints), 2, 6))
+        sides = orientation(rows.chain, rows.positions, none)
+        return np.asarray(np.swapaxes(sides.work, 1, 2) @ sides.tool @ self.pointing)
 
     @property
     def numbers(self) -> tuple[str, ...]:

@@ -1,8 +1,9 @@
 """``point``: where a point of the tool is, in the frame of the instrument that looks at it (a tracker, a CMM, a plate).
 
-Or, of a part that the machine cut, where it was cut. Unknown in every run are the frame (three turns and three
-shifts in its own directions, away from a first guess) and a place on the tool for each target, unless they are known. A row whose third number is
-empty has two: the plane of a part is no reading, and neither is a third number that is the same in all rows.
+Or, of a part that the machine cut, where it was cut. Unknown in every run are the frame (three turns and three shifts
+in its own directions, away from a first guess) and a place on the tool for each target, unless they are known. A row
+whose third number is empty has two: the plane of a part is no reading, and neither is a third number that is the same
+in all rows.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from monitor.methods.instruments.frames import first_frame, seen_points
 from monitor.methods.instruments.reading import SHIFT, TURN, Plain, Rows, Seen, Shown
 from monitor.methods.instruments.readings.direction import frame_turn
 from monitor.records import Array, Setup
-
 
 # Where the points vary along the line of sight by less than this part of what they vary across it, two numbers show a
 # tilt of the frame only through products of errors.
