@@ -100,8 +100,8 @@ def _sigma(
     for part in parts:
         angular = part.reading.angular
         stated = (setups[number[part.at[0]]].standard_uncertainty or np.nan) * (LEVER if angular else 1.0)
-        own = _column(context, U_ANGLE if angular else U_LENGTH)[part.at]
-        u = np.where(np.isfinite(own), own, stated)
+        of_rows = _column(context, U_ANGLE if angular else U_LENGTH)[part.at]
+        u = np.where(np.isfinite(of_rows), of_rows, stated)
         kinds = len(part.reading.numbers)
         read = np.isfinite(part.rows.measured)
         # Of a direction all three components together make two numbers.

@@ -49,7 +49,7 @@ def usual_setups(chain: Chain) -> tuple[Setup, ...]:
 @cache
 def instrument_base(chain: Chain, setups: tuple[Setup, ...]) -> tuple[str, ...]:
     """The effects that are free in every run of campaigns with these setups, location errors in chain order first."""
-    by_error, known = _generic(chain, setups)
+    by_error, by_unknowns = _generic(chain, setups)
     by_error = _without_rounding(by_error)
     gains = [
         (index, joint.main)
@@ -59,7 +59,7 @@ def instrument_base(chain: Chain, setups: tuple[Setup, ...]) -> tuple[str, ...]:
     positions = _positions(chain)
     rows = len(by_error) // len(positions)
     columns = [by_error[:, index, 1, axis] * np.repeat(positions[:, index], rows) for index, axis in gains]
-    basis, seen_gains = _orthonormal(known), []
+    basis, seen_gains = _orthonormal(by_unknowns), []
     for gain, column in zip(gains, columns, strict=True):
         basis, is_new = _with(basis, column)
         if is_new:
@@ -79,13 +79,13 @@ def instrument_base(chain: Chain, setups: tuple[Setup, ...]) -> tuple[str, ...]:
 def taken_up(chain: Chain, setups: tuple[Setup, ...]) -> tuple[TakenUp, ...]:
     """Location errors, turns of the tool and outer frames that have no number of their own, with the free errors that
     do the same, or unknown frames and places; with none where the setups see nothing of them."""
-    by_error, known = _generic(chain, setups)
+    by_error, by_unknowns = _generic(chain, setups)
     by_error = _without_rounding(by_error)
     base = instrument_base(chain, setups)
     names = [joint.name for joint in chain.joints]
     columns = {_name(names, term): by_error[:, *term] for term in _candidates(chain, setups)}
     free = {name: column for name, column in columns.items() if name in base}
-    others = np.column_stack([*free.values(), known])
+    others = np.column_stack([*free.values(), by_unknowns])
     length = np.linalg.norm(others, axis=0)
     others = others / np.where(length == 0, 1.0, length)
     groups = [
@@ -236,7 +236,7 @@ def _with(basis: Array, column: Array) -> tuple[Array, bool]:
     size = float(np.linalg.norm(column))
     remainder = column - basis @ (basis.T @ column)
     remainder = remainder - basis @ (basis.T @ remainder)
-    left = float(np.linalg.norm(remainder))
-    if size == 0.0 or left <= RANK_TOLERANCE * size:
+    length = float(np.linalg.norm(remainder))
+    if size == 0.0 or length <= RANK_TOLERANCE * size:
         return basis, False
-    return np.column_stack([basis, remainder / left]), True
+    return np.column_stack([basis, remainder / length]), True

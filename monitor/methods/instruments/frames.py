@@ -23,9 +23,9 @@ TURNS = 60
 OPEN = 1e-8
 
 
-def nearest_rotation(wanted: Array, given: Array) -> Array:
-    """The rotation (3, 3) that brings vectors ``given`` (m, 3) closest to ``wanted`` (m, 3)."""
-    return _as_rotation(wanted.T @ given)
+def nearest_rotation(wanted: Array, vectors: Array) -> Array:
+    """The rotation (3, 3) that brings vectors ``vectors`` (m, 3) closest to ``wanted`` (m, 3)."""
+    return _as_rotation(wanted.T @ vectors)
 
 
 def _as_rotation(matrix: Array) -> Array:
@@ -49,7 +49,7 @@ def first_frame(rows: Rows, places: Array, *, held: bool) -> tuple[Array, Array]
     for run in np.unique(rows.run):
         mine = np.flatnonzero(rows.run == run)
         complete = mine[~np.isnan(rows.measured[mine]).any(axis=1)]
-        turn, shift, found = _best(
+        turn, shift, improved = _best(
             pose.by_tip[complete],
             pose.residual[complete],
             rows.measured[complete],
@@ -58,9 +58,9 @@ def first_frame(rows: Rows, places: Array, *, held: bool) -> tuple[Array, Array]
             held,
         )
         guesses[mine] = np.concatenate([turn.reshape(9), shift])
-        seen = np.unique(at[complete])
-        sums[seen] += found[seen]
-        times[seen] += 1.0
+        of_run = np.unique(at[complete])
+        sums[of_run] += improved[of_run]
+        times[of_run] += 1.0
     mean = sums / np.maximum(times, 1.0)[:, None]
     return guesses, places if held else np.where(times[:, None] > 0.0, mean, places)
 
@@ -90,12 +90,12 @@ def _best(
             carried = np.einsum("nij,nj->ni", rotation, trial[at]) + origin
             turn, shift = _frame(carried, points)
             if not held:
-                trial = _places(rotation, origin, points, at, trial, turn, shift)
+                trial = _places((rotation, origin), points, at, trial, (turn, shift))
         carried = np.einsum("nij,nj->ni", rotation, trial[at]) + origin
-        seen = ((carried - shift) @ turn)[:, : points.shape[1]]
-        left = float(np.sum((seen - points) ** 2))
-        if left < least:
-            best, least = (turn, shift, trial), left
+        shown = ((carried - shift) @ turn)[:, : points.shape[1]]
+        squares = float(np.sum((shown - points) ** 2))
+        if squares < least:
+            best, least = (turn, shift, trial), squares
     assert best is not None
     return best
 
@@ -117,22 +117,21 @@ def _frame(carried: Array, points: Array) -> tuple[Array, Array]:
 
 
 def _places(
-    rotation: Array,
-    origin: Array,
+    poses: tuple[Array, Array],
     points: Array,
     at: npt.NDArray[np.int64],
     places: Array,
-    turn: Array,
-    shift: Array,
+    frame: tuple[Array, Array],
 ) -> Array:
     """Places (T, 3) for a frame, nearest to those before where rows leave them open."""
+    (rotation, origin), (turn, shift) = poses, frame
     kinds = points.shape[1]
     better = places.copy()
     for number in np.unique(at):
         mine = at == number
         columns = np.einsum("ai,nij->naj", turn.T[:kinds], rotation[mine])
-        seen = (np.einsum("nij,j->ni", rotation[mine], places[number]) + origin[mine] - shift) @ turn
-        wanted = (points[mine] - seen[:, :kinds]).reshape(-1)
+        shown = (np.einsum("nij,j->ni", rotation[mine], places[number]) + origin[mine] - shift) @ turn
+        wanted = (points[mine] - shown[:, :kinds]).reshape(-1)
         better[number] += np.linalg.lstsq(columns.reshape(-1, 3), wanted, rcond=1e-6)[0]
     return better
 

@@ -16,7 +16,7 @@ from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.added_effects import columns_of
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.reading import Reading, Rows, Seen, Shown
+from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance
 from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
@@ -133,8 +133,8 @@ class InstrumentProblem(ChainProblem):
     def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """The work points and tool points of all rows."""
         work, tool = np.zeros((2, len(self.context), 3))
-        for part, own in self._with_own(nuisance):
-            work[part.at], tool[part.at] = part.reading.ends(own, part.rows)
+        for part, values in self._with_own(nuisance):
+            work[part.at], tool[part.at] = part.reading.ends(values, part.rows)
         return work, tool
 
     def _with_own(self, nuisance: Array) -> Iterator[tuple[Part, Array]]:
@@ -160,11 +160,11 @@ class InstrumentProblem(ChainProblem):
         count, numbers = len(context), self.sigma.shape[1]
         residual, by_own = np.zeros((count, numbers)), np.zeros((count, numbers, nuisance.shape[1]))
         by_error = np.zeros((count, numbers, len(context.chain.joints), 2, 6)) if jacobian else None
-        for (part, own), columns in zip(self._with_own(nuisance), self.own_columns, strict=True):
+        for (part, values), columns in zip(self._with_own(nuisance), self.own_columns, strict=True):
             at = part.at
-            nominal = _seen(pose.residual[at], self._nominal, at)
-            seen = replace(_seen(pose.residual[at], sides, at), nominal=nominal)
-            shown = part.reading.shown(seen, own, part.rows)
+            nominal = _stance(pose.residual[at], self._nominal, at)
+            stance = replace(_stance(pose.residual[at], sides, at), nominal=nominal)
+            shown = part.reading.shown(stance, values, part.rows)
             kinds = shown.residual.shape[1]
             residual[at, :kinds] = np.nan_to_num(shown.residual)
             if shown.by_own is not None:
@@ -276,7 +276,7 @@ class InstrumentProblem(ChainProblem):
         return None
 
 
-def _seen(r: Array, sides: Orientation, at: npt.NDArray[np.int64]) -> Seen:
+def _stance(r: Array, sides: Orientation, at: npt.NDArray[np.int64]) -> Stance:
     """How the sides stand at the rows of a setup."""
     work, tool = sides.work[at], sides.tool[at]
-    return Seen(r, np.swapaxes(work, 1, 2) @ tool, work, tool)
+    return Stance(r, np.swapaxes(work, 1, 2) @ tool, work, tool)

@@ -53,7 +53,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Seen:
+class Stance:
     """How the sides stand at the m rows of a setup.
 
     ``r`` (m, 3) mm from work point to tool point, ``turned`` (m, 3, 3) the tool side in the frame of the last work
@@ -65,7 +65,7 @@ class Seen:
     turned: Array
     work: Array
     tool: Array
-    nominal: Seen | None = None
+    nominal: Stance | None = None
 
 
 @dataclass(frozen=True)
@@ -120,11 +120,11 @@ class Reading(Protocol):
         """Unknowns that are known with a standard uncertainty: index and u in mm or rad; they are 0 as stated."""
         ...
 
-    def ends(self, own: Array, rows: Rows) -> tuple[Array, Array]:
+    def ends(self, values: Array, rows: Rows) -> tuple[Array, Array]:
         """Work point and tool point (m, 3) mm in the frames of the last axes, for unknowns (m, q) row by row."""
         ...
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
         """What the instrument shows."""
         ...
 
@@ -156,7 +156,7 @@ class Plain:
     def prior(self) -> tuple[tuple[int, float], ...]:
         return ()
 
-    def ends(self, own: Array, rows: Rows) -> tuple[Array, Array]:
+    def ends(self, values: Array, rows: Rows) -> tuple[Array, Array]:
         count = len(rows)
         return np.tile(self.setup.work_point, (count, 1)), np.tile(self.setup.tool_point, (count, 1))
 

@@ -13,8 +13,8 @@ import numpy as np
 from monitor.methods.instruments.reading import (
     LEVER,
     Rows,
-    Seen,
     Shown,
+    Stance,
     cross_matrix,
     direction_of,
     turn_vectors,
@@ -31,13 +31,13 @@ class Angle(Zeroed):
     columns: ClassVar[tuple[str, ...]] = ("reading_urad",)
     angular: ClassVar[bool] = True
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
-        assert seen.nominal is not None
-        value, slope = turned_about(direction_of(self.setup), seen.turned, seen.nominal.turned)
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
+        assert stance.nominal is not None
+        value, slope = turned_about(direction_of(self.setup), stance.turned, stance.nominal.turned)
         return Shown(
-            residual=(value - LEVER * own.sum(axis=1))[:, None] - rows.measured,
+            residual=(value - LEVER * values.sum(axis=1))[:, None] - rows.measured,
             by_turn=slope,
-            by_own=np.full((len(rows), 1, own.shape[1]), -LEVER),
+            by_own=np.full((len(rows), 1, values.shape[1]), -LEVER),
         )
 
 

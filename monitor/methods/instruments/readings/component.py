@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from monitor.methods.instruments.reading import Plain, Rows, Seen, Shown, direction_of
+from monitor.methods.instruments.reading import Plain, Rows, Shown, Stance, direction_of
 from monitor.records import Array
 
 
@@ -33,13 +33,13 @@ class Component(Zeroed):
 
     name: ClassVar[str] = "component"
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
         along = direction_of(self.setup)
         count = len(rows)
         return Shown(
-            residual=(seen.r @ along - own.sum(axis=1))[:, None] - rows.measured,
+            residual=(stance.r @ along - values.sum(axis=1))[:, None] - rows.measured,
             by_shift=np.tile(along, (count, 1, 1)),
-            by_own=-np.ones((count, 1, own.shape[1])),
+            by_own=-np.ones((count, 1, values.shape[1])),
         )
 
 

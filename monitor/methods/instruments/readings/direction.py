@@ -16,7 +16,7 @@ import numpy as np
 from monitor.machine import orientation
 from monitor.machine.chain import rotation_about
 from monitor.methods.instruments.frames import nearest_rotation
-from monitor.methods.instruments.reading import LEVER, TURN, Plain, Rows, Seen, Shown, cross_matrix
+from monitor.methods.instruments.reading import LEVER, TURN, Plain, Rows, Shown, Stance, cross_matrix
 from monitor.records import Array, Setup
 
 # A frame turned by less than 20 degrees against the machine's is the machine's: no axis is set up worse than that.
@@ -68,14 +68,14 @@ class Direction(Plain):
     def unknowns(self) -> tuple[str, ...]:
         return TURN if self.floating else ()
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
-        pointed = seen.turned @ self.pointing
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
+        pointed = stance.turned @ self.pointing
         star = np.einsum("nij,nj->ni", rows.guess.reshape(-1, 3, 3), rows.measured)
-        assert seen.nominal is not None
-        across = self._across(star, seen.nominal, rows)
-        by_own = np.zeros((len(rows), 2, own.shape[1]))
+        assert stance.nominal is not None
+        across = self._across(star, stance.nominal, rows)
+        by_own = np.zeros((len(rows), 2, values.shape[1]))
         if self.floating:
-            turned, axes = frame_turn(own)
+            turned, axes = frame_turn(values)
             star = np.einsum("nij,nj->ni", turned, star)
             moved = np.cross(axes, star[:, None, :])
             by_own = -LEVER * np.einsum("nka,nqa->nkq", across, moved)
@@ -85,7 +85,7 @@ class Direction(Plain):
             by_own=by_own,
         )
 
-    def _across(self, star: Array, nominal: Seen, rows: Rows) -> Array:
+    def _across(self, star: Array, nominal: Stance, rows: Rows) -> Array:
         """Unit vectors (m, 2, 3) to the side and up, across the direction that was seen."""
         star = star / np.linalg.norm(star, axis=1, keepdims=True)
         up = -np.einsum("nji,j->ni", nominal.work, np.array(rows.chain.gravity))

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from monitor.methods.instruments.reading import Plain, Rows, Seen, Shown, direction_of
+from monitor.methods.instruments.reading import Plain, Rows, Shown, Stance, direction_of
 from monitor.records import Array
 
 #: A laser is set up along an axis to a millimetre over a metre.
@@ -37,19 +37,19 @@ class Displacement(Plain):
     def prior(self) -> tuple[tuple[int, float], ...]:
         return () if self.holds("direction") else ((1, BEAM), (2, BEAM))
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
         along = direction_of(self.setup)
         across = np.linalg.svd(along[None, :])[2][1:]
-        off = own[:, 1:] @ across if own.shape[1] > 1 else np.zeros((len(rows), 3))
+        off = values[:, 1:] @ across if values.shape[1] > 1 else np.zeros((len(rows), 3))
         beam = along + off
         size = np.linalg.norm(beam, axis=1, keepdims=True)
         beam = beam / size
-        by_own = np.zeros((len(rows), 1, own.shape[1]))
+        by_own = np.zeros((len(rows), 1, values.shape[1]))
         by_own[:, 0, 0] = -1.0
-        shown = np.einsum("ni,ni->n", seen.r, beam)
-        if own.shape[1] > 1:
-            by_own[:, 0, 1:] = (seen.r @ across.T - shown[:, None] * (beam @ across.T)) / size
-        return Shown((shown - own[:, 0])[:, None] - rows.measured, beam[:, None, :], by_own=by_own)
+        shown = np.einsum("ni,ni->n", stance.r, beam)
+        if values.shape[1] > 1:
+            by_own[:, 0, 1:] = (stance.r @ across.T - shown[:, None] * (beam @ across.T)) / size
+        return Shown((shown - values[:, 0])[:, None] - rows.measured, beam[:, None, :], by_own=by_own)
 
 
 READING = Displacement

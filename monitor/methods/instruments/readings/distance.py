@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from monitor.methods.instruments.reading import Rows, Seen, Shown
+from monitor.methods.instruments.reading import Rows, Shown, Stance
 from monitor.methods.instruments.readings.vector import AtWorkPoint
 from monitor.records import Array
 
@@ -32,15 +32,15 @@ class DistanceReading(AtWorkPoint):
         u = self.setup.length_uncertainty
         return () if u is None or self.holds("length") else ((len(self.unknowns) - 1, u),)
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
         assert self.setup.length is not None  # the reader asks for it
-        long = np.linalg.norm(seen.r, axis=1)
-        by_shift = (seen.r / np.maximum(long, 1e-12)[:, None])[:, None, :]
-        by_own = self.by_point(by_shift, own)
+        long = np.linalg.norm(stance.r, axis=1)
+        by_shift = (stance.r / np.maximum(long, 1e-12)[:, None])[:, None, :]
+        by_own = self.by_point(by_shift, values)
         nominal = np.full(len(rows), self.setup.length)
         if not self.holds("length"):
             by_own[:, :, -1] = -1.0
-            nominal = nominal + own[:, -1]
+            nominal = nominal + values[:, -1]
         return Shown((long - nominal)[:, None] - rows.measured, by_shift, by_own=by_own)
 
 

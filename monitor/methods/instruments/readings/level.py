@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from monitor.methods.instruments.reading import LEVER, Rows, Seen, Shown, direction_of
+from monitor.methods.instruments.reading import LEVER, Rows, Shown, Stance, direction_of
 from monitor.methods.instruments.readings.angle import turned_about
 from monitor.methods.instruments.readings.component import Zeroed
 from monitor.records import Array
@@ -21,16 +21,16 @@ class Level(Zeroed):
     columns: ClassVar[tuple[str, ...]] = ("reading_urad",)
     angular: ClassVar[bool] = True
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
-        assert seen.nominal is not None
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
+        assert stance.nominal is not None
         on_tool = self.setup.side == "tool"
-        side, nominal = (seen.tool, seen.nominal.tool) if on_tool else (seen.work, seen.nominal.work)
+        side, nominal = (stance.tool, stance.nominal.tool) if on_tool else (stance.work, stance.nominal.work)
         value, slope = turned_about(direction_of(self.setup), side, nominal)
         return Shown(
-            residual=(value - LEVER * own.sum(axis=1))[:, None] - rows.measured,
+            residual=(value - LEVER * values.sum(axis=1))[:, None] - rows.measured,
             by_tool=slope if on_tool else None,
             by_work=None if on_tool else slope,
-            by_own=np.full((len(rows), 1, own.shape[1]), -LEVER),
+            by_own=np.full((len(rows), 1, values.shape[1]), -LEVER),
         )
 
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from monitor.methods.instruments.reading import Rows, Seen, Shown, direction_of
+from monitor.methods.instruments.reading import Rows, Shown, Stance, direction_of
 from monitor.methods.instruments.readings.component import Zeroed
 from monitor.records import Array
 
@@ -23,7 +23,7 @@ class Offset(Zeroed):
     def unknowns(self) -> tuple[str, ...]:
         return (*super().unknowns, *(() if self.holds("slope") else ("slope",)))
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
         assert self.setup.along is not None  # the reader asks for it
         along = direction_of(self.setup)
         index = rows.chain.index(self.setup.along)
@@ -31,7 +31,7 @@ class Offset(Zeroed):
         parts = [np.ones(len(rows))] * (not self.holds("zero")) + [travel] * (not self.holds("slope"))
         line = np.column_stack(parts) if parts else np.zeros((len(rows), 0))
         return Shown(
-            residual=(seen.r @ along - np.sum(line * own, axis=1))[:, None] - rows.measured,
+            residual=(stance.r @ along - np.sum(line * values, axis=1))[:, None] - rows.measured,
             by_shift=np.tile(along, (len(rows), 1, 1)),
             by_own=-line[:, None, :],
         )

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.methods.instruments.frames import first_frame, seen_points
-from monitor.methods.instruments.reading import SHIFT, TURN, Plain, Rows, Seen, Shown
+from monitor.methods.instruments.reading import SHIFT, TURN, Plain, Rows, Shown, Stance
 from monitor.methods.instruments.readings.direction import frame_turn
 from monitor.records import Array, Setup
 
@@ -48,12 +48,12 @@ class Point(Plain):
         guess = np.tile(np.concatenate([np.eye(3).reshape(9), np.zeros(3)]), (len(rows), 1))
         if "frame" not in setup.known:
             guess, places = first_frame(rows, places, held="targets" in setup.known)
-        seen = seen_points(rows, guess, places)
-        spread = seen.std(axis=0)
+        points = seen_points(rows, guess, places)
+        spread = points.std(axis=0)
         flat = plane and bool(spread[2] < FLAT * spread[:2].max())
-        middle = np.zeros_like(seen)
+        middle = np.zeros_like(points)
         for run in np.unique(rows.run):
-            middle[rows.run == run] = seen[rows.run == run].mean(axis=0)
+            middle[rows.run == run] = points[rows.run == run].mean(axis=0)
         reading = cls(setup, targets, tuple(map(tuple, places.tolist())), plane, flat)
         return reading, replace(rows, guess=np.concatenate([guess, middle], axis=1))
 
@@ -86,35 +86,35 @@ class Point(Plain):
     def _target(self, rows: Rows) -> npt.NDArray[np.int64]:
         return np.searchsorted(np.array(self.targets), rows.target)
 
-    def ends(self, own: Array, rows: Rows) -> tuple[Array, Array]:
+    def ends(self, values: Array, rows: Rows) -> tuple[Array, Array]:
         count, at = len(rows), self._target(rows)
         if self.holds("targets"):
             places = np.array(self.places)[at]
         else:
-            places = own[:, -3 * len(self.targets) :].reshape(count, -1, 3)[np.arange(count), at]
+            places = values[:, -3 * len(self.targets) :].reshape(count, -1, 3)[np.arange(count), at]
         return np.zeros((count, 3)), places
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
         count, kinds = len(rows), len(self.numbers)
         turns, shifts = self._free
         turned, shift = np.zeros((2, count, 3))
-        turned[:, turns] = own[:, : len(turns)]
-        shift[:, shifts] = own[:, len(turns) : len(turns) + len(shifts)]
+        turned[:, turns] = values[:, : len(turns)]
+        shift[:, shifts] = values[:, len(turns) : len(turns) + len(shifts)]
         moved, axes = frame_turn(turned)
         into = np.swapaxes(rows.guess[:, :9].reshape(-1, 3, 3), 1, 2)
         middle = rows.guess[:, 12:]
         arm = np.einsum(
-            "nij,nj->ni", moved, np.einsum("nij,nj->ni", into, seen.r - rows.guess[:, 9:12]) - middle
+            "nij,nj->ni", moved, np.einsum("nij,nj->ni", into, stance.r - rows.guess[:, 9:12]) - middle
         )
         by_shift = moved @ into
-        by_own = np.zeros((count, 3, own.shape[1]))
+        by_own = np.zeros((count, 3, values.shape[1]))
         for column, axis in enumerate(turns):
             by_own[:, :, column] = np.cross(axes[:, axis], arm)
         for column, axis in enumerate(shifts, start=len(turns)):
             by_own[:, axis, column] = 1.0
         if not self.holds("targets"):
-            first, at = own.shape[1] - 3 * len(self.targets), self._target(rows)
-            on_tool = by_shift @ seen.turned
+            first, at = values.shape[1] - 3 * len(self.targets), self._target(rows)
+            on_tool = by_shift @ stance.turned
             if self.plane:
                 # Along the line of sight a place shows only through products of errors.
                 on_tool = np.where(np.linalg.norm(on_tool[:, :2], axis=1, keepdims=True) < FLAT, 0.0, on_tool)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from monitor.methods.instruments.reading import Plain, Rows, Seen, Shown, cross_matrix
+from monitor.methods.instruments.reading import Plain, Rows, Shown, Stance, cross_matrix
 from monitor.records import Array
 
 WORK_POINT = ("work point x", "work point y", "work point z")
@@ -29,13 +29,13 @@ class AtWorkPoint(Plain):
             stated[:3] = self.setup.work_point
         return np.tile(stated, (runs, 1))
 
-    def ends(self, own: Array, rows: Rows) -> tuple[Array, Array]:
-        work, tool = super().ends(own, rows)
-        return (work if self.holds("work_point") else own[:, :3].copy()), tool
+    def ends(self, values: Array, rows: Rows) -> tuple[Array, Array]:
+        work, tool = super().ends(values, rows)
+        return (work if self.holds("work_point") else values[:, :3].copy()), tool
 
-    def by_point(self, by_shift: Array, own: Array) -> Array:
+    def by_point(self, by_shift: Array, values: Array) -> Array:
         """Derivatives (m, k, q) by the unknowns, of which the work point is the first."""
-        by_own = np.zeros((*by_shift.shape[:2], own.shape[1]))
+        by_own = np.zeros((*by_shift.shape[:2], values.shape[1]))
         if not self.holds("work_point"):
             by_own[:, :, :3] = -by_shift
         return by_own
@@ -52,16 +52,16 @@ class VectorReading(AtWorkPoint):
     def numbers(self) -> tuple[str, ...]:
         return ("x", "y", "z")
 
-    def shown(self, seen: Seen, own: Array, rows: Rows) -> Shown:
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
         if self.setup.frame == "work":
             by_shift = np.tile(np.eye(3), (len(rows), 1, 1))
-            return Shown(seen.r - rows.measured, by_shift, by_own=self.by_point(by_shift, own))
-        by_shift = np.swapaxes(seen.turned, 1, 2)
+            return Shown(stance.r - rows.measured, by_shift, by_own=self.by_point(by_shift, values))
+        by_shift = np.swapaxes(stance.turned, 1, 2)
         return Shown(
-            residual=np.einsum("nij,nj->ni", by_shift, seen.r) - rows.measured,
+            residual=np.einsum("nij,nj->ni", by_shift, stance.r) - rows.measured,
             by_shift=by_shift,
-            by_turn=by_shift @ cross_matrix(seen.r),
-            by_own=self.by_point(by_shift, own),
+            by_turn=by_shift @ cross_matrix(stance.r),
+            by_own=self.by_point(by_shift, values),
         )
 
 
