@@ -24,6 +24,13 @@ from monitor.methods.model import Model
 from monitor.readers import read_campaign, write_campaign
 from monitor.readers.setups_file import FORMATS
 from monitor.records import Campaign
+from monitor.store import Database, import_campaign
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.trend.request import TrendRequest
+from monitor.workflow.trend.trends import trend
+from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 from tests.simulator.instruments import SimulatedAxis, SimulatedChain, small
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -587,3 +594,34 @@ def test_a_small_frame_of_the_simulator_is_that_of_the_conventions() -> None:
         * Rotation.from_rotvec([0.1, 0, 0])
     )
     np.testing.assert_allclose(turn, expected.as_matrix(), atol=1e-15)
+
+
+def test_four_years_of_one_mount_are_one_history(tmp_path: Path) -> None:
+    """The tilt of azimuth went from 9.6 over 23.6 to 10.4 arcseconds, the elevation's zero by 11, the collimation from
+    5.8 to 0.75."""
+    with Database(tmp_path / "mount.duckdb") as db:
+        for name in MMT:
+            import_campaign(db, example(name))
+            identify(db, IdentifyRequest(name))
+        history = trend(db, TrendRequest("MMT")).parameters
+    assert set(history) == {"EA0AZ", "EB0AZ", "EC0AZ", "EA0EL", "EB0EL", "ECEL:const"}
+    values = {name: [fitted(campaign)[0][name] / ARCSECOND for campaign in MMT] for name in history}
+    assert values["EA0AZ"] == pytest.approx([9.6, 23.6, 10.4, 12.2], abs=0.1)
+    assert values["EB0EL"][0] - values["EB0EL"][3] == pytest.approx(11.4, abs=0.1)
+    assert [values["ECEL:const"][index] for index in (0, 3)] == pytest.approx([5.8, 0.75], abs=0.05)
+    for name, parameter in history.items():
+        assert parameter.latest == pytest.approx(values[name][3] * ARCSECOND * 1e6, rel=1e-6)
+
+
+def test_the_uncertainty_of_a_mount_is_that_of_the_weights(tmp_path: Path) -> None:
+    """GUM framework by rows against the inverse normal matrix of the independent least squares, for 5 µrad."""
+    db = open_database(tmp_path / "mount.duckdb")
+    import_campaign(db, example("mount-mmt-2023-07"))
+    answer = uncertainty(db, UncertaintyRequest("mount-mmt-2023-07", method="guf", model_uncertainty=False))
+    _, u, rms = independent("mount-mmt-2023-07", 6)
+    readings_ = 2 * len(example("mount-mmt-2023-07").probings)
+    from_residuals = rms * ARCSECOND / np.sqrt(2.0) * np.sqrt(readings_ / (readings_ - 6.0))
+    expected = u / from_residuals * 5.0
+    assert [
+        answer.parameters[name].u for name in ("EA0AZ", "EB0AZ", "EC0AZ", "EA0EL", "EB0EL", "ECEL:const")
+    ] == (pytest.approx(expected, rel=2e-3))

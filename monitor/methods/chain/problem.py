@@ -130,6 +130,11 @@ class ChainProblem(ABC):
         """Displacement (mm at the tool) and angle (rad) of the largest effect that such a machine is likely to hide."""
         return LARGEST_DISPLACEMENT, LARGEST_ANGLE
 
+    @property
+    def observes_numbers(self) -> bool:
+        """Whether ``evaluated`` gives the numbers of a row themselves, not vectors of which they are a part."""
+        return False
+
     def can_show(self, effect: Effect) -> bool:
         """Whether readings of this kind could show an effect at all, whatever the plan."""
         return True

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from monitor.effects import ArtefactEffect, Context, ParsedEffect, context_of
 from monitor.exceptions import DataError, EffectError
-from monitor.machine import Chain
+from monitor.machine import Chain, evaluate
 from monitor.methods.instruments.base import instrument_base
 from monitor.methods.instruments.problem import InstrumentProblem, Part
 from monitor.methods.instruments.reading import LEVER, Reading, Rows
@@ -48,7 +48,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentPr
     _refuse_artefact((*base, *added))
     ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
     return InstrumentProblem(
-        context=replace(context, sight=_sight(setups, number)),
+        context=replace(context, sight=_sight(setups, number), nominal=_places(context, parts)),
         base=base,
         added=added,
         sigma=_sigma(context, setups, number, parts),
@@ -84,6 +84,21 @@ def _parts(
             reading = replace(reading, floating=floating)
         parts.append(Part(setup.id, reading, rows, at))
     return tuple(parts)
+
+
+def _places(context: Context, parts: tuple[Part, ...]) -> Array:
+    """Where people look for a row (n, 3) mm in the frame of the last work axis: the tool point of a machine without
+    errors, of a direction its end at one metre."""
+    places = context.nominal.copy()
+    for part in parts:
+        if isinstance(part.reading, Direction):
+            places[part.at] = LEVER * part.reading.pointed(part.rows)
+            continue
+        start = part.reading.start(1)[np.zeros(len(part.at), dtype=np.int64)]
+        work, tool = part.reading.ends(start, part.rows)
+        none = np.zeros((len(part.at), len(context.chain.joints), 2, 6))
+        places[part.at] = evaluate(context.chain, part.rows.positions, none, work, tool).residual + work
+    return places
 
 
 def _column(context: Context, name: str) -> Array:

@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from monitor.effects import ChainEffect, Effect
+from monitor.effects import ArtefactEffect, ChainEffect, Effect
 from monitor.effects.catalogue import of_drives, of_sight
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.added_effects import columns_of
@@ -110,8 +110,15 @@ class InstrumentProblem(ChainProblem):
         """More where a mount or a robot is looked at from outside than on a machine tool."""
         return LARGEST_OUTSIDE if self.kinds & {"direction", "point"} else super().largest_effect
 
+    @property
+    def observes_numbers(self) -> bool:
+        """A number may be the length of a vector, or a turn."""
+        return True
+
     def can_show(self, effect: Effect) -> bool:
-        """Angles alone show no displacement."""
+        """Nothing of targets that are touched or tracked; angles alone show no displacement."""
+        if isinstance(effect, ArtefactEffect):
+            return False
         angular = all(part.reading.angular for part in self.parts)
         return not angular or not isinstance(effect, ChainEffect) or effect.term.is_rotation
 
@@ -127,8 +134,23 @@ class InstrumentProblem(ChainProblem):
         return (*pointing, *of_drives(chain, dict(self.gear_ratios)))
 
     def as_vectors(self, rows: Array) -> Array:
-        """The numbers of a row side by side, zero where there are fewer than three."""
-        return np.pad(rows, ((0, 0), (0, 3 - rows.shape[1])))
+        """The shortest vectors (n, 3) mm, in the frame of the last work axis, that would show such numbers (n, d); of a
+        turn the vector about which it is, of a direction where its end at one metre lies off."""
+        return np.asarray(np.einsum("nik,nk->ni", self._inverse, rows))
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """Vectors (n, 3, d) for a unit of each number, at the start."""
+        context = self.context
+        errors, work, tool = self.state(self.start, self.common_start)
+        vectors = evaluate(context.chain, context.positions, errors, work, tool).residual
+        inverse = np.zeros((len(self.context), 3, self.sigma.shape[1]))
+        for part, values in self._with_own(self.own_start):
+            shown = part.reading.shown(self._stance_of(part, vectors, self._nominal), values, part.rows)
+            along = shown.along if shown.along is not None else shown.by_shift
+            assert along is not None
+            inverse[part.at, :, : along.shape[1]] = np.linalg.pinv(along)
+        return inverse
 
     def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """The work points and tool points of all rows."""
@@ -162,9 +184,7 @@ class InstrumentProblem(ChainProblem):
         by_error = np.zeros((count, numbers, len(context.chain.joints), 2, 6)) if jacobian else None
         for (part, values), columns in zip(self._with_own(nuisance), self.own_columns, strict=True):
             at = part.at
-            nominal = _stance(pose.residual[at], self._nominal, at)
-            stance = replace(_stance(pose.residual[at], sides, at), nominal=nominal)
-            shown = part.reading.shown(stance, values, part.rows)
+            shown = part.reading.shown(self._stance_of(part, pose.residual, sides), values, part.rows)
             kinds = shown.residual.shape[1]
             residual[at, :kinds] = np.nan_to_num(shown.residual)
             if shown.by_own is not None:
@@ -195,6 +215,11 @@ class InstrumentProblem(ChainProblem):
             moved = np.sum(pose.by_error[at] ** 2, axis=(0, 1))
             self._masks[setup] = np.sum(derivatives**2, axis=(0, 1)) > SECOND_ORDER**2 * moved
         return self._masks[setup]
+
+    def _stance_of(self, part: Part, vectors: Array, sides: Orientation) -> Stance:
+        """How the sides stand at the rows of a setup, for ``vectors`` (n, 3) mm from work points to tool points."""
+        nominal = _stance(vectors[part.at], self._nominal, part.at)
+        return replace(_stance(vectors[part.at], sides, part.at), nominal=nominal)
 
     def _by_error(
         self, shown: Shown, pose: ChainPose, sides: Orientation, at: npt.NDArray[np.int64]

@@ -74,7 +74,8 @@ class Shown:
 
     ``by_shift`` (m, k, 3) by r, ``by_turn`` (m, k, 3) per radian by the turn of the tool side against the work side,
     both in the frame of the last work axis; ``by_tool`` and ``by_work`` (m, k, 3) by the turn of one side alone in the
-    bed's frame (a level). None: no such derivative. ``by_own`` (m, k, q) by the unknowns of the setup.
+    bed's frame (a level). None: no such derivative. ``by_own`` (m, k, q) by the unknowns of the setup. ``along``
+    (m, k, 3) are unit vectors by which people see the numbers of angles, in the frame of the last work axis.
     """
 
     residual: Array
@@ -83,6 +84,7 @@ class Shown:
     by_tool: Array | None = None
     by_work: Array | None = None
     by_own: Array | None = None
+    along: Array | None = None
 
 
 class Reading(Protocol):

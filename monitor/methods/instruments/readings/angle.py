@@ -38,6 +38,7 @@ class Angle(Zeroed):
             residual=(value - LEVER * values.sum(axis=1))[:, None] - rows.measured,
             by_turn=slope,
             by_own=np.full((len(rows), 1, values.shape[1]), -LEVER),
+            along=np.tile(direction_of(self.setup), (len(rows), 1, 1)),
         )
 
 

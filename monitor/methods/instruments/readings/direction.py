@@ -83,6 +83,7 @@ class Direction(Plain):
             residual=LEVER * np.einsum("nka,na->nk", across, pointed - star),
             by_turn=-LEVER * across @ cross_matrix(pointed),
             by_own=by_own,
+            along=across,
         )
 
     def _across(self, star: Array, nominal: Stance, rows: Rows) -> Array:

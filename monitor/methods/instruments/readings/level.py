@@ -31,6 +31,7 @@ class Level(Zeroed):
             by_tool=slope if on_tool else None,
             by_work=None if on_tool else slope,
             by_own=np.full((len(rows), 1, values.shape[1]), -LEVER),
+            along=np.tile(direction_of(self.setup), (len(rows), 1, 1)),
         )
 
 
