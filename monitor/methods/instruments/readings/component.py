@@ -29,7 +29,7 @@ class Zeroed(Plain):
 
 @dataclass(frozen=True)
 class Component(Zeroed):
-    """r . n less the zero."""
+    """The component of r along n, less the zero."""
 
     name: ClassVar[str] = "component"
 

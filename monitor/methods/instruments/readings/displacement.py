@@ -20,7 +20,7 @@ BEAM = 1e-3
 
 @dataclass(frozen=True)
 class Displacement(Plain):
-    """r along the beam, less that of the first row."""
+    """The component of r along the beam, less that of the first row."""
 
     name: ClassVar[str] = "displacement"
     columns: ClassVar[tuple[str, ...]] = ("reading_um",)

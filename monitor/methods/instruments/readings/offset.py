@@ -14,7 +14,7 @@ from monitor.records import Array
 
 @dataclass(frozen=True)
 class Offset(Zeroed):
-    """r . n less a zero and a slope times the reading of the axis along which it travels."""
+    """The component of r along n, less a zero and a slope times the reading of the axis along which it travels."""
 
     name: ClassVar[str] = "offset"
     holdable: ClassVar[tuple[str, ...]] = ("zero", "slope")

@@ -43,7 +43,7 @@ class AtWorkPoint(Plain):
 
 @dataclass(frozen=True)
 class VectorReading(AtWorkPoint):
-    """r in the frame of the last work axis, or in that of the last tool axis."""
+    """The vector r in the frame of the last work axis, or in that of the last tool axis."""
 
     name: ClassVar[str] = "vector"
     columns: ClassVar[tuple[str, ...]] = ("dx_um", "dy_um", "dz_um")
