@@ -10,7 +10,7 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
-from monitor.effects import ChainEffect, Context, parse_effect, with_time_constant
+from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, WarmUp, parse_driver
 from monitor.effects.drivers.gravity import Gravity
 from monitor.effects.shapes import Compliance, Cyclic, Harmonic
@@ -145,7 +145,7 @@ def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVar
 
 def each_run(effect: MachineEffect) -> ChainVariant | None:
     """The effect with another size in every run; None where it has a driver already."""
-    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
+    if not isinstance(effect, ChainEffect | TurnEffect) or not isinstance(effect.driver, Always):
         return None
     varying = replace(effect, driver=EachRun(), driver_text="each_run")
     return Variant(varying.text, varying)
