@@ -345,6 +345,33 @@ def test_points_in_an_unknown_frame_are_fitted_to_their_noise(name: str, flat: b
     assert abs(run.chi_square - run.degrees_of_freedom) < 5.0 * np.sqrt(2.0 * run.degrees_of_freedom)
 
 
+@pytest.mark.parametrize("known", [("frame",), ("targets",), ("frame", "targets")])
+def test_known_frames_and_places_leave_their_errors_to_the_machine(
+    known: tuple[str, ...], tmp_path: Path
+) -> None:
+    """A wrist of three axes that meet: with all known its location errors are those of every axis."""
+    axes, limits = CHAINS["a wrist"]
+    rng = np.random.default_rng(8)
+    errors = [(*rng.normal(0, 0.02, 3), *rng.normal(0, 1e-4, 3)) for _ in axes]
+    chain = SimulatedChain(
+        tuple(A(a.name, a.kind, a.about, errors=six) for a, six in zip(axes, errors, strict=True))
+    )
+    rows: list[dict[str, object]] = []
+    for _ in range(150):
+        readings_ = {
+            a.name: round(float(rng.uniform(*limit)), 4) for a, limit in zip(axes, limits, strict=True)
+        }
+        pose = chain.pose(readings_)
+        point = pose[:3, :3] @ [20.0, -10.0, -100.0] + pose[:3, 3] + rng.normal(0.0, 5e-3, 3)
+        named = zip(("point_x_mm", "point_y_mm", "point_z_mm"), point, strict=True)
+        rows.append({"setup": "camera", **readings_, **dict(named)})
+    setups = '\n[[setups]]\nid = "camera"\nreading = "point"\nstandard_uncertainty_um = 5.0\n'
+    setups += f"tool_point_mm = [20.0, -10.0, -100.0]\nknown = {list(known)}\n".replace("'", '"')
+    campaign = read_campaign(chain.write(tmp_path / "points", setups, rows))
+    run = campaign_method(campaign).identify(campaign).runs[0]
+    assert abs(run.chi_square - run.degrees_of_freedom) < 5.0 * np.sqrt(2.0 * run.degrees_of_freedom)
+
+
 def test_a_third_number_that_is_the_same_in_all_rows_is_no_reading(tmp_path: Path) -> None:
     empty = points_campaign("plate", tmp_path / "empty", flat=True)
     written = points_campaign("plate", tmp_path / "written", flat=True, constant=12.5)

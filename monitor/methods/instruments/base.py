@@ -134,17 +134,26 @@ def _candidates(chain: Chain, setups: tuple[Setup, ...]) -> list[tuple[int, int,
     """Joint, stage and component of every error that may be free, in the order of preference.
 
     Those of every chain first; then those of the first axis, which an outer frame that is known shows, its zero before
-    its tilts; at last, for directions, constant turns of what points and of what it is seen from.
+    its tilts; for directions constant turns of what points and of what it is seen from; at last all other location
+    errors, which show where places are known.
     """
     usual = [(chain.index(joint.name), 0, component) for joint, component in location_candidates(chain)]
     frame = (chain.work or chain.tool)[0]
     first = chain.index(frame.name)
     of_first = [(first, 0, component) for component in (3 + frame.main, 3, 4, 5, 0, 1, 2)]
+    # What unknown places take up elsewhere shows where a setup states them.
+    places_known = any(setup.known for setup in setups)
+    others = [
+        (index, 0, component)
+        for index, joint in enumerate(chain.joints)
+        for component in (3, 4, 5, 0, 1, 2)
+        if places_known and joint.kind != "spindle"
+    ]
     if all(setup.reading != "direction" for setup in setups):
-        return list(dict.fromkeys([*usual, *of_first]))
+        return list(dict.fromkeys([*usual, *of_first, *others]))
     of_tool = [(len(chain.joints) - 1, 1, component) for component in (3, 4, 5)] if chain.tool else []
     of_table = [(len(chain.work) - 1, 1, component) for component in (3, 4, 5)] if chain.work else []
-    return list(dict.fromkeys([*usual, *of_first, *of_tool, *of_table]))
+    return list(dict.fromkeys([*usual, *of_first, *of_tool, *of_table, *others]))
 
 
 @cache
