@@ -213,9 +213,37 @@ class LShape:
 
 
 @dataclass(frozen=True)
+class Setup:
+    """One way in which an instrument is set up: what one of its readings is a statement about.
+
+    ``reading`` names the kind; ``standard_uncertainty`` is that of one reading, in mm or rad, None where
+    every row states its own. ``tool_point`` and
+    ``work_point`` (mm) are in the frames of the last tool and work axis; the unit vectors ``direction`` and
+    ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar is free where
+    ``length_uncertainty`` is None. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame`` that
+    in which a vector is read; ``known`` names the unknowns that are held at what is stated.
+    """
+
+    id: str
+    reading: str
+    standard_uncertainty: float | None
+    instrument: str | None = None
+    tool_point: Vector = (0.0, 0.0, 0.0)
+    work_point: Vector = (0.0, 0.0, 0.0)
+    direction: Vector | None = None
+    tool_direction: Vector | None = None
+    length: float | None = None
+    length_uncertainty: float | None = None
+    along: str | None = None
+    side: Branch = "tool"
+    frame: Branch = "work"
+    known: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Artefact:
     """The balls; the scale bar where the method needs one; the reflectors where the file lists them; the tables and
-    conditions of a self-calibration."""
+    conditions of a self-calibration; the setups of instruments."""
 
     id: str
     balls: tuple[Ball, ...]
@@ -223,6 +251,7 @@ class Artefact:
     reflectors: tuple[Reflector, ...] = ()
     l_shape: LShape | None = None
     self_calibration: SelfCalibration | None = None
+    setups: tuple[Setup, ...] = ()
 
 
 @dataclass(frozen=True)

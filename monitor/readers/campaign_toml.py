@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from monitor.readers.axes import axes_of_machine
 from monitor.readers.decimals import decimal_in
+from monitor.readers.setups_file import FORMATS, probe_of
 from monitor.records import (
     Artefact,
     Campaign,
@@ -16,6 +17,7 @@ from monitor.records import (
     Probe,
     ScaleBar,
     SelfCalibration,
+    Setup,
 )
 from monitor.sources import HALF_WIDTHS, QUANTITIES, Law, Sharing, Source
 from monitor.units import MICROMETRE, MICRORADIAN
@@ -28,9 +30,10 @@ def campaign_toml(campaign: Campaign) -> str:
         f"campaign = {_text(campaign.name)}",
         f"method = {_text(campaign.method)}",
         *_machine(campaign.machine),
-        *_probe(campaign.probe),
+        *(() if _is_derived(campaign) else _probe(campaign.probe)),
         *_artefact(campaign.artefact),
         *_sources(campaign.sources),
+        *(line for setup in campaign.artefact.setups for line in _setup(setup)),
     ]
     return "\n".join(lines) + "\n"
 
@@ -101,6 +104,37 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
     yield from _scale_bar(artefact.scale_bar)
     yield from _l_shape(artefact.l_shape)
     yield from _self_calibration(artefact.self_calibration)
+
+
+def _is_derived(campaign: Campaign) -> bool:
+    """Whether the probe is what the setups make of it."""
+    setups = campaign.artefact.setups
+    return bool(setups) and campaign.probe == probe_of(setups, campaign.probings)
+
+
+def _setup(setup: Setup) -> Iterator[str]:
+    form = FORMATS[setup.reading]
+    yield from ("", "[[setups]]", f"id = {_text(setup.id)}", f"reading = {_text(setup.reading)}")
+    if setup.instrument is not None:
+        yield f"instrument = {_text(setup.instrument)}"
+    if setup.standard_uncertainty is not None:
+        unit, name = (MICRORADIAN, "urad") if form.angular else (MICROMETRE, "um")
+        yield f"standard_uncertainty_{name} = {decimal_in(unit)(setup.standard_uncertainty)}"
+    yield f"tool_point_mm = {_numbers(setup.tool_point)}"
+    yield f"work_point_mm = {_numbers(setup.work_point)}"
+    if setup.direction is not None:
+        yield f"direction = {_numbers(setup.direction)}"
+    if setup.tool_direction is not None:
+        yield f"tool_direction = {_numbers(setup.tool_direction)}"
+    if setup.length is not None:
+        yield f"length_mm = {float(setup.length)!r}"
+    if setup.length_uncertainty is not None:
+        yield f"length_standard_uncertainty_um = {decimal_in(MICROMETRE)(setup.length_uncertainty)}"
+    if setup.along is not None:
+        yield f"along = {_text(setup.along)}"
+    yield from (f"{key} = {_text(getattr(setup, key))}" for key in ("side", "frame") if key in form.allows)
+    if setup.known:
+        yield f"known = [{', '.join(map(_text, setup.known))}]"
 
 
 def _scale_bar(bar: ScaleBar | None) -> Iterator[str]:

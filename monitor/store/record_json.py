@@ -22,6 +22,7 @@ from monitor.records import (
     Reflector,
     ScaleBar,
     SelfCalibration,
+    Setup,
 )
 from monitor.sources import Source
 
@@ -93,6 +94,8 @@ def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
         del data["l_shape"]
     if sources:
         data["sources"] = [to_document(source) for source in sources]
+    if not artefact.setups:
+        del data["setups"]
     return _text(data)
 
 
@@ -113,7 +116,13 @@ def artefact_record(text: str) -> Artefact:
         tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
         l_shape=_l_shape(data.get("l_shape")),
         self_calibration=_self_calibration(data.get("self_calibration")),
+        setups=tuple(map(_setup, data.get("setups", ()))),
     )
+
+
+def _setup(data: dict[str, Any]) -> Setup:
+    vectors = ("tool_point", "work_point", "direction", "tool_direction", "known")
+    return Setup(**{**data, **{name: _tuple(data[name]) for name in vectors}})
 
 
 def _self_calibration(data: dict[str, Any] | None) -> SelfCalibration | None:

@@ -24,7 +24,12 @@ from monitor.discovery.machine.steps import Step, find_steps
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.machine.suspects import Suspects, find_suspects, with_effects
 from monitor.discovery.machine.tables import ChainScan
-from monitor.discovery.machine.variants import cycles_of_unknown_pitch, resolvable, variants_of
+from monitor.discovery.machine.variants import (
+    cycles_of_unknown_pitch,
+    resolvable,
+    variants_of,
+    without_part_periods,
+)
 from monitor.discovery.machine.varying import varying_effects
 from monitor.discovery.search.comparison import Verdict
 from monitor.effects.catalogue import catalogue
@@ -78,7 +83,10 @@ def _variants(campaign: Campaign, problem: ChainProblem, drivers: Sequence[str])
     texts = [effect.text for effect in (*problem.base, *problem.added)]
     chain = problem.context.chain
     effects = catalogue(chain, texts, drivers, pitches, problem.method_effects(drivers))
-    variants = [variant for effect in effects for variant in variants_of(effect)]
+    shown = filter(problem.can_show, effects)
+    variants = [variant for effect in shown for variant in variants_of(effect)]
+    if problem.needs_whole_periods:
+        variants = without_part_periods(variants, problem.context)
     return [*variants, *resolvable(cycles_of_unknown_pitch(chain), problem.context)]
 
 

@@ -162,6 +162,20 @@ class ChainProblem(ABC):
         """Displacement (mm at the tool) and angle (rad) of the largest effect that such a machine is likely to hide."""
         return LARGEST_DISPLACEMENT, LARGEST_ANGLE
 
+    @property
+    def observes_numbers(self) -> bool:
+        """Whether ``evaluated`` gives the numbers of a row themselves, not vectors of which they are a part."""
+        return False
+
+    def can_show(self, effect: Effect) -> bool:
+        """Whether readings of this kind could show an effect at all, whatever the plan."""
+        return True
+
+    @property
+    def needs_whole_periods(self) -> bool:
+        """Whether a harmonic has to repeat within the travel of its axis to be told apart from what bends once."""
+        return False
+
     def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
         """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
         return of_balls(drivers)

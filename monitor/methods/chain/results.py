@@ -65,7 +65,8 @@ def identification(
     runs = []
     for index, run in enumerate(problem.runs):
         rows = problem.context.run == run
-        residuals = vectors[rows]
+        # A number that was not read has no weight and counts for nothing.
+        residuals = vectors[rows][np.isfinite(problem.sigma[rows])]
         free = solution.local_free[index, :count]
         both = free[:, None] & free
         weighted = solution.last.residual[index]

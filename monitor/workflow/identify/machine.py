@@ -51,6 +51,7 @@ def machine_answer(machine: Machine, identification: Identification) -> Identify
         added_refused=tuple(map(refused_parameters, identification.added_refused)),
         frames=frames_of((*identification.parameters, *identification.added), chain_of(machine)),
         reversal_values=values or None,
+        taken_up=identification.taken_up or None,
     )
 
 

@@ -205,8 +205,9 @@ def _lack_of_fit(
     in_model = [effect.text for effect in (*problem.base, *problem.added)]
     # Only what depends on the time within a run, not on its day, can be the same in every run.
     effects = catalogue(problem.context.chain, in_model, ("run_time",), pitches)
+    shown = filter(problem.can_show, effects)
     unexplained = model_uncertainty(
-        fit, index, [variant for effect in effects for variant in variants_of(effect)]
+        fit, index, [variant for effect in shown for variant in variants_of(effect)]
     )
     if unexplained is None:
         return None, ()
