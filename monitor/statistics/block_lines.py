@@ -23,12 +23,12 @@ import numpy.typing as npt
 
 from monitor.records import Array
 
-#: Every day is a block up to so many days; from 64 on four days make one, up to so many blocks.
-DAYS_AS_BLOCKS, MOST_BLOCKS = 16, 32
+#: Every day is a block up to so many days; from 64 on so many days make one, up to so many blocks.
+DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS = 16, 4, 20
 #: A line and its scatter need so many blocks.
 FEWEST_BLOCKS = 3
-#: Margin on the correlation of neighbouring blocks, times the root of the number of days, and the days from which on all
-#: of it is added (with fewer, so little is left of the scatter that its few degrees of freedom allow for the rest): the
+#: Margin on the correlation of neighbouring blocks, times the root of the number of days, and the days from which on
+#: all of it is added (with fewer, so little is left of the scatter that its few degrees of freedom allow for the rest): the
 #: smallest, to a tenth, that keeps false alarms of a slope at 5 % below 8 % for correlations up to 0.8, day components
 #: up to twice the scatter of a run and 3 to 250 days (docs/trials-statistics.md).
 MARGIN, FULL_MARGIN = 1.1, 10.0
@@ -92,10 +92,12 @@ class BlockLines:
 
 
 def block_count(days: npt.ArrayLike) -> npt.NDArray[np.int64]:
-    """Number of blocks for so many days: one a day up to 16, then 16, then one for four days, 32 at most."""
+    """Number of blocks for so many days: one a day up to 16, then 16, then one for four days, 20 at most."""
     number = np.asarray(days, dtype=np.int64)
     return np.asarray(
-        np.where(number <= DAYS_AS_BLOCKS, number, np.clip(number // 4, DAYS_AS_BLOCKS, MOST_BLOCKS))
+        np.where(
+            number <= DAYS_AS_BLOCKS, number, np.clip(number // DAYS_OF_BLOCK, DAYS_AS_BLOCKS, MOST_BLOCKS)
+        )
     )
 
 
@@ -104,7 +106,8 @@ def block_of(
 ) -> npt.NDArray[np.int64]:
     """Block of each time where the stretch from ``first`` to ``last`` is cut into ``count`` equal ones."""
     number = np.asarray(count, dtype=np.int64)
-    share = (times - first) / np.maximum(np.asarray(last, dtype=np.float64) - first, 1e-300)
+    begin, end = np.asarray(first, dtype=np.float64), np.asarray(last, dtype=np.float64)
+    share = (times - begin) / np.maximum(end - begin, 1e-300)
     return np.asarray(np.clip((share * number).astype(np.int64), 0, number - 1))
 
 
@@ -206,7 +209,7 @@ class _Tables(NamedTuple):
 
 
 def _tables(basis: Array, count: npt.NDArray[np.int64]) -> _Tables:
-    """Moments of first-order processes for m plans, each an orthonormal ``basis`` (m, b, q) over ``count`` (m,) blocks."""
+    """Moments of first-order processes for m plans, each a ``basis`` (m, b, q) over ``count`` (m,) blocks."""
     _, b, _ = basis.shape
     lag = np.abs(np.subtract.outer(np.arange(b), np.arange(b)))
     r = CORRELATIONS[:, np.newaxis, np.newaxis] ** lag

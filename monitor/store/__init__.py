@@ -41,7 +41,7 @@ from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
-from monitor.store.fleet import FleetSums, fleet_sums
+from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
 from monitor.store.identifications import (
     identification_by_number,
@@ -77,6 +77,7 @@ from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
 __all__ = [
+    "BlockCut",
     "NOTE",
     "AuditEntry",
     "Backup",

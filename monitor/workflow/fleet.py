@@ -11,12 +11,23 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
-from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
-from monitor.store import Database, FleetSums, fleet_sums, latest_tolerances
+from monitor.statistics.block_lines import DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS, Blocks
+from monitor.statistics.means import VarianceMoments, brown_forsythe_from_moments
+from monitor.statistics.sufficient import (
+    CellDrift,
+    CellTests,
+    GroupSums,
+    cells_from_sums,
+    drift_from_sums,
+    drift_in_blocks,
+)
+from monitor.store import BlockCut, Database, FleetSums, fleet_sums, latest_tolerances
 from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.drift import SHORTEST_DAYS
 from monitor.workflow.models import resolve
 
+#: How histories are cut into blocks: as those of `monitor trend`.
+CUT = BlockCut(DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS)
 #: A drift that reaches the limit within so many years needs attention now.
 SOON_YEARS = 1.0
 #: False discovery rate over all machines and parameters.
@@ -93,7 +104,21 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
             sums.log_variances, sums.inverse_dof,
         )
     )  # fmt: skip
-    return cells, drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
+    drift = drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
+    blocks = Blocks(sums.blocks.groups, sums.blocks.t, sums.blocks.m, sums.groups)
+    return cells, drift_in_blocks(drift, blocks, cycle=DAYS_PER_YEAR)
+
+
+def means_p(sums: FleetSums) -> Array:
+    """p-values (c,) of equal means of the days, whatever their scatter: Brown and Forsythe's test."""
+    repeated = sums.repeated_sums
+    with np.errstate(divide="ignore", invalid="ignore"):
+        between = np.maximum(repeated.squares - repeated.offset**2 / repeated.runs, 0.0)
+    moments = VarianceMoments(
+        groups=sums.repeated, runs=repeated.runs, between=between, first=repeated.s2,
+        first_runs=repeated.s2_runs, second=repeated.s4, second_runs=repeated.s4_runs, by_dof=repeated.s4_dof,
+    )  # fmt: skip
+    return brown_forsythe_from_moments(moments)[3]
 
 
 def _limits(db: Database, sums: FleetSums) -> Array:
@@ -161,7 +186,8 @@ def _without_short_histories(sums: FleetSums, drift: CellDrift) -> CellDrift:
     mean = sums.sum_t / sums.groups
     spread = np.sqrt(np.maximum(sums.sum_tt / sums.groups - mean**2, 0.0))
     short = spread < SHORTEST_DAYS / np.sqrt(12.0)
-    return CellDrift(*(np.where(short, np.nan, values) for values in (drift.slope, drift.u, drift.p_value)))
+    columns = (drift.slope, drift.u, drift.p_value, drift.widening)
+    return CellDrift(*(np.where(short, np.nan, values) for values in columns))
 
 
 def _number(value: float) -> float | None:
@@ -177,14 +203,14 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
     if request.model is not None:
         stored = resolve(db, request.model)
         name, version = stored.name, stored.version
-    sums = fleet_sums(db, name, version)
+    sums = fleet_sums(db, name, version, cut=CUT)
     cells, drift = cell_tests(sums)
     drift = _without_short_histories(sums, drift)
     limit = _limits(db, sums)
     q_values = {
         test: control_false_discoveries(p_values, rate=RATE).q_value
         for test, p_values in (
-            ("anova", cells.anova_p), ("bartlett", cells.bartlett_p), ("drift", drift.p_value)
+            ("anova", means_p(sums)), ("bartlett", cells.bartlett_p), ("drift", drift.p_value)
         )
     }  # fmt: skip
     kind, measure, years = _rank(sums, cells, drift, q_values["drift"], limit)
