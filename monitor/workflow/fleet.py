@@ -75,6 +75,7 @@ class FleetTableRow:
     anova_q: float | None
     slope_per_year: float | None
     u_slope: float | None
+    slope_widening: float | None
     drift_p: float | None
     drift_q: float | None
     latest: float | None
@@ -236,6 +237,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
             anova_q=_number(q_values["anova"][i]),
             slope_per_year=_number(drift.slope[i] * DAYS_PER_YEAR),
             u_slope=_number(drift.u[i] * DAYS_PER_YEAR),
+            slope_widening=_number(drift.widening[i]),
             drift_p=_number(drift.p_value[i]),
             drift_q=_number(q_values["drift"][i]),
             latest=_number(sums.origin[i] + sums.latest[i]),
