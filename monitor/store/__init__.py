@@ -77,10 +77,10 @@ from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
 __all__ = [
-    "BlockCut",
     "NOTE",
     "AuditEntry",
     "Backup",
+    "BlockCut",
     "CampaignRow",
     "Database",
     "FleetSums",
