@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.workflow.history import agreement
 from monitor.workflow.trend.answer import (
+    FEW_DAYS,
     Between,
     ConditionEffect,
     Cycle,
@@ -49,6 +50,14 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     parameters = answer.parameters.items()
     for name, parameter in parameters:
         yield from (_change(name, change) for change in parameter.changes)
+    few = [
+        change.days for _, parameter in parameters for change in parameter.changes if change.days < FEW_DAYS
+    ]
+    if few:
+        yield (
+            f"{min(few)} days cannot tell a change from days that differ by much more than runs scatter: none of these "
+            "is allowed for where the other parameters do not show such days"
+        )
     for name, parameter in parameters:
         yield from _dependences(name, parameter)
     yield from _charts(answer)

@@ -84,7 +84,7 @@ def before_after(
     fit = fit_with_days(values, design, None, day if count > 2 else np.arange(len(values)))
     means = fit.coefficients
     u = float(np.sqrt(fit.covariance[0, 0] + fit.covariance[1, 1] - 2.0 * fit.covariance[0, 1]))
-    if not u > 0.0:
+    if np.ptp(x) == 0.0 and np.ptp(y) == 0.0:
         raise DataError("no run differs from the others of its side; the difference has no uncertainty.")
     dof = _dof(fit.covariance, fit.dof)
     return BeforeAfter(

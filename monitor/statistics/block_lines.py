@@ -226,7 +226,7 @@ def _tables(basis: Array, count: npt.NDArray[np.int64]) -> _Tables:
     beside -= np.einsum("miq,mgiq->mg", basis[:, 1:], turned[:, :, :-1])
     beside += np.einsum("miq,mgqp,mip->mg", basis[:, :-1], inside, basis[:, 1:], optimize=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        neighbours = np.maximum.accumulate(beside / trace, axis=1)
+        neighbours = np.maximum.accumulate(np.where(trace > 1e-9, beside / trace, 0.0), axis=1)
         return _Tables(inside, trace, trace**2 / squares, neighbours)
 
 

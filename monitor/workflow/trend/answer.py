@@ -11,8 +11,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from monitor.documents import INLINED, OMITTED, named
+from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
 
+#: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
+FEW_DAYS = DAYS_THAT_SHOW
 #: The ends of an interval of time; None where open.
 Between = tuple[str | None, str | None]
 
@@ -87,7 +90,10 @@ class LatestMean:
 
 @dataclass(frozen=True)
 class DatedChange:
-    """A change of a parameter, between which times it lies, and its size; a slope is stated a day or a year."""
+    """A change of a parameter, between which times it lies, and its size; a slope is stated a day or a year.
+
+    ``days`` is the number of days that were searched.
+    """
 
     at: str | None
     interval: Between
@@ -96,6 +102,7 @@ class DatedChange:
     u: float
     unit: str
     p_value: float
+    days: int
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,7 @@ def dated_change(change: Change, series: Series) -> DatedChange:
         u=change.u * (days if slope else 1.0),
         unit=f"{series.unit}/{period}" if slope else series.unit,
         p_value=change.p_value,
+        days=series.steady.day_count,
     )
 
 
