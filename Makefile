@@ -43,6 +43,7 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@$(PYTEST) $(PARALLEL) --all-seeds --timeout 3600
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_dependence.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_robots.py --seeds 10
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_methods.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_curve.py --seeds 40

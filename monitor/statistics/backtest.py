@@ -2,7 +2,8 @@
 
 The line of ``trend``, fitted anew to the history before every forecast day. Such a line depends on the days alone
 (their weights, means and times), so the fits of all origins are sums over the same days and are solved together: the
-work of one fit for each of 255 days becomes some products of matrices. So are the blocks by which ``block_lines`` allows
+work of one fit for each of 255 days becomes some products of matrices. So are the blocks by which ``block_lines``
+allows
 for days that resemble each other.
 """
 
@@ -82,7 +83,8 @@ def _by_day(y: Array, t: Array, u: Array | None, index: npt.NDArray[np.intp]) ->
 
 class _Lines(NamedTuple):
     """Lines of k origins: place and value of their weighted means, slopes, chi-square of the day means about them, its
-    derivative by the day component, the variance of a wave beside them, each (k,), and the weights of the days (k, d)."""
+    derivative by the day component, the variance of a wave beside them, each (k,), and the weights of the days (k,
+    d)."""
 
     at: Array
     level: Array

@@ -1,6 +1,7 @@
 """Did a quantity change between two stretches of runs by the same method, before and after an event?
 
-Whatever both share, as the scale of the bar or the form of the probe, drops out of their difference and has no part in its
+Whatever both share, as the scale of the bar or the form of the probe, drops out of their difference and has no part in
+its
 uncertainty: what is left is the scatter of the runs, divided by their number, and that of the days where a side has
 several. Judged by E_n with the expanded uncertainty at 95 % for the degrees of freedom that there are, so that of
 machines that did not change one in twenty is said to have. Compare results of different methods, which share less, with
@@ -29,7 +30,8 @@ LEVEL = 0.95
 class BeforeAfter:
     """``difference`` of the means, after less before, in the unit of the values; ``u`` with ``dof``, ``k`` for 95 %.
 
-    ``u_before`` and ``u_after`` are those of the two means. ``between`` is the standard deviation of the days, None where
+    ``u_before`` and ``u_after`` are those of the two means. ``between`` is the standard deviation of the days, None
+    where
     each side has one: then the difference of the machine and that of the two days are one, and ``u`` is of runs alone.
     """
 

@@ -28,7 +28,8 @@ DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS = 16, 4, 20
 #: A line and its scatter need so many blocks.
 FEWEST_BLOCKS = 3
 #: Margin on the correlation of neighbouring blocks, times the root of the number of days, and the days from which on
-#: all of it is added (with fewer, so little is left of the scatter that its few degrees of freedom allow for the rest): the
+#: all of it is added (with fewer, so little is left of the scatter that its few degrees of freedom allow for the
+#: rest): the
 #: smallest, to a tenth, that keeps false alarms of a slope at 5 % below 8 % for correlations up to 0.8, day components
 #: up to twice the scatter of a run and 3 to 250 days (docs/trials-statistics.md).
 MARGIN, FULL_MARGIN = 1.1, 10.0

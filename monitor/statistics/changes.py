@@ -141,7 +141,8 @@ def _change(series: _Series, best: Scan, base: Base, offset: int) -> Change:
 
 
 #: From so many days on days may differ by up to four times the scatter of a run, unless a series itself refutes that: a
-#: step of eight is then seen in every history. With fewer only where other parameters show such days (``day_evidence``):
+#: step of eight is then seen in every history. With fewer only where other parameters show such days
+#: (``day_evidence``):
 #: of five days a step of eight would else be seen in a third of histories, now in all; the price are false alarms of a
 #: parameter that alone has such days (docs/trials-statistics.md).
 DAYS_THAT_SHOW = 8
@@ -254,7 +255,8 @@ def find_changes(
     ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
     holds for whatever dependence among them; inside a piece every detected step splits it again at the
     same level. It holds for runs whose neighbours correlate by up to 0.8 and for day components up to four
-    times the scatter of a run; with fewer than eight days up to once, or where several parameters show such: whatever of these a series
+    times the scatter of a run; with fewer than eight days up to once, or where several parameters show such: whatever
+    of these a series
     does not refute is allowed for (see ``scan`` and ``day_evidence``), so for independent runs the rate is
     below it. Measured rates and power: docs/trials-statistics.md. Pieces of fewer than 6 runs are not
     searched. Raises ``DataError`` for times that fall, unknown names in ``u``, trials that cannot reach the

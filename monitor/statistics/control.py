@@ -27,7 +27,8 @@ THREE_SIGMA = 370.398
 D2 = 2.0 / float(np.sqrt(np.pi))
 
 
-#: Added to the estimated correlation of neighbouring points, times the root of their number: a reference period of 8 to 30
+#: Added to the estimated correlation of neighbouring points, times the root of their number: a reference period of 8
+#: to 30
 #: points says little of it (measured rates: docs/trials-statistics.md). Beyond the highest one no level is claimed.
 MARGIN, HIGHEST = 0.6, 0.9
 #: Fewest points that a reference period of points that resemble each other counts for.
@@ -64,7 +65,8 @@ class Reference:
 
 
 def allowed_correlation(values: Array) -> float:
-    """Correlation of neighbouring points of each column (n, p) or (n,), averaged, with a margin for what it may be off."""
+    """Correlation of neighbouring points of each column (n, p) or (n,), averaged, with a margin for what it may be
+    off."""
     columns = values[:, np.newaxis] if values.ndim == 1 else values
     estimates = [lag_one(column, fitted=1) for column in columns.T]
     return float(np.clip(np.mean(estimates) + MARGIN / np.sqrt(len(columns)), 0.0, HIGHEST))

@@ -33,7 +33,8 @@ from monitor.statistics.variances import bartlett_from_sums, levene
 
 @dataclass(frozen=True)
 class Homogeneity:
-    """Six tests of each of p columns; ``bartlett``, ``levene``, ``welch`` and ``brown_forsythe`` (of means) need two runs
+    """Six tests of each of p columns; ``bartlett``, ``levene``, ``welch`` and ``brown_forsythe`` (of means) need two
+    runs
     in each group and are None where a group has one. ``mean_discoveries`` holds the q-values of equal means over the
     columns, from ``robust_p_value``."""
 

@@ -98,7 +98,8 @@ class VarianceMoments:
     """Sums over k groups of two runs and more for p columns: what Brown and Forsythe's test needs; all broadcast.
 
     ``groups`` and ``runs`` count them, ``between`` is the sum of squares between. Of the variances s² of groups of n
-    runs: ``first`` = sum s², ``first_runs`` = sum n s², ``second`` = sum s⁴, ``second_runs`` = sum n s⁴, and ``by_dof`` =
+    runs: ``first`` = sum s², ``first_runs`` = sum n s², ``second`` = sum s⁴, ``second_runs`` = sum n s⁴, and
+    ``by_dof`` =
     sum (1, n, n²) s⁴ / (n - 1).
     """
 

@@ -28,7 +28,8 @@ class MixedFit:
     """Coefficients (q,), their covariance (q, q) and effective degrees of freedom (q,).
 
     ``within`` is the factor s on the uncertainties of the runs, ``between`` the standard deviation t of the
-    days in the unit of the values; ``repeated``: a day has several runs, so that the two are told apart. ``weight`` (d,)
+    days in the unit of the values; ``repeated``: a day has several runs, so that the two are told apart. ``weight``
+    (d,)
     are the weights of the days with it, in an arbitrary unit; ``residual`` (n,) is value less fitted line.
     """
 

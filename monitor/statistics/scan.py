@@ -88,7 +88,8 @@ class _Sums(NamedTuple):
 class Scanner:
     """Everything of the search that does not depend on the values: prepared once for one plan.
 
-    ``days`` (n,) are indices of the runs' days, None where no day has two runs; ``cycle`` is the period of a wave that is
+    ``days`` (n,) are indices of the runs' days, None where no day has two runs; ``cycle`` is the period of a wave that
+    is
     no change, where the history covers it (``wave_columns``).
     """
 

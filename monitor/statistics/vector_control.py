@@ -76,7 +76,8 @@ def t_squared_chart(
     """T² of ``values`` (n, p) about a ``reference`` period (m, p), in any units; 1 / arl alarms a run.
 
     The limit is exact for new runs: p (m + 1) (m - 1) / (m (m - p)) F. Raises ``DataError`` unless
-    m >= p + 2. ``correlated``: neighbouring points may resemble each other. Source: N. D. Tracy, J. C. Young and R. L. Mason, J. Qual. Technol. 24 (1992) 88.
+    m >= p + 2. ``correlated``: neighbouring points may resemble each other. Source: N. D. Tracy, J. C. Young and R. L.
+    Mason, J. Qual. Technol. 24 (1992) 88.
     """
     z, inverse, m, _ = _reference(values, reference, correlated)
     p = z.shape[1]
@@ -100,7 +101,8 @@ def mewma_chart(
     """MEWMA of ``values`` (n, p) about a ``reference`` period (m, p), in any units, started at its mean.
 
     The limit is simulated with reference periods of the same size: a chance of 1 - 1/e of a false alarm
-    within ``arl`` runs (``correlated``: with what neighbours may resemble each other allowed for), as for an exponential run length; with 2000 trials the run length is good to 4 %.
+    within ``arl`` runs (``correlated``: with what neighbours may resemble each other allowed for), as for an
+    exponential run length; with 2000 trials the run length is good to 4 %.
     Where ``chart_limits`` holds the limit, from 20 000 trials, that one is taken and ``rng`` and ``trials`` are not
     used.
     Source: C. A. Lowry et al., Technometrics 34 (1992) 46.

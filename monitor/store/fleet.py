@@ -97,7 +97,8 @@ DELETE FROM fleet_group USING fleet_since
 WHERE fleet_group.machine_no = fleet_since.machine_no AND fleet_group.began_d < fleet_since.since_d
 """
 
-# The history of a machine is cut into blocks of equal time, as that of a parameter in `monitor trend`: from the number of
+# The history of a machine is cut into blocks of equal time, as that of a parameter in `monitor trend`: from the number
+# of
 # groups to their number, and from the time of a group to its block.
 _BLOCKS = """
 CREATE OR REPLACE TEMP TABLE fleet_blocked AS
@@ -188,7 +189,8 @@ WITH shown AS (
            list_avg(list_transform(x, lambda value: value - origin)) AS latest
     FROM fleet_latest JOIN fleet_origin USING (cell)
 ), part AS (
-    SELECT cb >> {_BLOCK_BITS} AS cell, n, sum(k) AS k, sum(v) AS v, min(least) AS least, sum(logs) AS logs, sum(t) AS t,
+    SELECT cb >> {_BLOCK_BITS} AS cell, n, sum(k) AS k, sum(v) AS v, min(least) AS least, sum(logs) AS logs, sum(t) AS
+    t,
            sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm, sum(vv) AS vv
     -- Groups in which a parameter was refused in every run have no part in it.
     FROM fleet_part WHERE n > 0 GROUP BY cell, n
@@ -225,7 +227,8 @@ ORDER BY m.machine, s.parameter
 
 # The blocks of every cell: how many groups, and their mean times and values about the origin.
 _OF_BLOCKS = f"""
-SELECT cb >> {_BLOCK_BITS} AS cell, cb & ((1 << {_BLOCK_BITS}) - 1) AS block, CAST(sum(k) AS DOUBLE) AS k, sum(t) / sum(k) AS t, sum(m) / sum(k) AS m
+SELECT cb >> {_BLOCK_BITS} AS cell, cb & ((1 << {_BLOCK_BITS}) - 1) AS block, CAST(sum(k) AS DOUBLE) AS k, sum(t) /
+sum(k) AS t, sum(m) / sum(k) AS m
 FROM fleet_part WHERE n > 0 GROUP BY cb
 """
 
@@ -246,7 +249,8 @@ class BlockCut:
 class RepeatedSums:
     """Sums over the groups of two runs and more of c cells, all (c,): runs, values and squares as in ``FleetSums``.
 
-    Of the variances s² of groups of n runs: ``s2`` and ``s2_runs`` are sums of s² and n s², ``s4`` and ``s4_runs`` those
+    Of the variances s² of groups of n runs: ``s2`` and ``s2_runs`` are sums of s² and n s², ``s4`` and ``s4_runs``
+    those
     of s⁴ and n s⁴, and ``s4_dof`` those of s⁴, n s⁴ and n² s⁴ by n - 1.
     """
 
@@ -262,7 +266,8 @@ class RepeatedSums:
 
 @dataclass(frozen=True)
 class FleetBlocks:
-    """Blocks of the history of c cells, all (c, b): groups (0: none), mean days since ``epoch_d``, mean value less origin."""
+    """Blocks of the history of c cells, all (c, b): groups (0: none), mean days since ``epoch_d``, mean value less
+    origin."""
 
     groups: Array
     t: Array
@@ -319,7 +324,8 @@ def fleet_sums(
     Of each machine since its last recorded event, where runs followed it (a day counts whole, by its first run).
     Without ``model`` the method's own. A parameter that a machine refused both in its first campaign and on its last
     day has zero for its origin and loses 2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the
-    last bits from one time to the next. ``cut`` says how the history of a machine is cut into blocks. Raises NotFoundError where nothing was identified.
+    last bits from one time to the next. ``cut`` says how the history of a machine is cut into blocks. Raises
+    NotFoundError where nothing was identified.
     """
     for statement in (_MACHINES, _HEADINGS):
         db.execute(statement)

@@ -31,7 +31,8 @@ class PairKind(Enum):
 
 @dataclass(frozen=True)
 class ParameterAgreement:
-    """A parameter of two results, in ``unit``: their difference, its expanded uncertainty with the factor ``k``, and E_n.
+    """A parameter of two results, in ``unit``: their difference, its expanded uncertainty with the factor ``k``, and
+    E_n.
 
     Before and after an event u is that of the means without what both share; ``between_days`` is the standard deviation
     of the days that it holds, None where each side has one day (then it is that of runs alone).
@@ -83,7 +84,8 @@ def agreement(
     """Compare the results of a machine that should agree, or should not.
 
     The uncertainty of the result of a method is that of its identification or, where it is larger, the one that was
-    evaluated for its campaign (the latest `monitor uncertainty`), and the scatter of its runs. Before and after an event
+    evaluated for its campaign (the latest `monitor uncertainty`), and the scatter of its runs. Before and after an
+    event
     one method measured with the same artefact and probe: what they share drops out, and the scatter of runs and days is
     left (``before_after``).
     """

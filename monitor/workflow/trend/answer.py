@@ -55,7 +55,8 @@ class DriftStatement:
     """The slope a year of the present piece of history, since the last change or event.
 
     ``robust_slope_per_year`` by Theil and Sen, ``monotone_p`` by Mann and Kendall; ``between_days`` and
-    ``within_days`` are standard deviations about the line. ``resemblance`` says how the slope's interval allows for days
+    ``within_days`` are standard deviations about the line. ``resemblance`` says how the slope's interval allows for
+    days
     that resemble each other, ``season`` whether a wave of a year is allowed for.
     """
 
