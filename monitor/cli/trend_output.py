@@ -254,7 +254,7 @@ def _next_check(answer: TrendAnswer) -> Iterator[str]:
     yield f"check within {intervals[name]:.0f} days, for {name} ({first.forecast.recommended_by})"
     span = first.drift.span_days
     if intervals[name] > span:
-        yield f"  its drift was seen over {span:.0f} days only; that it goes on for longer is a supposition"
+        yield f"  its drift was seen over {span:.0f} days only; that it goes on for longer is an assumption"
 
 
 #: Blocks of days up to which nothing is known of how far days resemble each other.
@@ -310,7 +310,7 @@ def _backtest(answer: TrendAnswer) -> Iterator[str]:
     forecasts, inside = sum(test.made for test in tests.values()), sum(test.inside for test in tests.values())
     name = min(tests, key=lambda parameter: tests[parameter].share_inside)
     yield (
-        f"backtest, every day foretold by the days before it: {inside} of {forecasts} later values "
+        f"backtest, each day forecast from the days before it: {inside} of {forecasts} later values "
         f"({100 * inside / forecasts:.0f} %) inside the 95 % forecast interval; least for {name}, "
         f"{tests[name].inside} of {tests[name].made}"
     )

@@ -24,7 +24,6 @@ from monitor.store.catalogue import (
     WithdrawnCampaign,
     described_machines,
     list_campaigns,
-    list_machines,
     list_runs,
     list_withdrawn,
 )
@@ -73,6 +72,7 @@ from monitor.store.models import (
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
+from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
@@ -88,6 +88,7 @@ __all__ = [
     "MachineDescription",
     "MachineEvent",
     "MachineHistory",
+    "QueryResult",
     "RecordedRun",
     "RunRow",
     "StoredAnalysis",
@@ -104,11 +105,13 @@ __all__ = [
     "analysis_text",
     "campaign_machines",
     "campaign_notes",
+    "campaign_readings",
     "campaign_tolerances",
     "certificate_numbers",
     "check_analysis",
     "check_campaigns",
     "clear_refusals",
+    "column_comments",
     "curve_names",
     "described_machines",
     "export_tables",
@@ -154,6 +157,7 @@ __all__ = [
     "refusals",
     "restore",
     "run_fingerprints",
+    "run_query",
     "save_analysis",
     "save_certificate",
     "save_identification",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from monitor.effects.registry import parse, plug_ins
+from monitor.effects.registry import parse, plug_in_patterns, plug_ins
 from monitor.effects.shape import Shape
 from monitor.effects.shapes.compliance import Compliance
 from monitor.effects.shapes.const import Const
@@ -38,6 +38,6 @@ def parse_shape(text: str) -> Shape:
         raise EffectError(
             f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic9999, cyclic20mm (any "
             "pitch), reversal, lag, compliance, table (or table9 for nine nodes, up to table99; table(-100,0,100) for "
-            "your own nodes) and formula(...)"
+            f"your own nodes) and formula(...){plug_in_patterns('monitor.shapes')}"
         )
     return shape
