@@ -41,7 +41,7 @@ from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
-from monitor.store.fleet import FleetSums, fleet_sums
+from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
 from monitor.store.identifications import (
     identification_by_number,
@@ -90,6 +90,7 @@ __all__ = [
     "NOTE",
     "AuditEntry",
     "Backup",
+    "BlockCut",
     "CampaignRow",
     "Database",
     "FleetSums",
