@@ -12,7 +12,9 @@ from monitor.discovery.machine.run_evidence import p_value_against_runs
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.variants import with_drivers
 from monitor.discovery.search.acceptance import Acceptance, lowers_held_out_error
+from monitor.discovery.search.evidence import Evidence, Pool
 from monitor.discovery.search.scene import family_count
+from monitor.discovery.search.sign_flips import p_value_by_flips
 
 
 class ChainAcceptance(Acceptance[ChainCandidate]):
@@ -36,6 +38,13 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
             return False
         return lowers_held_out_error(self.scene, others, candidate)
+
+    def stands_among(
+        self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
+    ) -> bool:
+        """Whether an effect stands out under sign flips of whole runs, where there are enough of them."""
+        p_value = p_value_by_flips(self.scene, pool, others, evidence, self.scene.run)
+        return p_value is None or p_value <= self.rate
 
     def alternatives(self, candidate: ChainCandidate) -> Sequence[ChainCandidate]:
         """The effect with each driver, or without its own."""

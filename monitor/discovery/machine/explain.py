@@ -13,10 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from monitor.discovery.machine.anomalies import BadPoint, BallMove
+from monitor.discovery.machine.correlation import Correlation
 from monitor.discovery.machine.compare import ChainComparison, compare
 from monitor.discovery.machine.cures import Mistake
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
+from monitor.discovery.machine.poses import poses_of_rows
 from monitor.discovery.machine.refine import Refined, refine_all
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
@@ -130,18 +132,27 @@ def _search(
 ) -> _Search:
     """Search effects and suspects in turn, each under the others, until nothing changes."""
     suspects = Suspects()
+    correlation: Correlation | None = None
     for _ in range(MOST_ROUNDS):
         out, single = suspects.left_out(problem), suspects.effects(problem)
         current = fit(with_effects(problem, single), out, first) if suspects.any else first
+        current = current.with_correlation(correlation)
         scene, result = search_chain(scene_of(current, variants), drivers, rate)
         refined = refine_all(scene, result.candidates)
         effects = [finding.candidate.effect for finding in refined]
         under = fit(with_effects(problem, [*single, *effects]), out, current) if effects else current
         more = find_suspects(under, problem, effects, suspects, variants, scene if under is current else None)
-        if more.same_as(suspects):
+        # What all runs share and what the effects explain is no noise of neighbours.
+        before, correlation = correlation, _correlation(under)
+        if more.same_as(suspects) and correlation == before:
             break
         suspects = more
     return _Search(scene, result, refined, suspects, under)
+
+
+def _correlation(under: Fit) -> Correlation | None:
+    """The correlation of neighbours under a model; None where readings share their poses and are counted by these."""
+    return under.correlation() if poses_of_rows(under) is None else None
 
 
 def _steps(campaign: Campaign, search: _Search, rng: np.random.Generator) -> list[Step]:

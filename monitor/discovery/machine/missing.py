@@ -11,7 +11,7 @@ import numpy.typing as npt
 from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.machine.refine import Refined
 from monitor.discovery.machine.rivals import RivalSearch
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
 from monitor.discovery.machine.separate import Separation, separating_poses
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.machine.tables import ChainScan
@@ -47,11 +47,13 @@ class ChainMissing(Missing):
 class _Selection:
     """The findings of a scan together, at their best values: the most convincing first.
 
-    ``poses`` (M,) is the pose of every row, None where poses have no several rows.
+    ``poses`` (M,) is the pose of every row, None where poses have no several rows. Errors are ``shown`` in readings of
+    equal weight, whatever neighbours share.
     """
 
     scene: ChainScene
     candidates: Sequence[ChainCandidate]
+    shown: ChainScene
     poses: npt.NDArray[np.int64] | None
     surroundings: Surroundings
 
@@ -72,7 +74,10 @@ def missing_effects(
     if poses is not None:
         factors = widening(scene, candidates, poses)
         covariance = factors[:, None] * covariance * factors
-    selection = _Selection(scene, candidates, poses, surroundings)
+    shown = scene
+    if scene.fit.whitening is not None:
+        shown = scene_of(scene.fit.with_correlation(None), [candidate.variant for candidate in candidates])
+    selection = _Selection(scene, candidates, shown, poses, surroundings)
     return tuple(
         _missing(selection, index, finding, refined[index], (estimate[part], covariance[part, part]))
         for index, (finding, part) in enumerate(zip(result.findings, _parts(candidates), strict=True))
@@ -141,7 +146,9 @@ def _missing(
     candidate, effect = refined.candidate, refined.candidate.effect
     amplitude, u = _amplitude(effect, coefficients, covariance)
     p_value, q_value = _p_and_q(selection, finding, candidate)
-    before, after = selection.candidates[:index], selection.candidates[: index + 1]
+    shown = selection.shown
+    visible = selection.candidates if shown is scene else shown.candidates
+    before, after = visible[:index], visible[: index + 1]
     search = RivalSearch(scene, selection.candidates, surroundings.drivers)
     rivals = search.rivals(index, least_likelihood(finding.evidence), coefficients)
     return ChainMissing(
@@ -158,12 +165,12 @@ def _missing(
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,
-        rms_before=_rms(scene, before),
-        rms_after=_rms(scene, after),
-        held_out_before=_held_out(scene, before, surroundings.runs),
-        held_out_after=_held_out(scene, after, surroundings.runs),
-        held_out_days_before=_held_out(scene, before, surroundings.days),
-        held_out_days_after=_held_out(scene, after, surroundings.days),
+        rms_before=_rms(shown, before),
+        rms_after=_rms(shown, after),
+        held_out_before=_held_out(shown, before, surroundings.runs),
+        held_out_after=_held_out(shown, after, surroundings.runs),
+        held_out_days_before=_held_out(shown, before, surroundings.days),
+        held_out_days_after=_held_out(shown, after, surroundings.days),
         rivals=tuple(Rival(_name(rival), same) for rival, same in rivals),
         separation=separating_poses(
             scene.fit, effect, coefficients, [rival.effect for rival, _ in rivals], surroundings.strokes

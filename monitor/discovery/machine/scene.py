@@ -63,7 +63,7 @@ class ChainScene:
     @cached_property
     def residual(self) -> Array:
         """The whitened residual (M,), run by run."""
-        return self.fit.solution.last.residual.reshape(-1)
+        return self.fit.white.reshape(-1)
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -151,6 +151,8 @@ def _projected(fit: Fit, raw: Sequence[Array]) -> tuple[Array, Array]:
             target[...] = white.reshape(len(moved), *sources.shape)
         else:
             target[...] = np.where(filled, white[:, np.where(filled, sources, 0)], 0.0)
+    if fit.whitening is not None:
+        projected = fit.whitening(projected)
     before = np.sqrt(np.einsum("krn,krn->k", projected, projected))
     for run, basis in enumerate(fit.nuisance.basis):
         part = projected[:, run]
