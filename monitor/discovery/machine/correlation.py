@@ -1,8 +1,9 @@
 """Noise of neighbours: readings of one run that resemble those before them (drift, temperature, a slow probe).
 
 The noise of a reading is an independent part and a part that follows an autoregression of first order along the probing
-sequence. Both are estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) and taken
-out of all rows by the filter of Kalman (Trans. ASME J. Basic Eng. 82 (1960) 35), whose innovations are independent.
+sequence. Both are estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) and
+taken out of all rows by the filter of Kalman (Trans. ASME J. Basic Eng. 82 (1960) 35), whose innovations are
+independent.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ class Correlation:
 
 @dataclass(frozen=True)
 class Rows:
-    """The layout of whitened numbers (R, N): ``weighted`` (R, T) touches of d numbers each, ``turned`` (R, T, d, d) into
-    the directions of the readings (None where they are the readings); what stands behind is no reading."""
+    """The layout of whitened numbers (R, N): ``weighted`` (R, T) touches of d numbers each, ``turned`` (R, T, d, d)
+    into the directions of the readings (None where they are the readings); what stands behind is no reading."""
 
     weighted: npt.NDArray[np.bool_]
     numbers: int
@@ -50,7 +51,7 @@ class Rows:
     @property
     def count(self) -> int:
         """How many of the N numbers are of readings."""
-        return self.weighted.shape[1] * self.numbers
+        return int(self.weighted.shape[1]) * self.numbers
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class Whitening:
     def __call__(self, numbers: Array) -> Array:
         """Independent numbers (..., R, N) of equal variance from correlated ones."""
         rows = self.rows
-        runs, touches = rows.weighted.shape
+        touches = rows.weighted.shape[1]
         readings = numbers[..., : rows.count].reshape(*numbers.shape[:-1], touches, rows.numbers)
         if rows.turned is not None:
             readings = (rows.turned @ readings[..., None])[..., 0]
@@ -105,8 +106,8 @@ def rows_of(problem: ChainProblem) -> Rows:
 
 
 def turned_into_readings(problem: ChainProblem, by_error: Array) -> Array | None:
-    """Rotations (R, T, d, d) of a row's numbers into the directions of the measured joints; None where the numbers are no
-    vectors of as many joints."""
+    """Rotations (R, T, d, d) of a row's numbers into the directions of the measured joints; None where the numbers are
+    no vectors of as many joints."""
     chain, measured = problem.context.chain, list(problem.measured_joints)
     if len(measured) != 3 or problem.sigma.shape[1] != 3:
         return None

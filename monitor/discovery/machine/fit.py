@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +18,8 @@ from monitor.discovery.machine.correlation import (
     turned_into_readings,
 )
 from monitor.discovery.machine.plan_cells import plan_cells
-from monitor.effects import Basis
+from monitor.effects import Basis, Effect
+from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Solution, eliminate, project_out
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.records import Array
@@ -111,7 +113,7 @@ class Fit:
         Of several runs only what they do not share counts: an effect that the model lacks makes neighbours alike too.
         """
         rows = rows_of(self.problem)
-        cells = self.problem.padded(plan_cells(self.problem)[:, None, None] + 1.0).reshape(
+        cells = self.problem.padded(plan_cells(self.problem)[:, None, None].astype(np.float64) + 1.0).reshape(
             rows.weighted.shape
         )
         rows = replace(rows, turned=turned_into_readings(self.problem, self.by_error))
@@ -159,8 +161,8 @@ def fit(
 ) -> Fit:
     """The least-squares point of a problem; probings that are left out get no weight.
 
-    ``start`` is an earlier fit of the same runs with the same base, from which the search begins and whose correlation of
-    neighbours is kept.
+    ``start`` is an earlier fit of the same runs with the same base, from which the search begins and whose correlation
+    of neighbours is kept.
     """
     out = np.zeros(len(problem.context), dtype=bool) if left_out is None else left_out
     weighted = replace(problem, sigma=np.where(out[:, None], np.inf, problem.sigma)) if out.any() else problem
@@ -172,3 +174,26 @@ def fit(
         common[: len(names)] = start.solution.common
     fitted = Fit(weighted, solve_problem(weighted, start.solution.local, common), out)
     return fitted if start.whitening is None else fitted.with_correlation(start.whitening.correlation)
+
+
+def fit_those_possible(
+    problem: ChainProblem, effects: Sequence[Effect], out: npt.NDArray[np.bool_], start: Fit
+) -> tuple[Fit, tuple[Effect, ...]]:
+    """Fit a problem with further effects in common; return the fit and the effects that could not be fitted.
+
+    Effects whose coefficients only products of small errors determine may keep the steps from settling. Then they are
+    added one after the other, and each that cannot be fitted beside those before is left out.
+    Raises DataError where nothing of it can be fitted.
+    """
+    try:
+        return fit(replace(problem, added=(*problem.added, *effects)), out, start), ()
+    except (DataError, np.linalg.LinAlgError):
+        current = fit(problem, out, start)
+    able: list[Effect] = []
+    for effect in effects:
+        try:
+            current = fit(replace(problem, added=(*problem.added, *able, effect)), out, current)
+        except (DataError, np.linalg.LinAlgError):
+            continue
+        able.append(effect)
+    return current, tuple(effect for effect in effects if effect not in able)

@@ -1,16 +1,17 @@
 """Sign flips of whole runs: how often noise alone would bring forth a candidate as convincing as one that was found.
 
-Where nothing is missing the residual of a run is as likely as its negative, whatever the readings of one run share with
-each other. So the scores of the runs are given random signs, and the most convincing of all candidates under these signs
-is compared with the one that was found (Hemerik, Goeman and Finos, J. R. Stat. Soc. B 82 (2020) 841; the maximum over
-all candidates as in Westfall and Young, Resampling-based multiple testing, 1993). That pays for every candidate that was
-looked at, searched pitches and time constants too.
+Where nothing is missing the residual of a run is as likely as its negative, whatever the readings of one run share
+with each other. So the scores of the runs are given random signs, and the most convincing of all candidates under these
+signs is compared with the one that was found (Hemerik, Goeman and Finos, J. R. Stat. Soc. B 82 (2020) 841; the maximum
+over all candidates as in Westfall and Young, Resampling-based multiple testing, 1993). That pays for every candidate
+that was looked at, searched pitches and time constants too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -61,7 +62,7 @@ def p_value_by_flips(
     ends = np.searchsorted(run, np.arange(runs + 1))
     overlap = pool.rows @ basis
     scores = np.empty((len(pool.rows), runs))
-    for index, (start, end) in enumerate(zip(ends, ends[1:], strict=False)):
+    for index, (start, end) in enumerate(pairwise(ends)):
         scores[:, index] = pool.rows[:, start:end] @ residual[start:end]
         scores[:, index] -= overlap @ (basis[start:end].T @ residual[start:end])
     flips = signs(runs)

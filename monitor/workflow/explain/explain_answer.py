@@ -175,8 +175,8 @@ class MachineExplanation:
     """The explanation of a machine; ``answer`` is the finding in a few sentences.
 
     ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why;
-    ``held_out`` are the parts left out in turn for the held-out errors. The residual is pictured where something is
-    missing.
+    ``held_out`` are the parts left out in turn for the held-out errors. ``not_fitted`` are effects that stood out but
+    could not be fitted, and were skipped. The residual is pictured where something is missing.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -192,6 +192,7 @@ class MachineExplanation:
     answer: str
     residual_map: ResidualMap | None
     residual_against: ResidualAgainst | None
+    not_fitted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -147,4 +147,5 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         answer=machine_sentences(explanation, comparison.verdict, missing, len(suspect_data), changes),
         residual_map=residual_map,
         residual_against=residual_against,
+        not_fitted=explanation.unfitted,
     )

@@ -57,6 +57,11 @@ def machine_sentences(
             else (f"{target_word} {change.target}", "moved")
         )
         sentences.append(f"{subject} {verb} by {change.size:.1f} {change.unit} at run {change.run}.")
+    if explanation.unfitted:
+        sentences.append(
+            f"Could not be fitted and {'was' if len(explanation.unfitted) == 1 else 'were'} skipped: "
+            f"{', '.join(explanation.unfitted)}."
+        )
     return (GROSS if is_hopeless(explanation) else "") + " ".join(sentences)
 
 
