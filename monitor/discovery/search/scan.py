@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Generic
 
+import numpy as np
+
 from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.evidence import Evidence, Pool, best_of_families, weigh_beside
 from monitor.discovery.search.scene import CandidateT, Scene, family_count
@@ -244,3 +246,14 @@ def reduced(
 def except_for(selected: Sequence[CandidateT], index: int) -> list[CandidateT]:
     """The selected candidates without that at an index."""
     return [*selected[:index], *selected[index + 1 :]]
+
+
+def by_error_taken_away(scene: Scene[CandidateT], result: ScanResult[CandidateT]) -> ScanResult[CandidateT]:
+    """The findings in the order of what they take of the error, each beside those before it."""
+    ordered: list[Finding[CandidateT]] = []
+    rest = list(result.findings)
+    while rest:
+        before = [finding.candidate for finding in ordered]
+        explained = [weigh_beside(scene, [finding.candidate], before)[0].explained for finding in rest]
+        ordered.append(rest.pop(int(np.argmax(explained))))
+    return replace(result, findings=tuple(ordered))
