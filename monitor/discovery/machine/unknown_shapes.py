@@ -2,12 +2,14 @@
 
 Where the flexible competitor of an error says more than its shapes of the catalogue, a few parts of it are selected,
 one after the other, at the price of each and of the choice (Schwarz's criterion extended for many candidates: Chen and
-Chen, Biometrika 95 (2008) 759). The free shape leads if it says more at its price and predicts left-out poses better.
+Chen, Biometrika 95 (2008) 759). The free shape leads if it says more at its price and lowers the error
+at left-out poses.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy import special
@@ -68,7 +70,10 @@ def _free(
     """The effect of free shape that says more than the shapes of one error beside others; None where none does."""
     chain = scene.fit.problem.context.chain
     text = f"{symbol}:free"
-    (whole,) = scene_of(scene.fit, [Variant(text, parse_effect(text, chain))]).candidates
+    effect = mine[0].effect
+    assert isinstance(effect, ChainEffect)
+    any_shape = replace(effect, shape=Free(), shape_text="free")
+    (whole,) = scene_of(scene.fit, [Variant(text, any_shape)]).candidates
     if not _says_more(scene, whole, [*others, *mine]):
         return None
     parts = _parts(scene, whole, others)
@@ -80,7 +85,7 @@ def _free(
     (free,) = scene_of(scene.fit, [variant]).candidates
     price = 2.0 * len(parts) * float(np.log(whole.columns.shape[1]))
     worth = _score(scene, [free], others) - price > _score(scene, mine, others) + WORTH_EXCHANGING
-    return free if worth and _predicts(scene, free, mine, others) else None
+    return free if worth and _predicts(scene, free, others) else None
 
 
 def _says_more(scene: ChainScene, whole: ChainCandidate, selected: Sequence[ChainCandidate]) -> bool:
@@ -128,13 +133,8 @@ def _score(scene: ChainScene, selected: Sequence[ChainCandidate], others: Sequen
     )
 
 
-def _predicts(
-    scene: ChainScene,
-    free: ChainCandidate,
-    mine: Sequence[ChainCandidate],
-    others: Sequence[ChainCandidate],
-) -> bool:
-    """Whether a free shape predicts left-out poses better than the shapes of the catalogue; true with too few poses."""
-    before = scene.held_out_error_by_poses(scene.columns([*others, *mine]))
+def _predicts(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
+    """Whether a free shape beside others lowers the error at poses left out of every run; true with too few poses."""
+    before = scene.held_out_error_by_poses(scene.columns(others))
     after = scene.held_out_error_by_poses(scene.columns([*others, free]))
     return before is None or after is None or after < before

@@ -24,7 +24,7 @@ BUILD_UP = (1 / 40, 1 / 12, 1 / 4)
 
 @dataclass(frozen=True)
 class Free(DescribedShape):
-    """Parts of a flexible basis of one axis, numbered from 1; all of them where none is named.
+    """Parts of a flexible basis of one axis, numbered from 1; all of them where none is named, for a search.
 
     Linear axes: hats over the visited range, the direction of travel (alone, times the position and its square, and
     building up with the way since the last reversal), the position times that of every other axis. Rotary axes:
@@ -33,22 +33,21 @@ class Free(DescribedShape):
     """
 
     parts: tuple[int, ...] = ()
-    pattern: ClassVar[str] = r"free(\((?P<parts>[\d, ]+)\))?"
+    pattern: ClassVar[str] = r"free\((?P<parts>[1-9]\d*(,[1-9]\d*)*)\)"
 
     @classmethod
     def of(cls, groups: Mapping[str, str]) -> Self:
-        text = groups.get("parts") or ""
-        return cls(tuple(int(word) for word in text.split(",") if word.strip()))
+        return cls(tuple(int(word) for word in groups["parts"].split(",")))
 
     @property
     def labels(self) -> tuple[str, ...]:
-        return tuple(f".{part}" for part in self.parts) if self.parts else (".all",)
+        return tuple(f".{part}" for part in self.parts)
 
     def columns(self, context: Context, joint: int) -> Array:
         basis = flexible_basis(context, joint)
         if not self.parts:
             return basis
-        if min(self.parts) < 1 or max(self.parts) > basis.shape[1]:
+        if max(self.parts) > basis.shape[1]:
             raise EffectError(
                 f"free has the parts 1 to {basis.shape[1]} here; {max(self.parts)} is none of them"
             )
