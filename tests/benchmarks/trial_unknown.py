@@ -150,7 +150,9 @@ def told(campaign: Any, seed: int) -> Told:
 
 
 def shapes(seeds: range, peaks: tuple[float, ...], runs: int, only: str) -> Iterator[str]:
-    """The rows of the table of shapes."""
+    """The rows of the table of shapes; none without seeds."""
+    if not seeds:
+        return
     yield "| hidden | peak | right error alone | led by it | seconds | else |"
     yield "| --- | --- | --- | --- | --- | --- |"
     days, each = PLANS[runs]
@@ -162,7 +164,12 @@ def shapes(seeds: range, peaks: tuple[float, ...], runs: int, only: str) -> Iter
                 continue
             answers = [
                 told(
-                    virtual_campaigns.virtual(seed, [simulator.Effect(effect, peak_um=peak, curve=curve)])[0],
+                    virtual_campaigns.virtual(
+                        seed,
+                        [simulator.Effect(effect, peak_um=peak, curve=curve)],
+                        days=days,
+                        runs_per_day=each,
+                    )[0],
                     seed,
                 )
                 for seed in seeds
@@ -211,9 +218,8 @@ def main() -> None:
     parser.add_argument("--runs", type=int, nargs="+", default=[4, 8, 20, 60, 1, 2, 7], choices=list(PLANS))
     parser.add_argument("--only", default="", help="shapes or noises whose name contains this")
     options = parser.parse_args()
-    for row in shapes(
-        range(options.first, options.first + options.seeds), tuple(options.peaks), options.only
-    ):
+    seeds = range(options.first, options.first + options.seeds)
+    for row in shapes(seeds, tuple(options.peaks), options.shape_runs, options.only):
         print(row, flush=True)
     print(flush=True)
     for row in empties(range(options.first, options.first + options.empties), options.runs, options.only):
