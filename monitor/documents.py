@@ -54,6 +54,16 @@ def from_document(kind: type[Record], document: Mapping[str, Any]) -> Record:
     return record
 
 
+def inlined_parts(record: object) -> tuple[object, ...]:
+    """Return a record and the records that are written into its document, at any depth."""
+    if not dataclasses.is_dataclass(record):
+        return (record,)
+    inlined = (
+        getattr(record, field.name) for field in dataclasses.fields(record) if "inlined" in field.metadata
+    )
+    return (record, *(part for value in inlined if value is not None for part in inlined_parts(value)))
+
+
 def _key(field: dataclasses.Field[Any]) -> str:
     return str(field.metadata.get("key", field.name))
 

@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from enum import StrEnum
 from typing import Literal
 
 import numpy as np
@@ -348,3 +349,19 @@ class LinearAxes:
 
     axes: Mapping[str, LinearAxisErrors]
     node_spacing: tuple[float, float]
+
+
+class FrameKind(StrEnum):
+    """What a parameter is stated relative to; the value is how records store it."""
+
+    MACHINE = "machine frame"
+    PRECEDING_AXIS = "preceding axis"
+    OWN_AXIS = "own axis"
+
+
+@dataclass(frozen=True)
+class FrameOfReference:
+    """What a parameter refers to: the frame of the machine, or that of an ``axis``, before it or its own."""
+
+    kind: FrameKind
+    axis: str | None = None

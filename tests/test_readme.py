@@ -85,11 +85,14 @@ def reader_environment() -> dict[str, str]:
     return kept | {"PATH": path, "COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
 
 
-def try_out(example: Example, folder: Path) -> None:
-    """Run one example in ``folder``; AssertionError when it ends or prints otherwise than the README says."""
+def try_out(example: Example, folder: Path) -> str:
+    """Run one example in ``folder`` and return what it prints (nothing where it is not run).
+
+    Raises AssertionError when it ends or prints otherwise than the README says.
+    """
     source = MAKE.get(example.source, example.source)
     if example.language == "console" and source.startswith(NOT_RUN):
-        return
+        return ""
     wanted = re.search(r"# exit status (\d+)$", source)
     command = [sys.executable, "-c", source] if example.language == "python" else ["bash", "-c", source]
     done = subprocess.run(
@@ -110,15 +113,35 @@ def try_out(example: Example, folder: Path) -> None:
     same = doctest.OutputChecker().check_output(example.shown + "\n", done.stdout, LOOSELY)
     if example.shown and not same:
         raise AssertionError(f"{told}shows\n{example.shown}\nbut prints\n{done.stdout}")
+    return done.stdout
 
 
 def test_readme_examples_do_what_it_says(tmp_path: Path) -> None:
     if (CHECKOUT / "examples").is_dir():
         shutil.copytree(CHECKOUT / "examples", tmp_path / "examples")
-    found = examples(README.read_text(encoding="utf-8"))
-    assert any(example.language == "console" for example in found)
-    for example in found:
-        try_out(example, tmp_path)
+    typed = examples(README.read_text(encoding="utf-8"))
+    assert any(example.language == "console" for example in typed)
+    printed = {example.source: try_out(example, tmp_path) for example in typed}
+    # The demo is the main job; it takes long and is looked at here, where it runs anyway.
+    demo = printed["make demo"]
+    assert "five-days: imported, 20 runs, 1240 probings\n" in demo
+    assert "U = k_q u" in demo
+    step = next(line for line in demo.splitlines() if line.startswith("EB0C ") and "< 0.0001" in line)
+    assert "µrad" in step
+    assert "EZC1:const@warmup" in demo
+    assert len(list((tmp_path / "demo-output").glob("certificate-*.pdf"))) == 1
+    assert (tmp_path / "demo-output/demo.duckdb").is_file()
+    # What it shows is typed below it, and every command may be copied.
+    assert "$ monitor --db demo-output/demo.duckdb import " in demo
+
+
+def test_the_python_of_the_documents_runs(tmp_path: Path) -> None:
+    (tmp_path / "examples").symlink_to(CHECKOUT / "examples")
+    typed = examples((CHECKOUT / "docs/python.md").read_text(encoding="utf-8"))
+    assert len(typed) == 2
+    printed = [try_out(example, tmp_path) for example in typed]
+    assert "EZC1:const@warmup" in printed[0]
+    assert (tmp_path / "figures/missing-effects.svg").is_file()
 
 
 def test_readme_make_targets_exist_and_do_what_the_examples_run() -> None:

@@ -68,6 +68,6 @@ def _unexpected(error: Exception) -> int:
 
 
 def _let_go_of_output() -> None:
-    """Send what is still in the buffer nowhere: Python would complain of it when it ends."""
+    """Discard what is still in the buffer: Python would complain of it when it ends."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from monitor.cli import output, residual_output
+from monitor.cli.identify_output import reversal_words
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
@@ -110,6 +111,8 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         output.say(
             f"   shape unknown; nearest in the catalogue: {effect.nearest_shape}; --json has the curve"
         )
+    if effect.reversal_value is not None:
+        output.say(f"   {reversal_words(effect.reversal_value)}")
     searched = effect.searched
     if searched is not None:
         u = "" if searched.u is None else f" ± {output.two_digits(searched.u)}"

@@ -24,7 +24,7 @@ def add_issuing(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--as-left", type=int, metavar="N",
-        help="the run after an adjustment or repair: its results stand behind those as found, or alone without --run",
+        help="the run after an adjustment or repair: its results follow those as found, or stand alone without --run",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="PATH", help="a folder, or a file ending in .pdf")
     parser.add_argument("--number", metavar="NUMBER", help="default: the next of the year")

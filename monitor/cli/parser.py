@@ -16,7 +16,7 @@ from monitor.cli.database import check_path
 VERBS = {
     "demo": "the main job on the example campaigns",
     "import": "campaign folders into the database, all or nothing each",
-    "withdraw": "a campaign no longer counts, its name is free for the corrected folder",
+    "withdraw": "take a wrong campaign out, so that its corrected folder can be imported",
     "campaigns": "the campaigns in the database",
     "runs": "the runs of a campaign with their conditions",
     "identify": "geometric errors of every run, stored",
@@ -35,10 +35,11 @@ VERBS = {
     "report": "weekly health report of the fleet, HTML and PDF",
     "certificate": "calibration certificates: issue, show, verify, amend, withdraw",
     "event": "record what happened to a machine (crash, repair, compensation)",
-    "verify": "is the database as it was written?",
+    "verify": "whether the database is as it was written",
     "audit": "who changed what and when",
     "backup": "a second file with everything, checked",
     "restore": "a database from a backup",
+    "sql": "a query of your own, which may only read",
     "export": "all tables as CSV or Parquet files",
 }
 DEFAULT_DATABASE = "monitor.duckdb"

@@ -14,6 +14,8 @@ from functools import cache
 from importlib.metadata import entry_points
 from typing import Any, ClassVar, Self
 
+from monitor.exceptions import EffectError
+
 
 class BuiltIn:
     """What is written as a text that matches ``pattern``."""
@@ -26,10 +28,42 @@ class BuiltIn:
         return cls(**groups)
 
 
+#: What a class of a plug-in needs, whether shape or driver.
+NEEDED = ("pattern", "labels", "columns", "unit")
+
+
 @cache
 def plug_ins(group: str) -> tuple[Any, ...]:
-    """Return what is registered under an entry point group (``monitor.shapes`` or ``monitor.drivers``)."""
-    return tuple(point.load() for point in sorted(entry_points(group=group), key=lambda point: point.name))
+    """Return what is registered under an entry point group (``monitor.shapes`` or ``monitor.drivers``).
+
+    Raises EffectError, which names the plug-in, for one that cannot be loaded or lacks what it needs.
+    """
+    return tuple(_loaded(point) for point in sorted(entry_points(group=group), key=lambda point: point.name))
+
+
+def _loaded(point: Any) -> Any:
+    try:
+        kind = point.load()
+    except Exception as error:
+        raise EffectError(f"the plug-in {point.name} ({point.value}) cannot be loaded: {error}") from error
+    missing = [name for name in NEEDED if not hasattr(kind, name)]
+    if missing:
+        raise EffectError(
+            f"the plug-in {point.name} ({point.value}) lacks {', '.join(missing)}; docs/effects.md has an example"
+        )
+    try:
+        re.compile(kind.pattern)
+    except (re.error, TypeError) as error:
+        raise EffectError(
+            f"the pattern of the plug-in {point.name} ({point.value}) is no regular expression: {error}"
+        ) from error
+    return kind
+
+
+def plug_in_patterns(group: str) -> str:
+    """Return the patterns of the plug-ins of a group as the end of a sentence, empty where there are none."""
+    patterns = ", ".join(kind.pattern for kind in plug_ins(group))
+    return f"; from plug-ins {patterns}" if patterns else ""
 
 
 @cache

@@ -187,8 +187,8 @@ def nothing_to_refuse(campaign: Campaign, problem: ChainProblem) -> None:
 NO_REHEARSAL = Unable("there is no virtual machine for it")
 NO_STEPWISE = Unable("all unknowns are identified at once, so type identify without --stepwise")
 NO_TOUCH_PLAN = Unable(
-    "plan weighs touches of balls and angles of a workpiece's table; what this plan cannot tell apart, identify names "
-    "with what to do"
+    "plan works for touches of balls and for angles of a workpiece's table only; identify lists what the present "
+    "plan cannot separate, and what to do about it"
 )
 
 

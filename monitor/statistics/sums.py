@@ -127,7 +127,9 @@ def grouped_sums(
     labels, index = label_groups(groups, n)
     counts = np.bincount(index, minlength=len(labels)).astype(np.int64)
     if len(labels) < least_groups:
-        raise DataError(f"groups names {len(labels)} group ({', '.join(labels)}); {least_groups} are needed.")
+        raise DataError(
+            f"the runs form {len(labels)} group ({', '.join(labels)}); at least {least_groups} are needed"
+        )
     short = np.flatnonzero(counts < least_runs)
     if short.size:
         at = int(short[0])

@@ -10,6 +10,7 @@ from monitor.store.analyses import (
     analysis_text,
     check_analysis,
     latest_documents,
+    latest_maps,
     list_analyses,
     load_analysis,
     save_analysis,
@@ -24,7 +25,6 @@ from monitor.store.catalogue import (
     WithdrawnCampaign,
     described_machines,
     list_campaigns,
-    list_machines,
     list_runs,
     list_withdrawn,
 )
@@ -73,6 +73,7 @@ from monitor.store.models import (
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
+from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
@@ -87,6 +88,7 @@ __all__ = [
     "MachineDescription",
     "MachineEvent",
     "MachineHistory",
+    "QueryResult",
     "RecordedRun",
     "RunRow",
     "StoredAnalysis",
@@ -103,11 +105,13 @@ __all__ = [
     "analysis_text",
     "campaign_machines",
     "campaign_notes",
+    "campaign_readings",
     "campaign_tolerances",
     "certificate_numbers",
     "check_analysis",
     "check_campaigns",
     "clear_refusals",
+    "column_comments",
     "curve_names",
     "described_machines",
     "export_tables",
@@ -122,6 +126,7 @@ __all__ = [
     "last_entries",
     "last_used_campaign",
     "latest_documents",
+    "latest_maps",
     "latest_tolerances",
     "list_analyses",
     "list_backups",
@@ -153,6 +158,7 @@ __all__ = [
     "refusals",
     "restore",
     "run_fingerprints",
+    "run_query",
     "save_analysis",
     "save_certificate",
     "save_identification",

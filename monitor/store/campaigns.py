@@ -36,7 +36,8 @@ class Imported:
     rows: int | None = None
 
     def __str__(self) -> str:
-        size = f"{self.runs} runs, {self.probings} probings" if self.rows is None else f"{self.rows} rows"
+        runs = f"{self.runs} run{'' if self.runs == 1 else 's'}"
+        size = f"{runs}, {self.probings} probings" if self.rows is None else f"{self.rows} rows"
         if self.state == "imported":
             return f"{self.campaign}: imported, {size}"
         return f"{self.campaign}: was imported before with the same content, nothing changed ({size})"

@@ -15,7 +15,7 @@ from monitor.store.connection import Database
 from monitor.store.record_json import machine_record
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 @dataclass(frozen=True)
@@ -90,11 +90,6 @@ def list_runs(db: Database, campaign: str) -> tuple[RunRow, ...]:
     """Return the runs of a campaign in file order. Raises NotFoundError."""
     campaign_number(db, campaign)
     return db.records(RunRow, "SELECT * FROM v_runs WHERE campaign = ?", [campaign])
-
-
-def list_machines(db: Database) -> pd.DataFrame:
-    """All machines by name: the view ``v_machines``."""
-    return db.frame("SELECT * FROM v_machines ORDER BY machine")
 
 
 def described_machines(db: Database) -> tuple[Machine, ...]:

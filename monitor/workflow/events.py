@@ -28,11 +28,9 @@ class EventRequest:
             raise InputError(f"--at {at} lacks its offset from UTC: write for example {at}-05:00")
         if self.text is None:
             return
-        if self.at is None:
-            raise InputError("say when it happened: --at 2026-03-05T07:00:00-05:00")
         if not self.text.strip():
             raise InputError("say in words what happened, for example 'B axis encoder changed'")
-        if self.at > datetime.now(UTC) + timedelta(hours=1):
+        if self.at is not None and self.at > datetime.now(UTC) + timedelta(hours=1):
             raise InputError(
                 f"{self.at.isoformat()} lies in the future, and an event cannot be undone; give the time it had"
             )
@@ -46,8 +44,10 @@ class EventAnswer:
 
 
 def event(db: Database, request: EventRequest) -> EventAnswer:
-    """Record what happened to a machine, or list what was recorded. Raises NotFoundError for an unknown machine."""
-    if request.text is not None and request.at is not None:
-        record_event(db, request.machine, request.at, request.kind, request.text)
+    """Record what happened to a machine, or list what was recorded. Raises NotFoundError, InputError."""
     check_machine(db, request.machine)
+    if request.text is not None:
+        if request.at is None:
+            raise InputError("say when it happened: --at 2026-03-05T07:00:00-05:00")
+        record_event(db, request.machine, request.at, request.kind, request.text)
     return EventAnswer(list_events(db, request.machine))

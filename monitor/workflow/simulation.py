@@ -13,6 +13,9 @@ from monitor.methods import Rehearsal, methods
 from monitor.readers import write_campaign
 from monitor.units import MICROMETRE
 
+#: Largest displacement of a hidden effect where the request names none, µm.
+PEAK_UM = 5.0
+
 
 @dataclass(frozen=True)
 class SimulateRequest:
@@ -24,7 +27,7 @@ class SimulateRequest:
 
     out: Path
     effect: str | None = None
-    peak_um: float = 5.0
+    peak_um: float | None = None
     noise_um: float | None = None
     seed: int = 1
     robot: bool = False
@@ -32,8 +35,10 @@ class SimulateRequest:
     def __post_init__(self) -> None:
         if self.noise <= 0 or not math.isfinite(self.noise):
             raise InputError(f"--noise {self.noise}: the noise of a reading must be above 0 µm")
-        if not math.isfinite(self.peak_um) or self.peak_um <= 0:
+        if self.peak_um is not None and (not math.isfinite(self.peak_um) or self.peak_um <= 0):
             raise InputError(f"--peak {self.peak_um}: the peak must be a number of µm above 0")
+        if self.peak_um is not None and self.effect is None:
+            raise InputError(f"--peak {self.peak_um:g} needs --effect, the effect that has it")
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 on")
 
@@ -43,6 +48,11 @@ class SimulateRequest:
         if self.noise_um is not None:
             return self.noise_um
         return self.rehearsal.noise_um
+
+    @property
+    def peak(self) -> float:
+        """The largest displacement of the effect in µm."""
+        return PEAK_UM if self.peak_um is None else self.peak_um
 
     @property
     def rehearsal(self) -> Rehearsal:
@@ -77,13 +87,13 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
         request.out.resolve().name,
         np.random.default_rng(request.seed),
         effect=request.effect,
-        peak=MICROMETRE.to_internal(request.peak_um),
+        peak=MICROMETRE.to_internal(request.peak),
         noise=MICROMETRE.to_internal(request.noise),
     )
     write_campaign(campaign, request.out)
     runs, probings = len(campaign.runs), len(campaign.probings)
     hidden = (
-        f"{request.effect} with a peak of {request.peak_um:g} µm is hidden"
+        f"{request.effect} with a peak of {request.peak:g} µm is hidden"
         if request.effect
         else "nothing is hidden"
     )
@@ -91,7 +101,7 @@ def simulate(request: SimulateRequest) -> SimulateAnswer:
         folder=str(request.out),
         campaign=campaign.name,
         effect=request.effect,
-        peak_um=request.peak_um if request.effect else None,
+        peak_um=request.peak if request.effect else None,
         noise_um=request.noise,
         seed=request.seed,
         runs=runs,

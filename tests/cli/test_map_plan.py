@@ -11,7 +11,7 @@ import pytest
 
 def _rows(file: str) -> list[dict[str, str]]:
     with Path(file).open(encoding="utf-8", newline="") as text:
-        return list(csv.DictReader(text))
+        return list(csv.DictReader(line for line in text if not line.startswith("#")))
 
 
 @pytest.fixture
@@ -132,7 +132,7 @@ def test_plan_proposes_balls_and_poses_and_draws_them(typed: Any, filled: Path, 
     assert answer.status == 0
     assert "proposed: 5 balls" in answer.out
     assert "at 9 indexations" in answer.out
-    assert "only a look at the machine tells" in answer.out
+    assert "check on the machine that the stylus can reach them" in answer.out
     assert (tmp_path / "expected-uncertainties.svg").stat().st_size > 1000
 
 

@@ -32,13 +32,13 @@ def test_explain_add_and_history(typed: Any, robot: Path) -> None:
     assert any("EAJ4:harmonic1" in group for group in groups)
     assert found["target_word"] == "reflector"
     assert found["held_out"] == "blocks of poses"
-    assert "with one run nobody can say what varies" in found["undecided"][0]
+    assert "one run cannot show what varies" in found["undecided"][0]
     assert found["missing"][0]["heldout_after_um"] < found["missing"][0]["heldout_before_um"]
     told = typed("explain", "tracked-robot", db=robot).out
     assert "on held-out blocks of poses" in told
     assert "µm at the reflectors" in told
     assert "ball" not in told
-    assert "with one run nobody can say" in told
+    assert "one run cannot show" in told
     added = typed(
         "model",
         "add",

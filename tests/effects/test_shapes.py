@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
-from monitor.effects import Context, drivers, parse_effect, shapes
+from monitor.effects import Context, drivers, parse_effect, registry, shapes
 from monitor.exceptions import EffectError
 from monitor.machine import Joint, parse_topology
 from monitor.records import Array
@@ -268,17 +269,75 @@ def test_shape_and_driver_of_the_user_come_through_the_entry_point(
     assert columns("EXX:poly1", context).ravel().tolist() == [-20, 5, 30, 40]
 
 
+@dataclass(frozen=True)
+class Point:
+    """An entry point that gives what a test wants."""
+
+    name: str
+    what: object
+    value: str = "package:Class"
+
+    def load(self) -> object:
+        if isinstance(self.what, Exception):
+            raise self.what
+        return self.what
+
+
+class Halfway:
+    """A plug-in that was not finished."""
+
+    pattern = r"halfway"
+
+
+class Unreadable(Step):
+    """A plug-in whose pattern is no regular expression."""
+
+    pattern: ClassVar[str] = r"step("
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        (
+            ImportError("no module named x"),
+            r"^the plug-in mine \(package:Class\) cannot be loaded: no module named x$",
+        ),
+        (
+            Halfway,
+            r"^the plug-in mine \(package:Class\) lacks labels, columns, unit; docs/effects.md has an example$",
+        ),
+        (Unreadable, r"^the pattern of the plug-in mine \(package:Class\) is no regular expression: "),
+    ],
+)
+def test_a_broken_plug_in_is_named(monkeypatch: pytest.MonkeyPatch, what: object, message: str) -> None:
+    monkeypatch.setattr(registry, "entry_points", lambda *, group: [Point("mine", what)])
+    registry.plug_ins.cache_clear()
+    try:
+        with pytest.raises(EffectError, match=message):
+            parse_effect("EXX:anything", CHAIN)
+    finally:
+        registry.plug_ins.cache_clear()
+
+
+def test_the_shape_of_the_document_is_what_it_says(
+    make: Callable[..., Context], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (Path(__file__).parents[2] / "docs/effects.md").read_text("utf-8")
+    names: dict[str, Any] = {"__name__": "__main__"}
+    source = text.split("```python\n# my_shapes.py\n")[1].split("```")[0]
+    exec(compile(source, "my_shapes.py", "exec", dont_inherit=True), names)
+    monkeypatch.setattr(registry, "entry_points", lambda *, group: [Point("scale_step", names["ScaleStep"])])
+    registry.plug_ins.cache_clear()
+    try:
+        context = make({"X": [-20.0, 119.0, 121.0]})
+        assert columns("EXX:scale_step120mm", context).ravel().tolist() == [0, 0, 1]
+        with pytest.raises(EffectError, match=r"; from plug-ins scale_step"):
+            parse_effect("EXX:scale_stop", CHAIN)
+    finally:
+        registry.plug_ins.cache_clear()
+
+
 def test_plug_ins_are_found_by_entry_point_group(monkeypatch: pytest.MonkeyPatch) -> None:
-    from monitor.effects import registry
-
-    @dataclass(frozen=True)
-    class Point:
-        name: str
-        what: type
-
-        def load(self) -> type:
-            return self.what
-
     asked = []
 
     def entry_points(*, group: str) -> list[Point]:

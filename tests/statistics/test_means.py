@@ -120,7 +120,7 @@ def test_a_column_without_scatter_says_nothing_or_everything():
 
 
 def test_refusals_say_what_is_needed():
-    with pytest.raises(DataError, match=r"groups names 1 group \(7\); 2 are needed"):
+    with pytest.raises(DataError, match=r"the runs form 1 group \(7\); at least 2 are needed"):
         anova(np.arange(4.0), np.full(4, 7))
     with pytest.raises(DataError, match="group 2 has 1 run"):
         welch_anova(np.arange(4.0), [1, 1, 1, 2])

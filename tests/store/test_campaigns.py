@@ -18,7 +18,6 @@ from monitor.store import (
     Database,
     import_campaign,
     list_campaigns,
-    list_machines,
     list_runs,
     load_campaign,
 )
@@ -162,7 +161,7 @@ def test_machine_is_described_by_its_latest_campaign_whatever_the_order_of_impor
     import_campaign(db, newer)
     older = make_campaign("older", location="hall 1")
     import_campaign(db, older)
-    table = list_machines(db)
+    table = db.frame("SELECT * FROM v_machines")
     assert list(table["location"]) == ["hall 9"]
     assert list(table["latest_campaign"]) == ["newer"]
     assert load_campaign(db, "older").machine == older.machine

@@ -20,7 +20,6 @@ from monitor.store import (
     import_campaign,
     latest_documents,
     list_campaigns,
-    list_machines,
     list_withdrawn,
     load_campaign,
     load_certificate,
@@ -69,7 +68,7 @@ def test_a_withdrawn_campaign_counts_nowhere(
     for view in ("v_runs", "v_probings", "v_parameters", "v_residuals", "v_identifications", "v_analyses",
                  "v_tolerances", "v_import_notes"):  # fmt: skip
         assert {name for (name,) in filled.rows(f"SELECT DISTINCT campaign FROM {view}")} == {"two"}, view
-    assert int(list_machines(filled)["campaigns"][0]) == 1
+    assert int(filled.frame("SELECT * FROM v_machines")["campaigns"][0]) == 1
     with pytest.raises(
         NotFoundError, match=r"there is no campaign 'one'; it was withdrawn on .* \(wrong file\)"
     ):
@@ -136,9 +135,9 @@ def test_a_wrong_topology_goes_with_the_last_campaign_of_the_machine(
     with pytest.raises(CampaignError, match="the axes of a machine do not change"):
         import_campaign(filled, other)
     withdraw_campaign(filled, "two", "wrong topology")
-    assert list(list_machines(filled)["machine"]) == []
+    assert list(filled.frame("SELECT * FROM v_machines")["machine"]) == []
     import_campaign(filled, other)
-    assert list(list_machines(filled)["topology"]) == ["w C A b X Y Z (C1) t"]
+    assert list(filled.frame("SELECT * FROM v_machines")["topology"]) == ["w C A b X Y Z (C1) t"]
     assert verify_audit(filled).faults == ()
 
 
@@ -147,7 +146,7 @@ def test_a_machine_with_an_event_stays(filled: Database, make_campaign: Callable
     record_event(filled, machine, datetime(2026, 1, 1, tzinfo=UTC), "crash", "x")
     for name in ("one", "two"):
         withdraw_campaign(filled, name, "wrong")
-    assert list(list_machines(filled)["machine"]) == [machine]
+    assert list(filled.frame("SELECT * FROM v_machines")["machine"]) == [machine]
     assert len(machine_history(filled, machine).run) == 0
 
 

@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -19,7 +20,9 @@ from monitor.cli import main
 from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
 from monitor.readers import read_campaign
+from monitor.reporting.certificate.page import _printed
 from monitor.reporting.certificate.record import CertificateRecord, ConformityStatement
+from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
@@ -103,7 +106,9 @@ def test_the_inputs_are_stored_with_it_and_travel_inside_it(
 ) -> None:
     reader = pypdf.PdfReader(guarded)
     files = {name: content[0] for name, content in reader.attachments.items()}
-    assert sorted(files) == ["certificate.dcc.xml", "certificate.json", "covariance-1.csv", "results-1.csv"]
+    assert sorted(files) == [
+        "certificate.dcc.xml", "certificate.json", "covariance-1.csv", "machine-frame-1.csv", "results-1.csv"
+    ]  # fmt: skip
     whole = json.loads(files["certificate.json"])
     stored = load_certificate(db, "G-1").record
     assert whole["inputs"] == stored["inputs"]
@@ -116,11 +121,54 @@ def test_the_inputs_are_stored_with_it_and_travel_inside_it(
 def test_iso_19005_3_6_8_every_attached_file_stands_once_in_af_with_its_relationship(guarded: Path) -> None:
     listed = pypdf.PdfReader(guarded).root_object["/AF"]
     names = [str(one.get_object()["/UF"]) for one in listed]
-    assert sorted(names) == ["certificate.dcc.xml", "certificate.json", "covariance-1.csv", "results-1.csv"]
+    assert sorted(names) == [
+        "certificate.dcc.xml", "certificate.json", "covariance-1.csv", "machine-frame-1.csv", "results-1.csv"
+    ]  # fmt: skip
     relations = {str(one.get_object()["/UF"]): one.get_object()["/AFRelationship"] for one in listed}
     assert relations["certificate.json"] == "/Source"
     assert relations["certificate.dcc.xml"] == "/Alternative"
     assert relations["results-1.csv"] == relations["covariance-1.csv"] == "/Data"
+
+
+def test_iso_230_1_3_7_location_errors_stand_in_the_machine_frame_with_their_covariance(
+    guarded: Path, found: RunUncertainty
+) -> None:
+    attached = pypdf.PdfReader(guarded).attachments
+    rows = {
+        row["parameter"]: row
+        for row in csv.DictReader(io.StringIO(attached["machine-frame-1.csv"][0].decode()))
+    }
+    result = results_of(as_stated(found), texts_of())
+    first, second = result.names.index("EA0B"), result.names.index("EA0C")
+    weights = np.zeros(len(result.names))
+    weights[[first, second]] = 1.0
+    tilt = rows["EA0C"]
+    assert tilt["sum_of"] == "EA0B + EA0C"
+    assert float(tilt["estimate"]) == pytest.approx(weights @ result.estimate)
+    assert float(tilt["standard_uncertainty"]) ** 2 == pytest.approx(weights @ result.covariance @ weights)
+    assert float(tilt["covariance_EA0B"]) == pytest.approx((weights @ result.covariance)[first])
+    text = " ".join(page.extract_text() for page in pypdf.PdfReader(guarded).pages)
+    assert "orientation about X of axis C, relative to axis B" in " ".join(text.split())
+    assert "In the frame of the machine: sum of" in " ".join(text.split())
+
+
+def test_a_result_stored_before_the_machine_frame_is_printed_as_it_was(found: RunUncertainty) -> None:
+    result = replace(results_of(as_stated(found), texts_of()), machine_frame=None)
+    document = to_document(result)
+    assert "machine_frame" not in document
+    printed = _printed(from_document(ResultSet, document), texts_of())
+    assert printed.parameter == "Parameter (ISO 230-1)"
+    assert printed.machine_frame is None
+
+
+def test_german_results_say_what_they_refer_to(found: RunUncertainty) -> None:
+    printed = _printed(results_of(as_stated(found), texts_of("de")), texts_of("de"))
+    rows = {row.name: row.description for row in printed.rows}
+    assert rows["EA0C"] == "Ausrichtung um X von Achse C, bezogen auf Achse B"
+    assert rows["EB0Z"].endswith(", im Koordinatensystem der Maschine")
+    assert printed.machine_frame is not None
+    assert [row[:2] for row in printed.machine_frame.rows] == [("EA0C", "EA0B + EA0C")]
+    assert "Im Koordinatensystem der Maschine (ISO 230-1:2012, 3.7" in printed.machine_frame.explained
 
 
 def test_the_attached_csv_holds_the_results_at_full_precision(guarded: Path, found: RunUncertainty) -> None:

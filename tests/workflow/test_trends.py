@@ -274,7 +274,7 @@ def test_los_2017_figure_4_6_without_its_first_hours_the_hot_machine_is_like_the
 def test_a_selection_is_a_group_and_feeds_the_uncertainty(campaigns: Database) -> None:
     within = stats(campaigns, StatisticsRequest("hot-cold", select="hot-cold-star"))
     assert within.groups == {"1": 33}
-    assert within.vector.manova.why == "groups names 1 group (1); 2 are needed."
+    assert within.vector.manova.why == "the runs form 1 group (1); at least 2 are needed"
     apart = stats(campaigns, StatisticsRequest("hot-cold", by="hot-cold-star"))
     assert apart.groups == {"hot-cold-star": 33, "not hot-cold-star": 11}
     assert apart.parameters["EYY"].anova_q < 1e-4

@@ -24,7 +24,9 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "text", nargs="?", metavar="TEXT", help="what happened; without it the events are listed"
     )
-    parser.add_argument("--at", metavar="TIME", help="ISO 8601 with an offset")
+    parser.add_argument(
+        "--at", metavar="TIME", help="when it happened, ISO 8601 with an offset; needed with TEXT"
+    )
     parser.add_argument(
         "--kind",
         default="note",

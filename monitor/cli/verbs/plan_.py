@@ -133,7 +133,7 @@ def _parameters(answer: BallPlanAnswer) -> None:
     )
     if proposed is not None:
         output.say(
-            "merit: what an hour of the proposed plan tells of the parameter, against the present plan"
+            "merit: information on the parameter in an hour of the proposed plan, relative to the present plan"
         )
     for name in (proposed or answer.present).refused:
         output.say(f"no number: this plan does not determine {name}")
@@ -150,7 +150,7 @@ def _proposed_cells(parameter: PlannedParameter) -> list[str]:
 
 def _indexations(plan: BallPlan) -> None:
     """Where the proposed plan probes, and where its new balls stand."""
-    output.say("indexations (whether the stylus gets there unhindered, only a look at the machine tells):")
+    output.say("indexations (check on the machine that the stylus can reach them):")
     for pose in plan.poses:
         output.say(f"   {_pose(pose)}")
     for name, position in plan.ball_places_mm.items():

@@ -10,6 +10,8 @@ from monitor.cli.parser import common
 from monitor.workflow.intake import campaigns
 
 EXAMPLE = "monitor runs five-days"
+#: What a table shows; every condition stands under the name that the folder gives it.
+COLUMNS = ("campaign", "machine", "run", "started_at_local", "day", "warm_up", "conditions")
 
 
 def options(parser: ArgumentParser) -> None:
@@ -23,7 +25,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
     else:
-        output.listing(answer.runs, "no run")
+        output.listing(answer.runs, "no run", COLUMNS)
         for note in answer.notes:
             output.say(f"note: {note}")
     return 0

@@ -18,14 +18,12 @@ def options(parser: ArgumentParser) -> None:
         "out", type=Path, metavar="OUT", help="the folder to make; its name is the campaign's"
     )
     parser.add_argument("--effect", metavar="EFFECT", help="what is hidden, for example EXX:reversal")
-    parser.add_argument(
-        "--peak", type=float, default=5.0, metavar="UM", help="its largest displacement (default 5 µm)"
-    )
+    parser.add_argument("--peak", type=float, metavar="UM", help="its largest displacement (default 5 µm)")
     parser.add_argument(
         "--noise",
         type=float,
         metavar="UM",
-        help="of a reading, standard deviation (1 µm; 20 µm of a tracker)",
+        help="standard deviation of the noise of a reading (1 µm; 20 µm of a tracker)",
     )
     parser.add_argument(
         "--robot", action="store_true", help="a robot seen by a tracker instead of a machine tool"

@@ -66,7 +66,7 @@ def run(options: Namespace) -> int:
         drift = answer.drift.parameters[name]
         output.say(
             f"{name} drifts within the day: {output.rounded(drift.per_hour, drift.u)} {drift.unit} "
-            f"(u = {output.two_digits(drift.u)} {drift.unit}, q = {output.probability(drift.q_value)})"
+            f"(u = {output.two_digits(drift.u)} {drift.unit}, {output.stated('q', drift.q_value)})"
         )
     tested = [p for p in answer.coordinates.anova_p if p is not None]
     if tested:

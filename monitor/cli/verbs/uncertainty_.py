@@ -9,6 +9,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.readers import read_linear_axes
+from monitor.reporting.frames import frame_words, sum_words
 from monitor.workflow.uncertainty.answer import MonteCarloAnswer, UncertaintyAnswer, ValidationAnswer
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
@@ -75,6 +76,7 @@ def run(options: Namespace) -> int:
         output.document(answer)
         return 0
     _parameters(answer)
+    _machine_frame(answer)
     _coverage(answer)
     if answer.mcm is not None:
         _monte_carlo(answer.mcm)
@@ -95,7 +97,8 @@ def _parameters(answer: UncertaintyAnswer) -> None:
     """The table of the parameters."""
     framework, sampled = answer.guf, answer.mcm
     of_sampled = ["u (Monte Carlo)"] if sampled is not None else []
-    columns = ["parameter", "unit", "estimate", "u (GUF)", *of_sampled, "U = k_q u"]
+    columns = ["parameter", "unit", "relative to", "estimate", "u (GUF)", *of_sampled, "U = k_q u"]
+    frames = answer.frames or {}
     rows = []
     for name in answer.parameters:
         expanded = framework.expanded[name]
@@ -103,13 +106,39 @@ def _parameters(answer: UncertaintyAnswer) -> None:
             [
                 name,
                 answer.units[name],
+                frame_words(frames.get(name)),
                 output.rounded(framework.estimate[name], expanded),
                 output.two_digits(framework.u[name]),
                 *([output.two_digits(sampled.u[name])] if sampled is not None else []),
                 output.rounded(expanded, expanded),
             ]
         )
-    output.table(f"{answer.campaign}, run {answer.run}, model {answer.model}", columns, rows, text_columns=2)
+    output.table(f"{answer.campaign}, run {answer.run}, model {answer.model}", columns, rows, text_columns=3)
+
+
+def _machine_frame(answer: UncertaintyAnswer) -> None:
+    """The location errors whose value in the machine frame is another than relative to the axis before."""
+    frame = answer.machine_frame
+    if frame is None or not frame.parameters:
+        return
+    if not frame.moved:
+        output.say("in the machine frame all location errors have these values")
+        return
+    columns = ["in the machine frame", "unit", "sum of", "value", "u"]
+    rows = [
+        [
+            name,
+            frame.units[name],
+            sum_words(frame.sums[name]),
+            output.rounded(frame.estimate[name], frame.u[name]),
+            output.two_digits(frame.u[name]),
+        ]
+        for name in frame.moved
+    ]
+    output.table("", columns, rows, text_columns=3)
+    output.say(
+        "the other location errors have the values above in the machine frame, too; --json has the covariance"
+    )
 
 
 def _coverage(answer: UncertaintyAnswer) -> None:

@@ -12,7 +12,7 @@ from monitor.effects.drivers.channel import Channel
 from monitor.effects.drivers.each_run import EachRun
 from monitor.effects.drivers.run_time import RunTime
 from monitor.effects.drivers.warmup import WarmUp
-from monitor.effects.registry import parse, plug_ins
+from monitor.effects.registry import parse, plug_in_patterns, plug_ins
 from monitor.exceptions import EffectError
 from monitor.units import COLUMN_UNITS, column_unit
 
@@ -31,6 +31,6 @@ def parse_driver(text: str) -> Driver:
         raise EffectError(
             f"there is no driver '@{text}'; there are @warmup (or @warmup45min), @run_time, @sequence, @gravity, "
             "@each_run and every recorded channel, whose name ends in a unit "
-            f"({', '.join('_' + suffix for suffix in COLUMN_UNITS)})"
+            f"({', '.join('_' + suffix for suffix in COLUMN_UNITS)}){plug_in_patterns('monitor.drivers')}"
         )
     return Channel(text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from monitor.effects.registry import parse, plug_ins
+from monitor.effects.registry import parse, plug_in_patterns, plug_ins
 from monitor.effects.shape import Shape
 from monitor.effects.shapes.compliance import Compliance
 from monitor.effects.shapes.const import Const
@@ -11,11 +11,12 @@ from monitor.effects.shapes.formula import FormulaShape
 from monitor.effects.shapes.harmonic import Harmonic
 from monitor.effects.shapes.nodes import Nodes, nodes_text
 from monitor.effects.shapes.poly import Poly
-from monitor.effects.shapes.reversal import Reversal
+from monitor.effects.shapes.reversal import REVERSAL_VALUE, Reversal, has_reversal_value
 from monitor.effects.shapes.table import TABLE_NODES, Table
 from monitor.exceptions import EffectError
 
 __all__ = [
+    "REVERSAL_VALUE",
     "TABLE_NODES",
     "Compliance",
     "Const",
@@ -26,6 +27,7 @@ __all__ = [
     "Poly",
     "Reversal",
     "Table",
+    "has_reversal_value",
     "nodes_text",
     "parse_shape",
 ]
@@ -38,6 +40,6 @@ def parse_shape(text: str) -> Shape:
         raise EffectError(
             f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic9999, cyclic20mm (any "
             "pitch), reversal, lag, compliance, table (or table9 for nine nodes, up to table99; table(-100,0,100) for "
-            "your own nodes) and formula(...)"
+            f"your own nodes) and formula(...){plug_in_patterns('monitor.shapes')}"
         )
     return shape

@@ -8,6 +8,7 @@ from typing import Any
 from markupsafe import Markup
 
 from monitor.reporting.certificate.completeness import check_complete
+from monitor.reporting.certificate.machine_frame import PrintedMachineFrame, printed_machine_frame
 from monitor.reporting.certificate.matrix import Block, correlation_blocks
 from monitor.reporting.certificate.pictures import Picture, beside, map_picture, pictures_of
 from monitor.reporting.certificate.record import CertificateRecord, ConformityStatement, MethodUsed
@@ -26,9 +27,11 @@ class PrintedResult:
 
     state: str
     k_q: str
+    parameter: str
     rows: tuple[Row, ...]
     widths: tuple[float, ...]
     explained: Markup
+    machine_frame: PrintedMachineFrame | None
     refused: tuple[Markup, ...]
     half_axes: Markup
     blocks: tuple[Block, ...]
@@ -90,12 +93,14 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
     k_q, k_p = written_factor(result.k_q, sign), written_factor(result.k_p, sign)
     half_axes = "; ".join(written_factor(axis, sign) for axis in result.half_axes)
     rows = result_rows(result, texts)
+    parameter = texts("page.parameter" if result.machine_frame is None else "page.parameter_referred")
     heads = (
-        texts("page.symbol"), texts("page.parameter"), texts("page.estimate"), "u", f"U = {k_q} u", texts("page.unit")
+        texts("page.symbol"), parameter, texts("page.estimate"), "u", f"U = {k_q} u", texts("page.unit")
     )  # fmt: skip
     return PrintedResult(
         state=result.state,
         k_q=k_q,
+        parameter=parameter,
         rows=rows,
         widths=result_widths(rows, heads),
         explained=texts.markup(
@@ -107,6 +112,7 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
             p=written_probability(result.p, sign),
             evaluation=result.evaluation,
         ),
+        machine_frame=printed_machine_frame(result.machine_frame, texts),
         refused=tuple(
             texts.markup(
                 "page.refused", parameters=", ".join(refusal.parameters), why=why_refused(refusal, texts)

@@ -13,8 +13,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from monitor.documents import OMITTED
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.certificate.machine_frame_result import MachineFrameResult
 from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
@@ -40,10 +42,11 @@ class ResultSet:
 
     ``state`` of the machine that they describe: as found, as left. ``estimate`` (m,), ``covariance`` (m, m) in
     products of the display units. ``k_q`` is the coverage factor of the hyper-rectangle, ``k_p`` that of the
-    hyper-ellipsoid of ``rank`` dimensions, both for probability ``p`` (JCGM 102:2011 6.5). ``evaluation``
-    names the way the uncertainty was found, with its clause. ``trials`` and ``validation`` belong to Monte
-    Carlo. ``tolerances`` (m,) are limits of absolute values, NaN where there is none. ``dof``: degrees of freedom of
-    the covariance, for which the factors hold (Student, Hotelling); not finite where it is known.
+    hyper-ellipsoid of ``rank`` dimensions, both for probability ``p`` (JCGM 102:2011 6.5). ``evaluation`` names the
+    way the uncertainty was found, with its clause. ``trials`` and ``validation`` belong to Monte Carlo.
+    ``tolerances`` (m,) are limits of absolute values, NaN where there is none. ``dof``: degrees of freedom of the
+    covariance, for which the factors hold (Student, Hotelling); not finite where it is known. ``machine_frame`` has
+    the location errors in the frame of the machine; None in a result of an earlier version.
     """
 
     state: str
@@ -63,6 +66,7 @@ class ResultSet:
     validation: str | None = None
     tolerances: Array | None = None
     dof: float = math.inf
+    machine_frame: MachineFrameResult | None = field(default=None, metadata=OMITTED)
 
     @property
     def u(self) -> Array:
@@ -135,6 +139,7 @@ class ResultStatements:
     validation: str | None = None
     tolerances: Mapping[str, float] | None = None
     descriptions: Mapping[str, str] = field(default_factory=dict)
+    machine_frame: MachineFrameResult | None = None
 
 
 def result_set(
@@ -182,6 +187,7 @@ def result_set(
         validation=statements.validation,
         tolerances=None if limits is None else np.array([limits.get(name, math.nan) for name in names]),
         dof=factors.dof,
+        machine_frame=statements.machine_frame,
     )
 
 

@@ -27,6 +27,8 @@ def path_of(out: Path | None, number: str) -> Path:
     name = f"certificate-{number}.pdf".replace("/", "-").replace("\\", "-")
     if out is None:
         return Path(name)
+    if out.suffix and out.suffix.lower() != ".pdf" and not out.is_dir():
+        raise InputError(f"--out {out}: a certificate is a PDF; name a file ending in .pdf, or a folder")
     return out if out.suffix.lower() == ".pdf" else out / name
 
 

@@ -7,7 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.machine import Chain
+from monitor.methods.model import chain_of
 from monitor.records import Array
+from monitor.reporting.certificate.machine_frame_result import MachineFrameResult
 from monitor.reporting.certificate.results import (
     CoverageFactors,
     JointEstimate,
@@ -17,11 +20,14 @@ from monitor.reporting.certificate.results import (
     result_set,
 )
 from monitor.reporting.covariance_source import covariance_sentence
+from monitor.reporting.frames import referred
 from monitor.reporting.numbers import decimal_of, round_to_place, written_factor
+from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 from monitor.store import Database, check_analysis, stored_analyses
 from monitor.units import MICROMETRE, Unit
 from monitor.workflow.uncertainty.answer import MonteCarloAnswer, UncertaintyAnswer
+from monitor.workflow.uncertainty.machine_frame import frames_of, in_machine_frame
 from monitor.workflow.uncertainty.stored import KIND, StatedUncertainty, restored
 
 #: What two evaluations of the same readings may differ by, relative to u: the last digits of double precision.
@@ -116,6 +122,8 @@ def results_of(
         if not np.isfinite(evaluated.dof):
             factors = replace(factors, k_p=monte_carlo.mcm.k_p, k_q=monte_carlo.mcm.k_q)
     limits = evaluated.campaign.machine.tolerances
+    chain = chain_of(evaluated.campaign.machine)
+    frames = frames_of(evaluated.names, chain)
     return result_set(
         # In display units already.
         JointEstimate(evaluated.names, [Unit(unit, 1.0) for unit in evaluated.units], estimate, covariance),
@@ -132,10 +140,42 @@ def results_of(
             ),
             trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
             validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
+            descriptions={
+                name: referred(describe(name, texts), frames.get(name), texts) for name in evaluated.names
+            },
+            machine_frame=_in_machine_frame(evaluated, chain, estimate, covariance),
             tolerances={name: limits[name] for name in limits if name in evaluated.names} or None,
         ),
         texts,
     )
+
+
+def _in_machine_frame(
+    evaluated: StatedUncertainty, chain: Chain, estimate: Array, covariance: Array
+) -> MachineFrameResult:
+    answer = evaluated.answer
+    unknown = [name for refused in answer.refused for name in refused.parameters]
+    frame = in_machine_frame(evaluated.names, estimate, covariance, chain, unknown)
+    return MachineFrameResult(
+        names=frame.parameters,
+        units=tuple(frame.units[name] for name in frame.parameters),
+        estimate=np.array([frame.estimate[name] for name in frame.parameters]),
+        covariance=frame.covariance,
+        sums=frame.sums,
+        k=_single_factor(evaluated),
+        p=answer.p,
+    )
+
+
+def _single_factor(evaluated: StatedUncertainty) -> float:
+    """The coverage factor of one number by itself; that of the answer where it has one."""
+    frame = evaluated.answer.machine_frame
+    if frame is not None and frame.k is not None:
+        return frame.k
+    # An answer of before there was one. Loaded here: what states a stored result waits for no library of formulas.
+    from monitor.uncertainty.coverage import single_factor
+
+    return single_factor(evaluated.answer.p, evaluated.fewest_dof)
 
 
 def _certifiable(evaluated: StatedUncertainty, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:

@@ -51,6 +51,7 @@ class MachineMissing:
     data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart. Where the catalogue does
     not have the shape of the effect, ``shape_unknown`` says so, ``nearest_shape`` is the entry that comes closest, and
     ``curve`` the shape in ``unit``, without the constant and the slope that every run has of its own.
+    ``reversal_value`` of a play (ISO 230-2) is twice its amplitude: what a backlash compensation is set to.
     """
 
     rank: int
@@ -80,6 +81,7 @@ class MachineMissing:
     nearest_shape: str | None
     curve: tuple[CurvePoint, ...]
     searched: SearchedValue | None = field(default=None, metadata=OMITTED)
+    reversal_value: Estimate | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

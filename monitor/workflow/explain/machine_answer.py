@@ -30,6 +30,7 @@ from monitor.workflow.explain.shared_answer import (
     rivals,
     searched_value,
 )
+from monitor.workflow.identify.answer import Estimate, reversal_value
 
 
 def micrometres(length: float | None) -> float | None:
@@ -107,6 +108,9 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         nearest_shape=effect.nearest,
         curve=_curve(effect, unit),
         searched=searched_value(effect),
+        reversal_value=reversal_value(
+            effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
+        ),
     )
 
 

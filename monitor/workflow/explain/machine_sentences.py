@@ -23,8 +23,8 @@ GROSS = (
     "unit, or the geometry in campaign.toml; of the simple mistakes that were tried none alone explains it. "
 )
 ONE_RUN = (
-    "with one run nobody can say what varies from run to run, what stepped between runs, or how well a reading "
-    "repeats; measure the same plan again"
+    "one run cannot show what varies from run to run, what stepped between runs, or how well a reading repeats; "
+    "measure the same plan again"
 )
 
 

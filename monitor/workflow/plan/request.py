@@ -31,5 +31,10 @@ class PlanRequest:
     def __post_init__(self) -> None:
         if self.balls is not None and not 1 <= self.balls <= MOST_BALLS:
             raise InputError(f"--balls {self.balls}: choose 1 to {MOST_BALLS}")
+        if self.wanted and (self.balls is not None or self.poses is not None):
+            raise InputError(
+                "--wanted looks for the quickest plan that reaches an uncertainty, --balls and --poses for the best "
+                "plan of a size; name one of them"
+            )
         if self.separate is not None and self.separate[0] == self.separate[1]:
             raise InputError(f"--separate {','.join(self.separate)}: name two different effects")

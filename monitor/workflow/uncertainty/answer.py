@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from monitor.documents import OMITTED
-from monitor.records import Array
+from monitor.records import Array, FrameOfReference
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.reporting.refused import RefusedParameters
+from monitor.workflow.uncertainty.machine_frame import MachineFrameAnswer
 from monitor.workflow.uncertainty.request import Asked
 
 
@@ -104,9 +105,10 @@ class UncertaintyAnswer:
     """The uncertainty of one run's geometric errors.
 
     ``units`` are the display units by parameter. ``input_covariance`` says in a sentence where the covariance of the
-    readings comes from, ``input_covariance_source`` as data; None in an answer that an earlier version stored, until it
-    is restored (``stored.restored``). ``refused`` are parameters without a number. ``mcm`` and ``validation`` are left
-    out where no Monte Carlo was asked for.
+    readings comes from, ``input_covariance_source`` as data; None in an answer that an earlier version stored, until
+    it is restored (``stored.restored``). ``frames`` say what each parameter of the chain is stated relative to,
+    ``machine_frame`` has the location errors in the frame of the machine; None in earlier answers. ``refused`` are
+    parameters without a number. ``mcm`` and ``validation`` are left out where no Monte Carlo was asked for.
     """
 
     campaign: str
@@ -122,6 +124,8 @@ class UncertaintyAnswer:
     refused: tuple[RefusedParameters, ...]
     residuals: RunResiduals
     guf: FrameworkAnswer
+    frames: Mapping[str, FrameOfReference] | None = field(default=None, metadata=OMITTED)
+    machine_frame: MachineFrameAnswer | None = field(default=None, metadata=OMITTED)
     lack_of_fit_causes: tuple[LackOfFitCause, ...] | None = field(default=None, metadata=OMITTED)
     mcm: MonteCarloAnswer | None = field(default=None, metadata=OMITTED)
     validation: ValidationAnswer | None = field(default=None, metadata=OMITTED)

@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from monitor.discovery import Verdict, compare
+from monitor.machine import Chain
+from monitor.methods.model import chain_of
 from monitor.records import Array
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.reporting.refused import refused_parameters
-from monitor.uncertainty.coverage import ellipsoid_factor, joint_coverage, rectangle_factor
+from monitor.uncertainty.coverage import ellipsoid_factor, joint_coverage, rectangle_factor, single_factor
 from monitor.uncertainty.validation import Comparison, Validation
 from monitor.units import MICROMETRE
 from monitor.workflow.models import label
@@ -23,6 +25,7 @@ from monitor.workflow.uncertainty.answer import (
     UncertaintyAnswer,
     ValidationAnswer,
 )
+from monitor.workflow.uncertainty.machine_frame import MachineFrameAnswer, frames_of, in_machine_frame
 from monitor.workflow.uncertainty.result import RunUncertainty
 
 #: So many effects that lack of fit may come from are named.
@@ -38,6 +41,7 @@ def answer_of(result: RunUncertainty) -> UncertaintyAnswer:
 
 def statement(result: RunUncertainty) -> UncertaintyAnswer:
     """As ``answer_of``, without what k = 2 each covers: half a second of sampling that no certificate states."""
+    chain = chain_of(result.campaign.machine)
     causes = tuple(LackOfFitCause(effect, probability) for effect, probability in result.causes[:MOST_CAUSES])
     return UncertaintyAnswer(
         campaign=result.campaign.name,
@@ -53,10 +57,22 @@ def statement(result: RunUncertainty) -> UncertaintyAnswer:
         refused=tuple(map(refused_parameters, result.refused)),
         residuals=_residuals(result),
         guf=_framework(result),
+        frames=frames_of(result.framework.names, chain),
+        machine_frame=_in_machine_frame(result, chain),
         lack_of_fit_causes=causes or None,
         mcm=_monte_carlo(result),
         validation=None if result.validation is None else _validation(result, result.validation),
     )
+
+
+def _in_machine_frame(result: RunUncertainty, chain: Chain) -> MachineFrameAnswer:
+    framework = result.framework
+    factors = np.array([unit.factor for unit in result.units])
+    covariance = framework.correlation * np.outer(framework.u / factors, framework.u / factors)
+    unknown = [name for refusal in result.refused for name in refusal.parameters]
+    frame = in_machine_frame(framework.names, framework.estimate / factors, covariance, chain, unknown)
+    fewest = float(np.min(framework.dof_by_output, initial=np.inf))
+    return replace(frame, k=single_factor(framework.p, fewest))
 
 
 def _displayed(result: RunUncertainty, values: Iterable[float]) -> dict[str, float]:

@@ -1,0 +1,105 @@
+"""One campaign of a database, and everything that can be asked about it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from monitor.api.answer import Answer
+from monitor.api.asking import Ask, drawn
+from monitor.api.tables import parameter_table, run_table, table_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from monitor.workflow.certificate.answer import CertificateFileAnswer
+    from monitor.workflow.explain.compare_answer import CompareAnswer
+    from monitor.workflow.explain.explain_answer import ExplainAnswer
+    from monitor.workflow.model.answer import ChangeModelAnswer
+    from monitor.workflow.run_statistics.answer import StatisticsAnswer
+    from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+    from monitor.workflow.volumetric.answer import VolumetricAnswer
+
+
+class Campaign:
+    """A campaign by its ``name``; made by ``Database.campaign``, which says what exists where there is none."""
+
+    def __init__(self, ask: Ask, name: str, machine: str, method: str) -> None:
+        self._ask = ask
+        self.name = name
+        self.machine = machine
+        self.method = method
+
+    def runs(self) -> pd.DataFrame:
+        """Return the runs with their conditions, by number of the run; times in UTC and by the shop's clock."""
+        return run_table(self._ask("runs", campaign=self.name))
+
+    def readings(self) -> pd.DataFrame:
+        """Return every reading: axes in mm and degrees; ``attrs["meanings"]`` says what the columns are."""
+        return table_of(self._ask("readings", campaign=self.name))
+
+    def parameters(self, model: str | None = None, *, wide: bool = True) -> pd.DataFrame:
+        """Identify every run and return its parameters: a column each, ``u(...)`` beside it, ``attrs["units"]``.
+
+        ``wide=False``: a row for every run and parameter, with value, u and unit.
+        """
+        return parameter_table(self._ask("identify", campaign=self.name, model=model), wide=wide)
+
+    def statistics(self, **options: Any) -> Answer[StatisticsAnswer]:
+        """Compare the runs: scatter by day and pooled, homogeneity, components of variance (``StatisticsRequest``)."""
+        return drawn(self._ask, "statistics", campaign=self.name, **options)
+
+    def compare(self, model: str | None = None) -> Answer[CompareAnswer]:
+        """Compare the model with the measurements: where does it fail?"""
+        return drawn(self._ask, "compare", campaign=self.name, model=model)
+
+    def explain(self, model: str | None = None, **options: Any) -> Answer[ExplainAnswer]:
+        """Search for the physical effects that the model lacks (``ExplainRequest``)."""
+        return drawn(self._ask, "explain", campaign=self.name, model=model, **options)
+
+    def add(
+        self, effect: str, name: str | None = None, *, to: str | None = None, note: str = ""
+    ) -> Answer[ChangeModelAnswer]:
+        """Add an effect to the model ``to`` (by default the method's own); the answer has the error before and after.
+
+        ``name`` is that of the new model; without one the name ``to`` means the new version from now on.
+        """
+        model = self.method if to is None else to
+        return Answer(
+            self._ask("add effect", effect=effect, to=model, new_name=name, note=note, campaign=self.name)
+        )
+
+    def uncertainty(self, run: int | None = None, **options: Any) -> Answer[UncertaintyAnswer]:
+        """Evaluate the uncertainty of one run, the last by default, after JCGM 102 (``UncertaintyRequest``)."""
+        return Answer(self._ask("uncertainty", campaign=self.name, run=run, **options))
+
+    def map(self, run: int | None = None, **options: Any) -> Answer[VolumetricAnswer]:
+        """Evaluate the volumetric error over the strokes with its uncertainty (``VolumetricRequest``)."""
+        return drawn(self._ask, "map", campaign=self.name, run=run, **options)
+
+    def certificate(
+        self, laboratory: str | Path, run: int | None = None, *, out: str | Path = ".", **options: Any
+    ) -> Answer[CertificateFileAnswer]:
+        """Issue a calibration certificate as PDF into ``out`` (``CertificateRequest``).
+
+        ``laboratory`` is the TOML file of what the laboratory states. Raises InputError with all that is missing.
+        """
+        return Answer(
+            self._ask(
+                "issue certificate",
+                campaign=self.name,
+                run=run,
+                laboratory=Path(laboratory),
+                out=Path(out),
+                **options,
+            )
+        )
+
+    def __repr__(self) -> str:
+        return f"Campaign('{self.name}') of {self.machine}, method {self.method}"
+
+    def _repr_html_(self) -> str:
+        """Return the name and the runs, as a notebook shows them."""
+        from html import escape
+
+        return f"<p>{escape(repr(self))}</p>{self.runs()._repr_html_()}"  # type: ignore[operator]

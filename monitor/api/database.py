@@ -1,0 +1,139 @@
+"""An open database with its machines and campaigns."""
+
+from __future__ import annotations
+
+import difflib
+import getpass
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from monitor import store
+from monitor.api.answer import Answer
+from monitor.api.asking import Ask, drawn
+from monitor.api.campaign import Campaign
+from monitor.api.tables import main_table, table_of
+from monitor.exceptions import InputError, NotFoundError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from monitor.workflow.fleet import FleetAnswer
+    from monitor.workflow.health.request import ReportAnswer
+    from monitor.workflow.intake.importing import ImportAnswer
+    from monitor.workflow.model.answer import ModelsAnswer
+    from monitor.workflow.simulation import SimulateAnswer
+    from monitor.workflow.trend.answer import TrendAnswer
+
+
+class Database:
+    """An open database; close it, or use it in a ``with`` statement: other processes wait meanwhile."""
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        actor = ""
+        with suppress(OSError, KeyError):  # a container may run under a number that has no name
+            actor = getpass.getuser()
+        self._store = store.Database(path, read_only=read_only, threads=1, actor=actor)
+        self._ask = Ask(self._store)
+        self.path = Path(path)
+
+    def __enter__(self) -> Database:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, fault: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; other processes can open it then."""
+        self._store.close()
+
+    def add(self, *folders: str | Path) -> Answer[ImportAnswer]:
+        """Import campaign folders, all or nothing each. Raises CampaignError with every fault of a folder."""
+        if not folders:
+            raise InputError("name a campaign folder or more")
+        return Answer(self._ask("import", folders=[Path(folder) for folder in folders]))
+
+    def machines(self) -> pd.DataFrame:
+        """Return the machines: topology, manufacturer, number of campaigns, latest run."""
+        return table_of(self._ask("machines"))
+
+    def campaigns(self) -> pd.DataFrame:
+        """Return the campaigns in the order of import."""
+        return main_table(self._ask("campaigns"))
+
+    def campaign(self, name: str) -> Campaign:
+        """Return one campaign. Raises NotFoundError with the nearest name, or those that there are."""
+        rows = {row.campaign: row for row in self._ask("campaigns").campaigns}
+        if name not in rows:
+            raise NotFoundError(_no_campaign(name, list(rows)))
+        return Campaign(self._ask, name, rows[name].machine, rows[name].method)
+
+    def models(self) -> Answer[ModelsAnswer]:
+        """List the models and their versions."""
+        return Answer(self._ask("models"))
+
+    def trend(self, machine: str, **options: Any) -> Answer[TrendAnswer]:
+        """Follow the parameters of a machine: drift, changes, alarms, forecast (``TrendRequest``)."""
+        return drawn(self._ask, "trend", machine=machine, **options)
+
+    def fleet(self, **options: Any) -> Answer[FleetAnswer]:
+        """List every machine and parameter, the most urgent first (``FleetRequest``)."""
+        return Answer(self._ask("fleet", **options))
+
+    def report(
+        self, week: str | None = None, *, out: str | Path = ".", **options: Any
+    ) -> Answer[ReportAnswer]:
+        """Write the weekly health report as HTML and PDF into ``out`` (``ReportRequest``)."""
+        return Answer(self._ask("report", week=week, out=Path(out), **options))
+
+    def sql(self, query: str, limit: int | None = None) -> pd.DataFrame:
+        """Return the rows of a query that only reads. Raises InputError for any other."""
+        return table_of(self._ask("sql", query=query, limit=limit))
+
+    def ask(self, question: str, **options: Any) -> Answer[Any]:
+        """Ask any question of the contract by its name, such as ``ask("plan", campaign="five-days")``.
+
+        Raises InputError for a question that there is not.
+        """
+        from monitor.workflow.contract import QUESTIONS
+
+        if question not in QUESTIONS:
+            raise InputError(f"there is no question '{question}'; there are {', '.join(QUESTIONS)}")
+        return Answer(self._ask(question, **options))
+
+    def __repr__(self) -> str:
+        return f"Database('{self.path}')"
+
+    def _repr_html_(self) -> str:
+        """Return the campaigns, as a notebook shows them."""
+        return f"<p>{self.path}</p>{self.campaigns()._repr_html_()}"  # type: ignore[operator]
+
+
+def _no_campaign(name: str, names: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, names, n=1)
+    if near:
+        return f"there is no campaign '{name}'; did you mean '{near[0]}'?"
+    listed = ", ".join(names) if names else "none yet: add(FOLDER) imports one"
+    return f"there is no campaign '{name}'; there are {listed}"
+
+
+def open(path: str | Path, *, new: bool = False, read_only: bool = False) -> Database:
+    """Open a database file; ``new`` makes one where there is none.
+
+    Raises NotFoundError for a file that is not there, StoreError for one that is no database or is in use.
+    """
+    path = Path(path)
+    if not new and not path.exists():
+        raise NotFoundError(f"there is no database {path}; open('{path}', new=True) makes one")
+    return Database(path, read_only=read_only)
+
+
+def simulate(out: str | Path, **options: Any) -> Answer[SimulateAnswer]:
+    """Write a virtual campaign folder with or without a hidden effect (``SimulateRequest``)."""
+    from monitor.workflow.simulation import SimulateRequest, simulate
+
+    return Answer(simulate(SimulateRequest(Path(out), **options)))

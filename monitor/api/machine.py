@@ -1,0 +1,85 @@
+"""The kinematic model of a machine alone: where the tool is, with and without geometric errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from monitor.records import Array
+from monitor.workflow.kinematics import PosesAnswer, PosesRequest, poses
+
+Point = tuple[float, float, float]
+
+
+class Machine:
+    """A machine by its topology, from the workpiece to the tool: ``Machine("w C B X b Z Y (C1) t")``.
+
+    Raises InputError for a topology that cannot be read.
+    """
+
+    def __init__(self, topology: str) -> None:
+        # One pose at zero: the topology is checked where it is written.
+        answer = poses(PosesRequest(topology, {_first_axis(topology): (0.0,)}))
+        self.topology = answer.topology
+        self.axes = answer.axes
+        self.base = answer.base
+
+    def deviation(
+        self,
+        errors: Mapping[str, float | Sequence[float]],
+        *,
+        tool: Point = (0.0, 0.0, 0.0),
+        target: Point = (0.0, 0.0, 0.0),
+        **readings: float | Sequence[float] | Array,
+    ) -> Array:
+        """Return what the errors do at n poses: (n, 3) in µm, tool against workpiece, seen from the last work axis.
+
+        ``errors`` in µm, µrad and µm/m by effect, such as ``{"EC0B": 20, "EXX:poly1": 15}``; ``readings`` in mm and
+        degrees by axis, numbers or arrays of one length, such as ``X=[0, 100], B=30``; ``tool`` and ``target`` in mm
+        in the frames of the last axes. Exact: nothing is linearised. Raises InputError, EffectError.
+        """
+        return self._poses(errors, tool, target, readings).deviation_um
+
+    def vector(
+        self,
+        errors: Mapping[str, float | Sequence[float]] | None = None,
+        *,
+        tool: Point = (0.0, 0.0, 0.0),
+        target: Point = (0.0, 0.0, 0.0),
+        **readings: float | Sequence[float] | Array,
+    ) -> Array:
+        """Return the vector from target to tool tip (n, 3) in mm, in the frame of the last work axis."""
+        return self._poses(errors or {}, tool, target, readings).vector_mm
+
+    def _poses(
+        self,
+        errors: Mapping[str, float | Sequence[float]],
+        tool: Point,
+        target: Point,
+        readings: Mapping[str, float | Sequence[float] | Array],
+    ) -> PosesAnswer:
+        columns = {axis: np.atleast_1d(np.asarray(values, dtype=float)) for axis, values in readings.items()}
+        count = max((len(values) for values in columns.values()), default=1)
+        columns = {
+            axis: np.repeat(values, count) if len(values) == 1 else values for axis, values in columns.items()
+        }
+        columns = columns or {self.axes[0]: np.zeros(1)}
+        return poses(
+            PosesRequest(
+                self.topology,
+                {axis: tuple(values.tolist()) for axis, values in columns.items()},
+                {text: tuple(np.atleast_1d(values).tolist()) for text, values in errors.items()},
+                tool,
+                target,
+            )
+        )
+
+    def __repr__(self) -> str:
+        return f"Machine('{self.topology}'): axes {', '.join(self.axes)}; errors {', '.join(self.base)}"
+
+
+def _first_axis(topology: str) -> str:
+    """Return the first axis of a topology as typed, for a pose at zero."""
+    names = [part.strip("()") for part in topology.replace("[", " ").replace("]", " ").split()]
+    return next((name for name in names if name[:1].isupper() and name not in ("V",)), "X")

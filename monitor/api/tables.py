@@ -1,0 +1,140 @@
+"""Answers as tables: the main rows of each kind of answer, with the units of the columns in ``attrs``."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from datetime import date, datetime
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+from monitor.documents import inlined_parts
+from monitor.exceptions import InputError
+from monitor.units import column_unit
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from monitor.workflow.identify.answer import IdentifyAnswer
+    from monitor.workflow.intake.campaigns import RunsAnswer
+    from monitor.workflow.query import TableAnswer
+
+#: Where the main rows of an answer are, the first that it has.
+MAIN_ROWS = (
+    "missing", "table", "parameters", "versions", "models", "effects", "runs", "campaigns", "imported",
+    "selections", "certificates", "machines", "entries",
+)  # fmt: skip
+SCALARS = (str, int, float, bool, date, datetime, type(None))
+
+
+def main_table(content: object) -> pd.DataFrame:
+    """Return the main rows of an answer. Raises InputError where it is no list of rows."""
+    # Loaded here: who asks for no table waits for no table engine.
+    import pandas as pd
+
+    if hasattr(content, "columns") and hasattr(content, "rows"):
+        return table_of(content)  # type: ignore[arg-type]
+    if hasattr(content, "guf"):
+        return _uncertainties(content)
+    parts = inlined_parts(content)
+    for name in MAIN_ROWS:
+        rows = next((value for part in parts if (value := getattr(part, name, None)) is not None), None)
+        if isinstance(rows, Mapping) and rows:
+            records = {key: _scalars(record) for key, record in rows.items()}
+            if all(records.values()):
+                return _with_units(pd.DataFrame.from_dict(records, orient="index"))
+        if isinstance(rows, tuple) and rows and dataclasses.is_dataclass(rows[0]):
+            return _with_units(pd.DataFrame([_scalars(record) for record in rows]))
+        if rows == ():
+            return pd.DataFrame()
+    groups = next((value for part in parts if isinstance(value := getattr(part, "by", None), Mapping)), None)
+    if groups is not None:
+        parts_by = ((kind, name, part) for kind, group in groups.items() for name, part in group.items())
+        return _with_units(
+            pd.DataFrame([{"by": kind, "of": name, **_scalars(part)} for kind, name, part in parts_by])
+        )
+    raise InputError(f"{type(content).__name__} is no list of rows; its fields are attributes, or to_dict()")
+
+
+def table_of(answer: TableAnswer) -> pd.DataFrame:
+    """Return the table of an answer that is one; ``attrs`` has what the columns mean."""
+    import pandas as pd
+
+    frame = pd.DataFrame(list(answer.rows), columns=list(answer.columns))
+    for column, kind in zip(answer.columns, answer.types, strict=True):
+        if kind.startswith("TIMESTAMP") or kind == "DATE":
+            frame[column] = pd.to_datetime(frame[column])
+    frame.attrs["meanings"] = {
+        name: answer.meanings[name] for name in answer.columns if name in answer.meanings
+    }
+    return _with_units(frame)
+
+
+def run_table(answer: RunsAnswer) -> pd.DataFrame:
+    """Return the runs by number, a column for each condition."""
+    import pandas as pd
+
+    rows = [{**_scalars(run), **run.conditions} for run in answer.runs]
+    frame = pd.DataFrame(rows).drop(columns=["ambient_degc"], errors="ignore")
+    return _with_units(frame.set_index("run") if rows else frame)
+
+
+def parameter_table(answer: IdentifyAnswer, *, wide: bool) -> pd.DataFrame:
+    """Return the identified parameters of every run: a column each and u(...) beside it, or a row each."""
+    import pandas as pd
+
+    rows = [
+        {"run": run.run, "parameter": name, "value": estimate.value, "u": estimate.u, "unit": estimate.unit}
+        for run in answer.runs
+        for name, estimate in run.parameters.items()
+    ]
+    frame = pd.DataFrame(rows, columns=["run", "parameter", "value", "u", "unit"])
+    if not wide:
+        return frame
+    names = list(dict.fromkeys(frame["parameter"]))
+    units = dict(zip(frame["parameter"], frame["unit"], strict=True))
+    values = frame.pivot(index="run", columns="parameter", values="value")
+    u = frame.pivot(index="run", columns="parameter", values="u")
+    columns = {}
+    for name in names:
+        columns[name], columns[f"u({name})"] = values[name], u[name]
+    table = pd.DataFrame(columns)
+    table.attrs["units"] = {key: units[name] for name in names for key in (name, f"u({name})")}
+    return table
+
+
+def _uncertainties(answer: Any) -> pd.DataFrame:
+    """Return estimate, standard and expanded uncertainty of each parameter, of the Monte Carlo where there is one."""
+    import pandas as pd
+
+    columns = {"estimate": answer.guf.estimate, "u": answer.guf.u, "expanded": answer.guf.expanded}
+    if answer.mcm is not None:
+        columns |= {"estimate_mcm": answer.mcm.estimate, "u_mcm": answer.mcm.u}
+    frame = pd.DataFrame(columns).reindex(list(answer.parameters))
+    frame["unit"] = [answer.units[name] for name in answer.parameters]
+    frame.attrs["correlation"] = answer.guf.correlation
+    return frame
+
+
+def _scalars(record: object) -> dict[str, Any]:
+    """Return the fields of a record that one cell can hold."""
+    if not dataclasses.is_dataclass(record):
+        return {}
+    values = (
+        (field.name, getattr(part, field.name))
+        for part in inlined_parts(record)
+        for field in dataclasses.fields(part)  # type: ignore[arg-type]
+    )
+    plain = ((name, value.value if isinstance(value, Enum) else value) for name, value in values)
+    return {name: value for name, value in plain if isinstance(value, SCALARS)}
+
+
+def _with_units(frame: pd.DataFrame) -> pd.DataFrame:
+    """Note the unit of every column whose name ends in one."""
+    frame.attrs["units"] = {name: unit for name in frame.columns if (unit := _unit(str(name)))}
+    return frame
+
+
+def _unit(column: str) -> str:
+    unit = column_unit(column)
+    return "" if unit is None else unit.name

@@ -1,0 +1,95 @@
+"""Runs a query of the user's own, which may read and change nothing, and lists machines and readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import duckdb
+
+from monitor.exceptions import InputError
+from monitor.store.connection import Database
+
+
+@dataclass(frozen=True)
+class QueryResult:
+    """The columns of a query by name and type, and its rows; ``truncated`` where more rows were there."""
+
+    columns: tuple[str, ...]
+    types: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+    truncated: bool
+
+
+@contextmanager
+def _reading(connection: duckdb.DuckDBPyConnection) -> Iterator[None]:
+    connection.execute("BEGIN TRANSACTION READ ONLY")
+    try:
+        yield
+    finally:
+        connection.execute("ROLLBACK")
+
+
+def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
+    """Run one SELECT, SHOW or DESCRIBE; at most ``limit`` rows.
+
+    Raises InputError for anything else, and for what DuckDB does not understand, with its own words.
+    """
+    with db.connected() as connection:
+        try:
+            statements = connection.extract_statements(text)
+        except duckdb.Error as fault:
+            raise InputError(f"this is no SQL that DuckDB understands: {fault}") from fault
+        if len(statements) != 1:
+            raise InputError(f"type one query; these are {len(statements)}")
+        # EXPLAIN ANALYZE would run what it explains.
+        if statements[0].type != duckdb.StatementType.SELECT:
+            raise InputError(
+                "a query may only read: begin it with SELECT, WITH, FROM, SHOW, DESCRIBE or SUMMARIZE"
+            )
+        with _reading(connection):
+            try:
+                cursor = connection.execute(statements[0])
+                rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit + 1)
+            except duckdb.Error as fault:
+                raise InputError(f"the query cannot be answered: {fault}") from fault
+            columns = tuple(str(column[0]) for column in cursor.description or ())
+            types = tuple(str(column[1]) for column in cursor.description or ())
+    truncated = limit is not None and len(rows) > limit
+    return QueryResult(columns, types, tuple(map(tuple, rows[:limit])), truncated)
+
+
+def campaign_readings(db: Database, campaign: str) -> QueryResult:
+    """List the readings of a campaign, run by run in the order of measurement, without the columns that name it.
+
+    Columns that hold nothing in this campaign are left out.
+    """
+    names = [name for (name,) in db.rows("SELECT column_name FROM (DESCRIBE v_probings)")]
+    wanted = [name for name in names if name not in ("campaign", "machine")]
+    counts = db.rows(
+        f"SELECT {', '.join(f'count({name})' for name in wanted)} FROM v_probings WHERE campaign = ?",
+        [campaign],
+    )[0]
+    present = tuple(name for name, count in zip(wanted, counts, strict=True) if count)
+    rows = db.rows(
+        f"SELECT {', '.join(present)} FROM v_probings WHERE campaign = ? ORDER BY run, sequence", [campaign]
+    )
+    types = dict(db.rows("SELECT column_name, column_type FROM (DESCRIBE v_probings)"))
+    return QueryResult(present, tuple(types[name] for name in present), tuple(rows), truncated=False)
+
+
+def list_machines(db: Database) -> QueryResult:
+    """List the machines as the view ``v_machines`` has them."""
+    return run_query(db, "SELECT * FROM v_machines ORDER BY machine")
+
+
+def column_comments(db: Database, table: str) -> dict[str, str]:
+    """Return what the comments say of the columns of a table or view, with the unit in brackets."""
+    return dict(
+        db.rows(
+            "SELECT column_name, comment FROM duckdb_columns() WHERE table_name = ? AND comment NOT NULL",
+            [table],
+        )
+    )

@@ -1,0 +1,203 @@
+"""The Python interface: the same answers as the command line's, as tables with units, refusals that help."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import monitor as mm
+from monitor.cli import main
+from monitor.exceptions import CampaignError, EffectError, InputError, NotFoundError
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+HIDDEN = "hidden-spindle-growth"
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("api") / "shop.duckdb"
+    with mm.open(path, new=True) as db:
+        answer = db.add(EXAMPLES / "five-days", EXAMPLES / HIDDEN)
+    assert answer.table()["campaign"].tolist() == ["five-days", HIDDEN]
+    return path
+
+
+@pytest.fixture
+def db(path: Path) -> Iterator[mm.Database]:
+    with mm.open(path) as opened:
+        yield opened
+
+
+def test_machines_campaigns_runs_and_readings_are_tables(db: mm.Database) -> None:
+    assert db.machines()["machine"].tolist() == ["HU40-T"]
+    assert db.campaigns()["campaign"].tolist() == ["five-days", HIDDEN]
+    campaign = db.campaign("five-days")
+    assert repr(campaign) == "Campaign('five-days') of HU40-T, method samba"
+    runs = campaign.runs()
+    assert runs.index.tolist() == list(range(1, 21))
+    assert runs.attrs["units"]["ambient_degC"] == "°C"
+    readings = campaign.readings()
+    # Against the file itself.
+    lines = (EXAMPLES / "five-days/probings.csv").read_text("utf-8").splitlines()
+    assert len(readings) == len(lines) - 1
+    first = dict(zip(lines[0].split(","), lines[1].split(","), strict=True))
+    assert readings["x_mm"][0] == float(first["x_mm"])
+    assert readings.attrs["units"]["b_deg"] == "°"
+    assert "mm" in readings.attrs["meanings"]["x_mm"]
+
+
+def test_parameters_are_those_that_the_command_line_prints(
+    db: mm.Database, path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = db.campaign("five-days").parameters()
+    rows = db.campaign("five-days").parameters(wide=False)
+    db.close()
+    assert main(["--db", str(path), "identify", "five-days", "--json"]) == 0
+    runs = json.loads(capsys.readouterr().out)["runs"]
+    for run in runs:
+        for name, estimate in run["parameters"].items():
+            assert table.loc[run["run"], name] == estimate["value"]
+            assert table.loc[run["run"], f"u({name})"] == estimate["u"]
+            assert table.attrs["units"][name] == estimate["unit"]
+    assert len(rows) == sum(len(run["parameters"]) for run in runs)
+
+
+def test_the_missing_effect_is_named_drawn_and_added(db: mm.Database, tmp_path: Path) -> None:
+    campaign = db.campaign(HIDDEN)
+    answer = campaign.explain()
+    assert answer.missing[0].effect == "EZC1:const@warmup"
+    assert answer.table()["effect"].tolist() == ["EZC1:const@warmup"]
+    assert answer.to_dict()["missing"][0]["effect"] == "EZC1:const@warmup"
+    pictures = answer.plot()
+    assert "missing-effects.svg" in pictures.names
+    assert {path.name for path in pictures.save(tmp_path / "drawn")} == set(pictures)
+    assert answer._repr_html_().count("<svg") == 1
+    assert "The model lacks EZC1:const@warmup" in repr(answer)
+    added = campaign.add("EZC1:const@warmup", "warm")
+    before, after = (version.heldout_rms_um for version in added.history)
+    assert after < before
+    assert campaign.explain("warm").missing == ()
+
+
+def test_answers_of_all_kinds_are_tables(db: mm.Database) -> None:
+    campaign = db.campaign("five-days")
+    u = campaign.uncertainty(method="guf").table()
+    assert u.loc["EXX", "unit"] == "µm/m"
+    assert (u["expanded"] > u["u"]).all()
+    assert u.attrs["correlation"].shape == (13, 13)
+    assert "slope_per_year" in db.trend("HU40-T").table().columns
+    assert len(db.fleet(top=0).table()) == 13
+    assert "u_pooled" in campaign.statistics().table().columns
+    assert campaign.compare().table().index.size > 0
+    assert len(db.models().table()) > 0
+    assert len(db.ask("plan", campaign="five-days").to_dict()) > 0
+
+
+def test_sql_reads_and_never_writes(db: mm.Database, tmp_path: Path) -> None:
+    days = db.sql(
+        "SELECT day, count(*) AS n FROM v_runs WHERE campaign = 'five-days' GROUP BY day ORDER BY day"
+    )
+    assert days["n"].tolist() == [4, 4, 4, 4, 4]
+    file = tmp_path / "x.csv"
+    for query in (
+        "DROP TABLE run", "DELETE FROM run", "CREATE TABLE t (i INT)", "SET threads = 1", "SELECT 1; SELECT 2", "",
+        f"COPY (SELECT 1) TO '{file}'", f"ATTACH '{tmp_path / 'b.duckdb'}' AS b",
+        f"EXPLAIN ANALYZE COPY (SELECT 1) TO '{file}'", "EXPLAIN ANALYZE DELETE FROM run", "INSTALL httpfs",
+        "PRAGMA force_checkpoint", "EXPORT DATABASE 'x'", "BEGIN", "SELEC 1",
+    ):  # fmt: skip
+        with pytest.raises(
+            InputError, match=r"a query may only read|type one query|no SQL that DuckDB understands"
+        ):
+            db.sql(query)
+    with pytest.raises(InputError, match=r"the query cannot be answered: .*v_nothing"):
+        db.sql("SELECT * FROM v_nothing")
+    assert not file.exists()
+    # The connection still writes after a query that failed.
+    assert len(db.sql("SELECT * FROM v_runs", limit=3)) == 3
+    assert (
+        db.ask("event", machine="HU40-T", text="looked at", at=datetime(2026, 3, 4, tzinfo=UTC)).to_dict()
+        is not None
+    )
+
+
+def test_wrong_names_are_answered_with_the_right_ones(db: mm.Database, tmp_path: Path) -> None:
+    with pytest.raises(NotFoundError, match=r"^there is no campaign 'five-day'; did you mean 'five-days'\?$"):
+        db.campaign("five-day")
+    with pytest.raises(InputError, match=r"^there is no option 'reliabilty': did you mean reliability\?$"):
+        db.trend("HU40-T", reliabilty=0.9)
+    with pytest.raises(InputError, match=r"^there is no question 'trends'; there are add effect, "):
+        db.ask("trends")
+    with pytest.raises(NotFoundError, match=r"open\('.*none.duckdb', new=True\) makes one$"):
+        mm.open(tmp_path / "none.duckdb")
+    with pytest.raises(AttributeError, match=r"ExplainAnswer has no 'effects'; it has "):
+        _ = db.campaign(HIDDEN).explain().effects
+    with pytest.raises(AttributeError, match=r"module 'monitor' has no attribute 'opem'; it has Answer, "):
+        _ = mm.opem  # type: ignore[attr-defined]
+    with pytest.raises(CampaignError):
+        mm.read(tmp_path)
+    assert mm.read(EXAMPLES / "five-days").name == "five-days"
+
+
+def test_simulate_writes_a_folder_that_is_read(tmp_path: Path) -> None:
+    answer = mm.simulate(tmp_path / "rehearsal", effect="EXX:reversal", peak_um=8.0, seed=3)
+    assert answer.runs == 20
+    assert mm.read(tmp_path / "rehearsal").name == "rehearsal"
+
+
+def test_the_kinematic_model_alone_agrees_with_a_chain_multiplied_by_hand() -> None:
+    """w B X b Z t with the table's squareness and the gain of X, by rotation matrices written here."""
+    machine = mm.Machine("w B X b Z Y t")
+    x, b, tool, target = 120.0, np.deg2rad(30.0), np.array([0.0, 0.0, -150.0]), np.array([10.0, 20.0, 30.0])
+    tilt, gain = 40e-6, 15e-6
+
+    def turn_x(angle: float) -> np.ndarray:
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+    def turn_y(angle: float) -> np.ndarray:
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+    def vector(tilted: float, stretched: float) -> np.ndarray:
+        # The bed carries X (with its gain), X carries B (tilted about X), B carries the work. The table moves against
+        # the sense of the reading, so that the tool moves with it as seen from the work.
+        origin = np.array([-x * (1.0 + stretched), 0.0, 0.0])
+        work = turn_x(tilted) @ turn_y(-b)
+        return work.T @ (tool - origin) - target
+
+    deviation = machine.deviation(
+        {"EA0B": 40.0, "EXX:poly1": 15.0}, X=x, B=30.0, tool=tuple(tool), target=tuple(target)
+    )
+    by_hand = (vector(tilt, gain) - vector(0.0, 0.0)) * 1e3
+    np.testing.assert_allclose(deviation[0], by_hand, atol=1e-6)
+    np.testing.assert_allclose(
+        machine.vector(X=x, B=30.0, tool=tuple(tool))[0], vector(0, 0) + target, atol=1e-12
+    )
+
+
+def test_the_kinematic_model_refuses_what_the_chain_does_not_have() -> None:
+    machine = mm.Machine("w C B X b Z Y (C1) t")
+    assert machine.deviation({"EC0B": 20.0}, X=[0.0, 100.0], B=30.0).shape == (2, 3)
+    with pytest.raises(InputError, match=r"^there is no axis A in "):
+        machine.vector(A=[0.0])
+    with pytest.raises(EffectError, match=r"'EC0A' is no geometric error"):
+        machine.deviation({"EC0A": 1.0}, X=0.0)
+    with pytest.raises(
+        InputError, match=r"^every axis needs the same number of readings; there are X 2, B 3$"
+    ):
+        machine.vector(X=[0.0, 1.0], B=[0.0, 1.0, 2.0])
+    with pytest.raises(InputError, match=r"^'EXX:poly1' has 1 coefficients, not 2$"):
+        machine.deviation({"EXX:poly1": [1.0, 2.0]}, X=0.0)
+
+
+def test_importing_the_package_loads_no_library() -> None:
+    code = "import monitor, sys; print(sorted({'numpy', 'duckdb', 'pandas'} & set(sys.modules)))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout == "[]\n"
