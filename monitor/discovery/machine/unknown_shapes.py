@@ -112,7 +112,7 @@ def _alone(scene: ChainScene, selected: Sequence[ChainCandidate]) -> ChainCandid
 def _priced(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float:
     """The score of effects together, free shapes at the price of the choice of their parts."""
     number = sum(shape.columns.shape[1] for shape in selected if _is_free(shape))
-    return _score(scene, selected, []) - 2.0 * number * PRICE
+    return float(_score(scene, selected, []) - 2.0 * number * PRICE)
 
 
 def _with_candidate(scene: ChainScene, candidate: ChainCandidate) -> ChainScene:
