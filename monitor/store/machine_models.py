@@ -77,24 +77,25 @@ def followed_by(db: Database, machine: str) -> dict[str, tuple[str, int]]:
     return every | {choice.method: (choice.model, choice.version) for choice in machine_models(db, machine)}
 
 
-# Machines with a model of their own, and those of methods whose own model has another version by now: few of a fleet.
+# By the model of the machine, else by the latest version of the method's own; a curve has no runs.
 _NOT_IDENTIFIED = """
 WITH own AS (
     SELECT model AS method, max(version) AS version FROM model
-    WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model HAVING version > 1
+    WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model
 ), followed AS (
     SELECT c.campaign_id, c.campaign, m.model, m.model_version
     FROM campaign AS c JOIN v_machine_models AS m USING (machine, method)
     UNION ALL
-    SELECT c.campaign_id, c.campaign, c.method, own.version
-    FROM campaign AS c JOIN own USING (method) ANTI JOIN v_machine_models USING (machine, method)
+    SELECT c.campaign_id, c.campaign, c.method, coalesce(own.version, 1)
+    FROM campaign AS c LEFT JOIN own USING (method) ANTI JOIN v_machine_models USING (machine, method)
 )
-SELECT campaign FROM followed ANTI JOIN identification USING (campaign_id, model, model_version) ORDER BY campaign
+SELECT campaign FROM followed SEMI JOIN run USING (campaign_id)
+ANTI JOIN identification USING (campaign_id, model, model_version) ORDER BY campaign
 """
 
 
 def not_identified(db: Database) -> tuple[str, ...]:
-    """The campaigns that were not identified by the model which their machine is followed by since that changed."""
+    """The campaigns of machines that were not identified by the model which their machine is followed by."""
     return tuple(str(campaign) for (campaign,) in db.rows(_NOT_IDENTIFIED))
 
 

@@ -63,6 +63,7 @@ QUESTIONS = {
         "export": "keeping:export",
         "fleet": "fleet:fleet",
         "identify": "identify.identify:identify",
+        "identify all": "identify.every:identify_all",
         "identify stepwise": "identify.stepwise:identify_stepwise",
         "import": "intake.importing:import_folders",
         "issue certificate": "certificate.issue:issue",

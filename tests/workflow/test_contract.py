@@ -32,7 +32,6 @@ BESIDES_QUESTIONS = {
     "history.agreement:sentence",
     "health.mail:mail_report",  # sends what was written; nothing is asked
     "health.mail:read_mail_settings",
-    "intake.campaigns:selected_campaigns",  # `identify` without a campaign asks once for each
 }
 
 each_question = pytest.mark.parametrize("question", QUESTIONS.values(), ids=lambda question: question.name)

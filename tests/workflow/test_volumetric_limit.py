@@ -72,13 +72,17 @@ def test_jcgm106_7_probability_beyond_the_limit(limited):
 def test_the_report_is_out_of_tolerance_where_only_the_volumetric_error_is(limited):
     mapped, _, _ = limited
     within = Conformity({"EXX": 0.001}, 0.001, every_has_one=True)
-    assert state_of(within, (), None, NOTHING, 0.05) == "in tolerance"
+    assert state_of(within, (), None, NOTHING, 0.05, evaluated=True) == "in tolerance"
+    assert state_of(within, (), None, NOTHING, 0.05, evaluated=False) == "not evaluated"
     beyond = with_volumetric(within, probability_beyond(mapped, 150.0))
-    assert state_of(beyond, (), None, NOTHING, 0.05) == "out of tolerance"
-    assert state_of(with_volumetric(within, 0.06), (), None, NOTHING, 0.05) == "may be out of tolerance"
+    assert state_of(beyond, (), None, NOTHING, 0.05, evaluated=True) == "out of tolerance"
+    assert (
+        state_of(with_volumetric(within, 0.06), (), None, NOTHING, 0.05, evaluated=True)
+        == "may be out of tolerance"
+    )
     # Without a tolerance of any parameter the limit alone judges.
     alone = with_volumetric(Conformity({}, None, every_has_one=False), 0.9)
-    assert state_of(alone, (), None, NOTHING, 0.05) == "out of tolerance"
+    assert state_of(alone, (), None, NOTHING, 0.05, evaluated=True) == "out of tolerance"
     lines = dict(_map(stated_map(mapped, 150.0, 0.999999)))
     assert lines["limit"] == "150.0 µm for the worst: beyond it, P(out): > 99.9 %"
 

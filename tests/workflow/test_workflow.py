@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 from datetime import datetime
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from monitor.exceptions import InputError, NotFoundError
@@ -18,6 +20,8 @@ from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.explain.versions import latest_campaign
+from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake import campaigns
@@ -88,7 +92,7 @@ def test_import_of_several_folders_names_what_came_before_a_refusal(tmp_path: Pa
     with Database(tmp_path / "x.duckdb") as own:
         with pytest.raises(InputError, match="In the database before it was met: cold-cold"):
             import_folders(own, ImportRequest([EXAMPLES / "cold-cold", tmp_path / "nope"]))
-        assert campaigns.selected_campaigns(own, None) == ["cold-cold"]
+        assert [row.campaign for row in campaigns.campaigns(own).campaigns] == ["cold-cold"]
 
 
 def test_no_campaign_yet(tmp_path: Path) -> None:
@@ -96,7 +100,24 @@ def test_no_campaign_yet(tmp_path: Path) -> None:
         Database(tmp_path / "x.duckdb") as own,
         pytest.raises(NotFoundError, match="no campaign yet; type `monitor import FOLDER`"),
     ):
-        campaigns.selected_campaigns(own, None)
+        identify_all(own, IdentifyAllRequest())
+
+
+def test_a_campaign_that_cannot_be_identified_does_not_hinder_the_others(tmp_path: Path) -> None:
+    inches = tmp_path / "in inches"
+    shutil.copytree(EXAMPLES / "cold-cold", inches)
+    toml = inches / "campaign.toml"
+    text = toml.read_text("utf-8").replace('"cold-cold"', '"in inches"', 1).replace("HU40-T", "HU40-I", 1)
+    toml.write_text(text, "utf-8")
+    table = pd.read_csv(inches / "probings.csv", dtype={"target": str})
+    table["y_mm"] /= 25.4
+    table.to_csv(inches / "probings.csv", index=False)
+    with Database(tmp_path / "x.duckdb") as own:
+        import_folders(own, ImportRequest([inches, EXAMPLES / "cold-cold"]))
+        answer = identify_all(own, IdentifyAllRequest())
+        assert [each.campaign for each in answer.identifications] == ["cold-cold"]
+        assert [each.campaign for each in answer.refused] == ["in inches"]
+        assert fleet(own, FleetRequest()).not_identified == ("in inches",)
 
 
 def test_a_base_effect_is_not_added(db: Database) -> None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import identify_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
-from monitor.workflow.identify.answer import IdentificationsAnswer
+from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest, StepwiseRequest
 from monitor.workflow.identify.stepwise import identify_stepwise
-from monitor.workflow.intake import campaigns
 
 EXAMPLE = "monitor identify five-days"
 
@@ -36,17 +36,31 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     if options.stepwise:
         return _stepwise(options)
-    with opened(options) as db, output.working("identifying"), db.transaction():
-        answers = [
-            identify(db, IdentifyRequest(campaign, options.model, options.number))
-            for campaign in campaigns.selected_campaigns(db, options.campaign)
-        ]
+    if options.campaign is None:
+        return _all(options)
+    with opened(options) as db, output.working("identifying"):
+        answer = identify(db, IdentifyRequest(options.campaign, options.model, options.number))
     if options.json:
-        output.document(answers[0] if options.campaign is not None else IdentificationsAnswer(tuple(answers)))
-        return 0
-    for answer in answers:
+        output.document(answer)
+    else:
         identify_output.show(answer)
     return 0
+
+
+def _all(options: Namespace) -> int:
+    """Identify every campaign; exit status 2 where one could not be."""
+    if options.number is not None:
+        raise InputError(f"--run {options.number} is a run of one campaign: name it")
+    with opened(options) as db, output.working("identifying"):
+        answer = identify_all(db, IdentifyAllRequest(options.model))
+    if options.json:
+        output.document(answer)
+    else:
+        for identification in answer.identifications:
+            identify_output.show(identification)
+    for refused in answer.refused:
+        print(f"monitor: {refused.campaign}: {refused.why}", file=sys.stderr)
+    return 2 if answer.refused else 0
 
 
 def _stepwise(options: Namespace) -> int:

@@ -37,7 +37,11 @@ def relabelled(campaign: Campaign, problem_of: Maker, fit: Fit | None) -> Mistak
         return None
     corrected, latest = campaign, fit
     for _ in range(MOST_ROUNDS):
-        problem = problem_of(corrected) if latest is None else latest.problem
+        try:
+            problem = problem_of(corrected) if latest is None else latest.problem
+        except MonitorError:
+            # Under the new names a target is missing that the method needs: the names were no mistake.
+            return None
         if len(problem.targets) < len(names):
             return None
         target = _better_names(problem, latest, corrected.probings.target)

@@ -30,6 +30,7 @@ from monitor.reporting.svg.sparkline import sparkline
 SIGNS = {
     "out of tolerance": "■",
     "may be out of tolerance": "▲",
+    "not evaluated": "?",
     "changed": "◆",
     "model fails": "◇",
     "suspect data": "○",

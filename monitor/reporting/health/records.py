@@ -17,6 +17,7 @@ from monitor.reporting.svg.map_slices import Slice
 State = Literal[
     "out of tolerance",
     "may be out of tolerance",
+    "not evaluated",
     "changed",
     "model fails",
     "suspect data",
@@ -29,6 +30,7 @@ STATES: dict[State, str] = {
     "out of tolerance": "a parameter or the volumetric error is more likely beyond its tolerance than within it",
     "may be out of tolerance": "the probability that a parameter or the volumetric error is beyond its tolerance "
     "exceeds the stated limit",
+    "not evaluated": "measured, but its last run could not be evaluated: nothing is known of its tolerances",
     "changed": "a parameter or an artefact changed this week",
     "model fails": "the model does not explain the measurements: an effect is missing",
     "suspect data": "bad points were found and left out; nothing else",
@@ -37,7 +39,7 @@ STATES: dict[State, str] = {
     "no change seen": "nothing changed; not every parameter has a tolerance to be judged by",
 }
 #: The states that `--fail-on-alarm` answers with exit status 1.
-ALARMS: tuple[State, ...] = ("out of tolerance", "may be out of tolerance")
+ALARMS: tuple[State, ...] = ("out of tolerance", "may be out of tolerance", "not evaluated")
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from monitor.methods import Unable, method_named
 from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport
 from monitor.store import (
     Database,
@@ -157,7 +158,10 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         week,
     )
     quality = data_quality(db, past.runs_of_week, explanation, stated, past.refused, remarks)
-    state = state_of(judged, noted, explanation, quality, past.options.risk)
+    can_be = not isinstance(method_named(last.method).uncertainty, Unable)
+    state = state_of(
+        judged, noted, explanation, quality, past.options.risk, evaluated=stated is not None or not can_be
+    )
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
         changed=changed_in_words(noted, explanation, quality),

@@ -112,12 +112,16 @@ def state_of(
     explanation: MachineExplanation | None,
     quality: DataQuality,
     risk: float,
+    *,
+    evaluated: bool,
 ) -> State:
-    """The most urgent state that holds."""
+    """The most urgent state that holds; ``evaluated``: whether the last run has the results that its method gives."""
     if judged.any is not None and max(judged.single.values()) > 0.5:
         return "out of tolerance"
     if judged.any is not None and judged.any > risk:
         return "may be out of tolerance"
+    if not evaluated:
+        return "not evaluated"
     if any(change.kind == "change" and change.this_week for change in noted):
         return "changed"
     if explanation is not None and explanation.comparison.verdict is Verdict.SOMETHING_IS_MISSING:
@@ -140,6 +144,8 @@ def next_check(
         for name, drift in drifts.items()
         if drift is not None and drift.good_for is not None
     }
+    if state == "not evaluated":
+        return "now: the last run could not be evaluated"
     if state in ALARMS:
         return "now"
     if not limits:

@@ -128,10 +128,19 @@ class IdentifyAnswer:
 
 
 @dataclass(frozen=True)
+class RefusedCampaign:
+    """A campaign that could not be identified, and why."""
+
+    campaign: str
+    why: str
+
+
+@dataclass(frozen=True)
 class IdentificationsAnswer:
-    """The identifications of several campaigns."""
+    """The identifications of all campaigns, and those that could not be identified."""
 
     identifications: tuple[IdentifyAnswer, ...]
+    refused: tuple[RefusedCampaign, ...]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from monitor.exceptions import NotFoundError
 from monitor.store import (
     CampaignRow,
     Database,
@@ -53,16 +52,6 @@ def runs(db: Database, request: RunsRequest) -> RunsAnswer:
     """List the runs of a campaign. Raises NotFoundError, DataError for a curve, which has none."""
     load_campaign(db, request.campaign)
     return RunsAnswer(request.campaign, list_runs(db, request.campaign), campaign_notes(db, request.campaign))
-
-
-def selected_campaigns(db: Database, campaign: str | None) -> list[str]:
-    """Return the named campaign, or all. Raises NotFoundError where there is none."""
-    if campaign is not None:
-        return [campaign]
-    names = [row.campaign for row in list_campaigns(db)]
-    if not names:
-        raise NotFoundError("the database has no campaign yet; type `monitor import FOLDER`")
-    return names
 
 
 def records(frame: Any) -> list[dict[str, Any]]:
