@@ -18,7 +18,6 @@ from monitor.records import Array
 from monitor.uncertainty.coverage import rectangle_factor
 from monitor.uncertainty.ellipsoid import wishart_roots
 from monitor.uncertainty.parts import BudgetLine, Estimated
-from monitor.uncertainty.roots import covariance_root
 
 #: A part below this share of every variance is none.
 _NEGLIGIBLE = 1e-6
@@ -101,16 +100,28 @@ def rectangle_law(parts: Sequence[BudgetLine]) -> RectangleLaw:
     ]
     estimated = [entry for entry in estimated if float(np.diag(entry[0]).max(initial=0.0)) > _NEGLIGIBLE]
     known = shared(total) - np.sum([np.zeros_like(scale), *(matrix for matrix, _, _ in estimated)], axis=0)
-    laws = [(covariance_root(matrix).root, dof, kind) for matrix, dof, kind in estimated]
+    laws = [(_root(matrix), dof, kind) for matrix, dof, kind in estimated]
     if float(np.diag(known).max(initial=0.0)) > _NEGLIGIBLE:
         np.einsum("ii->i", known)[:] = np.maximum(np.diag(known), 0.0)
         laws.append((_root(known), math.inf, Estimated.SCALE))
     return RectangleLaw(tuple(laws))
 
 
-def _root(known: Array) -> Array:
-    """Root (m, k) of what is left of a correlation matrix, rounding below zero left out."""
-    values, vectors = np.linalg.eigh(known)
+def _root(matrix: Array) -> Array:
+    """Root (m, k) of a part of a correlation matrix, rounding below zero left out.
+
+    Cholesky's where there is one, which moves with the matrix: eigenvectors may turn by its last digit, and with them
+    the sampled factor by its standard error.
+    """
+    try:
+        root = np.linalg.cholesky(matrix)
+        if float(np.diag(root).min()) ** 2 > _NEGLIGIBLE * float(np.diag(matrix).max()):
+            return np.asarray(root)
+    except np.linalg.LinAlgError:
+        pass
+    values, vectors = np.linalg.eigh(matrix)
+    largest = np.take_along_axis(vectors, np.argmax(np.abs(vectors), axis=0)[None, :], axis=0)
+    vectors = vectors * np.where(largest < 0.0, -1.0, 1.0)
     inside = values > _NEGLIGIBLE * max(float(values[-1]), 0.0)
     return np.asarray(vectors[:, inside] * np.sqrt(values[inside]))
 
