@@ -223,11 +223,13 @@ def backtest(
     u: npt.ArrayLike | None = None,
     days: npt.ArrayLike | None = None,
     cycle: float | None = None,
+    most: int | None = None,
     ahead: int = 1,
     first: int = 5,
     level: float = 0.95,
 ) -> Backtest:
-    """Forecast each day from the ``first`` on by the history up to ``ahead`` days before it.
+    """Forecast each day from the ``first`` on by the history up to ``ahead`` days before it, at ``most`` so many of
+    them.
 
     Arguments as in ``trend``. Only the first run of a forecast day counts, so that the counted errors are
     not copies of one day's. Raises ``DataError`` where the history has fewer than first + ahead days, or the first
@@ -250,6 +252,8 @@ def backtest(
     if np.ptp(day_sums.time[:first]) == 0.0:
         raise DataError("the first days have the same mean time; a trend needs days that differ.")
     targets = np.arange(first + ahead - 1, count)
+    if most is not None and len(targets) > most:
+        targets = targets[np.linspace(0, len(targets) - 1, most).round().astype(int)]
     target_runs = day_sums.first[targets]
     blocks = [slice(start, start + BLOCK) for start in range(0, len(targets), BLOCK)]
     forecasts = [

@@ -129,7 +129,7 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
 
 
 def means_p(sums: FleetSums) -> Array:
-    """p-values (c,) of equal means of the days, whatever their scatter: Brown and Forsythe's test."""
+    """Return p-values (c,) of equal means of the days, whatever their scatter: Brown and Forsythe's test."""
     repeated = sums.repeated_sums
     with np.errstate(divide="ignore", invalid="ignore"):
         between = np.maximum(repeated.squares - repeated.offset**2 / repeated.runs, 0.0)

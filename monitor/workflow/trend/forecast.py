@@ -13,6 +13,8 @@ from monitor.workflow.trend.answer import Between, ForecastTest, LimitForecast
 
 #: Days from which on forecasts are looked at: five to fit a line, and one to foretell.
 BACKTEST_DAYS = 6
+#: Days foretold at most, evenly spread: of five years of weeks all of them would be most of the time of a page.
+FORETOLD = 60
 #: A forecast beyond this many years is no forecast; the date is then left out.
 HORIZON_YEARS = 20.0
 
@@ -64,6 +66,7 @@ def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, str | None]:
             u=piece.weights(),
             days=piece.days,
             cycle=DAYS_PER_YEAR,
+            most=FORETOLD,
             first=BACKTEST_DAYS - 1,
         )
     except DataError as error:
@@ -71,5 +74,5 @@ def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, str | None]:
     return ForecastTest(
         made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
         bias=test.bias, rms=test.rms, unit=piece.unit,
-        method="every day foretold by the days before it since the last change; its first run counts",
+        method="days foretold by the days before them since the last change, 60 at most; the first run of each counts",
     ), None  # fmt: skip
