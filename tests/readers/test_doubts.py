@@ -91,7 +91,7 @@ def test_an_artefact_in_metres(altered: Callable[..., Path]) -> None:
         )
     )  # fmt: skip
     assert "or the declared places in another unit than mm" in told[0]
-    assert "but its balls S1 and S2 are declared 0.304989 mm apart" in told[1]
+    assert "but its balls S1 and S2 are declared 0.3049892 mm apart" in told[1]
 
 
 def test_statements_of_another_unit(altered: Callable[..., Path]) -> None:
