@@ -10,10 +10,13 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from enum import StrEnum
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+
+from monitor.sources import Source
 
 Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -22,6 +25,14 @@ Branch = Literal["work", "tool"]
 
 #: ISO 841: X, Y, Z and U, V, W, parallel to them, are linear axes; A, B, C turn.
 LINEAR_LETTERS = "XYZUVW"
+
+
+class ValidationVerdict(StrEnum):
+    """Whether Monte Carlo confirms a first-order result; the value is how documents store it."""
+
+    VALIDATED = "validated"
+    NOT_VALIDATED = "not validated"
+    UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True)
@@ -300,7 +311,7 @@ class SourceFile:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign: one machine, one artefact, one probe, and the runs of one plan."""
+    """A campaign: one machine, one artefact, one probe, the runs of one plan, and the stated sources of uncertainty."""
 
     name: str
     method: str
@@ -310,6 +321,7 @@ class Campaign:
     runs: tuple[Run, ...]
     probings: Probings
     files: tuple[SourceFile, ...] = ()
+    sources: tuple[Source, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -377,3 +389,19 @@ class LinearAxes:
 
     axes: Mapping[str, LinearAxisErrors]
     node_spacing: tuple[float, float]
+
+
+class FrameKind(StrEnum):
+    """What a parameter is stated relative to; the value is how records store it."""
+
+    MACHINE = "machine frame"
+    PRECEDING_AXIS = "preceding axis"
+    OWN_AXIS = "own axis"
+
+
+@dataclass(frozen=True)
+class FrameOfReference:
+    """What a parameter refers to: the frame of the machine, or that of an ``axis``, before it or its own."""
+
+    kind: FrameKind
+    axis: str | None = None

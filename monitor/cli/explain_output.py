@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from monitor.cli import output, residual_output
+from monitor.cli.identify_output import reversal_words
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.workflow.explain.explain_answer import (
     BadProbing,
@@ -106,6 +107,8 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         f"{effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
         f"{output.stated('q', effect.q_value)}"
     )
+    if effect.reversal_value is not None:
+        output.say(f"   {reversal_words(effect.reversal_value)}")
     searched = effect.searched
     if searched is not None:
         u = "" if searched.u is None else f" ± {output.two_digits(searched.u)}"

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from monitor.cli import output
 from monitor.cli.residual_output import four_digits, with_uncertainty
+from monitor.records import FrameOfReference
+from monitor.reporting.frames import frame_words
 from monitor.workflow.explain.curve_sentences import correlation
-from monitor.workflow.identify.answer import CurveRun, IdentifyAnswer, MachineRun, StepwiseAnswer
+from monitor.workflow.identify.answer import CurveRun, Estimate, IdentifyAnswer, MachineRun, StepwiseAnswer
 
 # A screen holds so many runs beside the names of the parameters.
 SHOWN_RUNS = 6
@@ -27,9 +31,9 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
     before = f" (the last {len(shown)} of {len(runs)} runs; --json has all)" if len(runs) > len(shown) else ""
     output.table(
         f"{answer.campaign}, model {answer.model}{before}",
-        ["parameter", "unit", *(f"run {run.run}" for run in shown), "u"],
-        [*_rows(shown), ["RMS", "µm", *(f"{run.rms_um:.2f}" for run in shown), ""]],
-        text_columns=2,
+        ["parameter", "unit", "relative to", *(f"run {run.run}" for run in shown), "u"],
+        [*_rows(shown, answer.frames or {}), ["RMS", "µm", "", *(f"{run.rms_um:.2f}" for run in shown), ""]],
+        text_columns=3,
     )
     notes = [run.note for run in shown if run.note]
     if notes:
@@ -47,6 +51,8 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
             f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "
             f"{estimate.unit} in all runs"
         )
+        if answer.reversal_values is not None and name in answer.reversal_values:
+            output.say(f"   {reversal_words(answer.reversal_values[name])}")
     for refusal in answer.added_refused:
         output.say(f"no number: {', '.join(refusal.parameters)}: {refusal.why}")
 
@@ -58,14 +64,23 @@ def _doing_the_same(names: tuple[str, ...]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]} together do the same"
 
 
-def _rows(runs: list[MachineRun]) -> list[list[str]]:
-    """A row for every parameter: its unit, its value in every run, and the standard uncertainty of the last."""
+def reversal_words(value: Estimate) -> str:
+    """The reversal value of a play."""
+    return (
+        f"reversal value (ISO 230-2), twice the amplitude: {output.rounded(value.value, value.u)} ± "
+        f"{output.two_digits(value.u)} {value.unit}"
+    )
+
+
+def _rows(runs: list[MachineRun], frames: Mapping[str, FrameOfReference]) -> list[list[str]]:
+    """A row for every parameter: its unit and frame, its value in every run, and the standard uncertainty of the
+    last."""
     rows = []
     for name in dict.fromkeys(name for run in runs for name in run.parameters):
         estimates = [run.parameters.get(name) for run in runs]
         last = [estimate for estimate in estimates if estimate is not None][-1]
         values = ["-" if each is None else output.rounded(each.value, each.u) for each in estimates]
-        rows.append([name, last.unit, *values, output.two_digits(last.u)])
+        rows.append([name, last.unit, frame_words(frames.get(name)), *values, output.two_digits(last.u)])
     return rows
 
 

@@ -12,6 +12,7 @@ from monitor.workflow.trend.answer import (
     Cycle,
     DatedChange,
     ParameterTrend,
+    StepAtEvent,
     TrendAnswer,
     VectorState,
     VolumetricForecast,
@@ -48,10 +49,12 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     parameters = answer.parameters.items()
     for name, parameter in parameters:
         yield from (_change(name, change) for change in parameter.changes)
+        yield from (_event_step(name, step) for step in parameter.event_steps)
     for name, parameter in parameters:
         yield from _dependences(name, parameter)
     yield from _charts(answer)
-    yield from _volumetric(answer.volumetric_error)
+    latest = max((parameter.mean.latest_at or "" for _, parameter in parameters), default="")
+    yield from _volumetric(answer.volumetric_error, latest)
     yield from _next_check(answer)
     yield from _backtest(answer)
     yield from dict.fromkeys(parameter.drift.why for _, parameter in parameters if parameter.drift.why)
@@ -81,7 +84,7 @@ _COLUMNS: dict[str, Callable[[ParameterTrend], str]] = {
     "p": lambda parameter: output.probability(parameter.drift.p_value),
     "Theil-Sen": lambda parameter: _three(parameter.drift.robust_slope_per_year),
     "limit": lambda parameter: "-" if parameter.forecast.limit is None else f"{parameter.forecast.limit:g}",
-    "crosses": lambda parameter: (parameter.forecast.crosses_limit_at or "-")[:10],
+    "crosses": lambda parameter: _crosses(parameter),
     "in tolerance next": lambda parameter: output.probability(parameter.forecast.in_tolerance_at_next_check),
     "charts": lambda parameter: (
         "-" if parameter.control.why else ", ".join(parameter.control.alarms) or "in control"
@@ -89,6 +92,14 @@ _COLUMNS: dict[str, Callable[[ParameterTrend], str]] = {
 }
 #: Headings that are shorter on paper than what tells two columns apart.
 _HEADINGS = {"u of slope": "u"}
+
+
+def _crosses(parameter: ParameterTrend) -> str:
+    """When the drift reaches the limit; since when it is beyond, where that day is past."""
+    at = parameter.forecast.crosses_limit_at
+    if at is None:
+        return "-"
+    return f"since {at[:10]}" if at <= (parameter.mean.latest_at or "") else at[:10]
 
 
 def _latest(value: float, u: float | None) -> str:
@@ -119,6 +130,19 @@ def _change(name: str, change: DatedChange) -> str:
     return (
         f"{name}: {change.kind} of {_with_u(change.size, change.u, change.unit)} at {_minute(change.at)} "
         f"({_interval(change.interval)}, p = {output.probability(change.p_value)})"
+    )
+
+
+def _event_step(name: str, step: StepAtEvent) -> str:
+    size = f"{output.rounded(step.size, step.u)} {step.unit} (u = {output.two_digits(step.u)} {step.unit})"
+    by = (
+        ""
+        if step.scatter_of == "days"
+        else "; by the scatter of the runs, too few days to know how days differ"
+    )
+    return (
+        f"{name} stepped by {size} at the event of {_minute(step.at)} UTC, {step.kind}: {step.description} "
+        f"(p = {output.probability(step.p_value)}{by})"
     )
 
 
@@ -198,8 +222,8 @@ def _vector(name: str, state: VectorState, count: int) -> str:
     )
 
 
-def _volumetric(ahead: VolumetricForecast | None) -> Iterator[str]:
-    """The volumetric error ahead, and how good its forecasts were."""
+def _volumetric(ahead: VolumetricForecast | None, latest: str) -> Iterator[str]:
+    """The volumetric error ahead, from the ``latest`` run on, and how good its forecasts were."""
     if ahead is None:
         return
     if ahead.why is not None or ahead.predicted_interval_um is None:
@@ -207,14 +231,12 @@ def _volumetric(ahead: VolumetricForecast | None) -> Iterator[str]:
             yield ahead.why
         return
     low, high = ahead.predicted_interval_um
-    crosses = (
-        "does not reach its limit"
-        if ahead.crosses_limit_at is None
-        else f"reaches its limit on {ahead.crosses_limit_at[:10]}"
+    beyond = None not in (ahead.latest_um, ahead.limit_um) and (ahead.latest_um or 0.0) > (
+        ahead.limit_um or 0.0
     )
     yield (
         f"volumetric error: {_three(ahead.latest_um)} µm by the drifts of all parameters together, limit "
-        f"{_three(ahead.limit_um)} µm; {crosses}{_crossing(ahead.crosses_limit_interval)}"
+        f"{_three(ahead.limit_um)} µm; {_reaches(ahead, beyond, latest)}"
     )
     yield (
         f"  at the next check, {(ahead.next_check or '')[:10]}: {_three(ahead.predicted_um)} µm "
@@ -227,6 +249,16 @@ def _volumetric(ahead: VolumetricForecast | None) -> Iterator[str]:
             f"  {ahead.backtest.inside} of {ahead.backtest.made} past days, each foretold by the days before it, lay "
             f"in the interval ({_three(ahead.backtest.rms_um)} µm off, root mean square)"
         )
+
+
+def _reaches(ahead: VolumetricForecast, beyond: bool, latest: str) -> str:
+    """When the volumetric error reaches its limit; where it lies beyond already, since when."""
+    at = ahead.crosses_limit_at
+    if beyond:
+        return f"already beyond it since {(ahead.beyond_since or latest)[:10]}"
+    if at is None:
+        return "does not reach its limit" + _crossing(ahead.crosses_limit_interval)
+    return f"reaches its limit on {at[:10]}{_crossing(ahead.crosses_limit_interval)}"
 
 
 def _next_check(answer: TrendAnswer) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.exceptions import DataError
-from monitor.machine.chain import evaluate
+from monitor.machine.chain import ChainPose, evaluate
 from monitor.machine.terms import MOTION
 from monitor.machine.topology import Chain
 from monitor.records import Array
@@ -25,6 +25,24 @@ def refuse_untouchable(chain: Chain) -> None:
         )
 
 
+def travel_slopes(
+    chain: Chain, positions: Array, errors: Array, target: Array, tip: Array
+) -> tuple[ChainPose, Array]:
+    """Return the chain at its poses, and the derivative (n, 3, L) of the residual by the displacement of each linear
+    joint.
+
+    The arguments are as in ``evaluate``, the L linear joints in the order of ``chain.joints``. The derivative stands
+    in the frame of the last work axis, as the residual does; along a joint it is that by the joint's own positioning
+    error.
+    """
+    linear = [index for index, joint in enumerate(chain.joints) if not joint.turns]
+    directions = np.array([chain.joints[index].direction for index in linear])
+    pose = evaluate(chain, positions, errors, target, tip, jacobian=True)
+    assert pose.by_error is not None
+    shifts = pose.by_error[..., linear, MOTION, :3]  # (n, 3, axes, component)
+    return pose, np.einsum("...rac,ac->...ra", shifts, directions)
+
+
 def touching_positions(chain: Chain, positions: Array, errors: Array, target: Array, tip: Array) -> Array:
     """Positions (n, J) with the linear axes moved so that tip and target coincide.
 
@@ -34,16 +52,11 @@ def touching_positions(chain: Chain, positions: Array, errors: Array, target: Ar
     refuse_untouchable(chain)
     touching = np.array(positions, dtype=float)
     linear = [index for index, joint in enumerate(chain.joints) if not joint.turns]
-    directions = np.array([chain.joints[index].direction for index in linear])
     for _ in range(STEPS):
-        pose = evaluate(chain, touching, errors, target, tip, jacobian=True)
+        pose, slopes = travel_slopes(chain, touching, errors, target, tip)
         if np.abs(pose.residual).max(initial=0.0) < CLOSE_ENOUGH:
             return touching
-        assert pose.by_error is not None
-        shifts = pose.by_error[..., linear, MOTION, :3]  # (n, 3, axes, component)
-        slopes = np.einsum("...rac,ac->...ra", shifts, directions)
-        step = np.einsum("...ar,...r->...a", np.linalg.pinv(slopes), pose.residual)
-        touching[..., linear] -= step
+        touching[..., linear] -= np.einsum("...ar,...r->...a", np.linalg.pinv(slopes), pose.residual)
     miss = float(np.abs(evaluate(chain, touching, errors, target, tip).residual).max())
     if miss > CLOSE_ENOUGH * 1e3:
         raise DataError(

@@ -19,6 +19,7 @@ from monitor.records import (
     SelfCalibration,
     Setup,
 )
+from monitor.sources import HALF_WIDTHS, QUANTITIES, Law, Sharing, Source
 from monitor.units import MICROMETRE, MICRORADIAN
 
 
@@ -32,6 +33,7 @@ def campaign_toml(campaign: Campaign) -> str:
         *(() if _is_derived(campaign) else _probe(campaign.probe)),
         *_artefact(campaign.artefact),
         *(line for setup in campaign.artefact.setups for line in _setup(setup)),
+        *_sources(campaign.sources),
     ]
     return "\n".join(lines) + "\n"
 
@@ -178,6 +180,35 @@ def _l_shape(piece: LShape | None) -> Iterator[str]:
     for placement in piece.placements:
         yield from ("", "[[artefact.l_shape.placements]]", f"plane = {_text(placement.plane)}")
         yield f"corner_mm = {_numbers(placement.corner)}"
+
+
+def _sources(sources: tuple[Source, ...]) -> Iterator[str]:
+    for source in sources:
+        yield from (
+            "",
+            "[[sources]]",
+            f"name = {_text(source.name)}",
+            f'quantity = "{source.quantity.value}"',
+        )
+        suffixes = QUANTITIES[source.quantity].suffixes
+        suffix = next(key for key, unit in suffixes.items() if unit == source.unit)
+        stem = "half_width" if source.law in HALF_WIDTHS else "standard_uncertainty"
+        yield f"{stem}_{suffix} = {decimal_in(source.unit)(source.size)}"
+        if source.law is not Law.NORMAL:
+            yield f'distribution = "{source.law.value}"'
+        if source.degrees_of_freedom is not None:
+            yield f"degrees_of_freedom = {float(source.degrees_of_freedom)!r}"
+        if source.shared_by is not Sharing.ALL_RUNS:
+            yield f'shared_by = "{source.shared_by.value}"'
+        for key, text in (("axis", source.axis), ("along", source.along), ("effect", source.effect)):
+            if text is not None:
+                yield f"{key} = {_text(text)}"
+        if source.expansion_coefficient is not None:
+            yield f"expansion_coefficient_per_K = {float(source.expansion_coefficient)!r}"
+        if source.temperature_offset is not None:
+            yield f"temperature_offset_K = {float(source.temperature_offset)!r}"
+        if source.node_spacing is not None:
+            yield f"node_spacing_mm = {_numbers(source.node_spacing)}"
 
 
 def _numbers(values: tuple[float, ...]) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from monitor.documents import from_document, to_document
 from monitor.records import (
     Artefact,
     AxisSettings,
@@ -22,6 +24,7 @@ from monitor.records import (
     SelfCalibration,
     Setup,
 )
+from monitor.sources import Source
 
 
 def machine_json(machine: Machine) -> str:
@@ -76,8 +79,11 @@ def probe_record(text: str) -> Probe:
     return Probe(**{**data, "tip": _tuple(data["tip"])})
 
 
-def artefact_json(artefact: Artefact) -> str:
-    """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C."""
+def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
+    """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C.
+
+    The stated ``sources`` of uncertainty stand beside it, where there are any.
+    """
     data = asdict(artefact)
     # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
     if artefact.self_calibration is None:
@@ -88,7 +94,14 @@ def artefact_json(artefact: Artefact) -> str:
         del data["l_shape"]
     if not artefact.setups:
         del data["setups"]
+    if sources:
+        data["sources"] = [to_document(source) for source in sources]
     return _text(data)
+
+
+def sources_record(text: str) -> tuple[Source, ...]:
+    """The sources of ``artefact_json``."""
+    return tuple(from_document(Source, source) for source in json.loads(text).get("sources", ()))
 
 
 def artefact_record(text: str) -> Artefact:

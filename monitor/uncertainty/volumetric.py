@@ -14,63 +14,17 @@ and shifted as a whole by what no parameter of the model describes, it has no fu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
 import numpy as np
 
-from monitor.effects import ChainEffect, Context
-from monitor.effects.shapes import Table
 from monitor.exceptions import DataError
 from monitor.machine import Chain, evaluate
 from monitor.records import Array
 from monitor.uncertainty.coverage import single_factor
-
-#: Before each point every axis comes from this much below, mm or rad: what depends on the direction of travel
-#: (reversal) is taken for an approach in the positive direction.
-APPROACH = 1.0
-
-
-@dataclass(frozen=True)
-class GeometricErrors:
-    """The errors of a machine as one run found them.
-
-    ``effects`` with their coefficients ``estimate`` (k,), named ``names``, with ``covariance`` (k, k), in internal
-    units, and its degrees of freedom. ``context`` is the campaign's, ``run`` the run whose mean temperatures and
-    time stand for the effects that are driven by them. ``tip`` (3,) mm is the tool, the same with and without
-    errors.
-    """
-
-    effects: tuple[ChainEffect, ...]
-    names: tuple[str, ...]
-    estimate: Array
-    covariance: Array
-    context: Context
-    run: int
-    tip: Array
-    degrees_of_freedom: float = float("inf")
-
-    def __post_init__(self) -> None:
-        count = sum(len(effect.parameters(self.context)) for effect in self.effects)
-        if len(self.names) != count or self.estimate.shape != (count,):
-            raise DataError(
-                f"{len(self.effects)} effects have {count} coefficients, but {len(self.names)} are named and "
-                f"{self.estimate.shape} estimated"
-            )
-        if self.covariance.shape != (count, count):
-            raise DataError(
-                f"{count} coefficients need a covariance of ({count}, {count}), not {self.covariance.shape}"
-            )
-        if self.run not in self.context.run:
-            raise DataError(
-                f"no run {self.run}; there are runs {', '.join(map(str, np.unique(self.context.run)))}"
-            )
-
-    @property
-    def chain(self) -> Chain:
-        """The chain."""
-        return self.context.chain
+from monitor.uncertainty.geometric_errors import GeometricErrors, joint_errors
 
 
 @dataclass(frozen=True)
@@ -186,74 +140,17 @@ def middle(chain: Chain, ranges: Mapping[str, tuple[float, float]]) -> Array:
     return np.asarray(np.mean(grid(chain, ranges, 2), axis=0))
 
 
-def _commanded(errors: GeometricErrors, positions: Array, inside: bool) -> Context:
-    """The campaign's context with, behind its rows, each point and before it the place that it is reached from.
-
-    ``inside`` keeps positions within what the campaign visited, for tables, which end there with a constant.
-    """
-    old, chain = errors.context, errors.chain
-    if inside:
-        positions = np.clip(positions, old.positions.min(axis=0), old.positions.max(axis=0))
-    of_run = old.run == errors.run
-    pairs = np.repeat(positions, 2, axis=0)
-    if not inside:
-        pairs[::2] -= APPROACH
-    count = len(pairs)
-
-    def joined(rows: Array, value: float) -> Array:
-        return np.concatenate([rows, np.full(count, value)])
-
-    columns = {}
-    for name, values in old.columns.items():
-        good = np.isfinite(values)
-        thermal = name.endswith("_degC")
-        recorded = values[of_run & good] if thermal and np.any(of_run & good) else values[good]
-        columns[name] = joined(values, float(np.mean(recorded)) if len(recorded) else float("nan"))
-    for index, joint in enumerate(chain.joints):
-        name = f"{joint.name.lower()}_{'deg' if joint.turns else 'mm'}"
-        if name in columns:
-            readings = joint.sign * pairs[:, index]
-            columns[name] = np.concatenate(
-                [old.columns[name], np.rad2deg(readings) if joint.turns else readings]
-            )
-    return replace(
-        old,
-        positions=np.concatenate([old.positions, pairs]),
-        expected=None if old.expected is None else np.concatenate([old.expected, pairs]),
-        run=np.concatenate([old.run, np.full(count, errors.run)]),
-        sequence=np.concatenate([old.sequence, np.arange(count) + int(old.sequence.max()) + 1]),
-        time=joined(old.time, float(np.mean(old.time[of_run]))),
-        day_time=joined(old.day_time, float(np.mean(old.day_time[of_run]))),
-        run_time=joined(old.run_time, float(np.mean(old.run_time[of_run]))),
-        target=np.concatenate([old.target, np.repeat(old.target[:1], count)]),
-        nominal=np.concatenate([old.nominal, np.zeros((count, 3))]),
-        columns=columns,
-    )
-
-
 def _in_work_frame(geometric: GeometricErrors, positions: Array, values: Array) -> tuple[Array, Array, Array]:
     """Error (n, 3) and its derivatives (n, 3, k) in the workpiece's frame, and the turn (n, 3, 3) to the machine's."""
-    chain, count = geometric.chain, len(positions)
-    free = _commanded(geometric, positions, inside=False)
-    held = _commanded(geometric, positions, inside=True)
-    errors = np.zeros((count, len(chain.joints), 2, 6))
-    none, origin = np.zeros_like(errors), np.zeros((count, 3))
-    bases = []
-    first = 0
-    for effect in geometric.effects:
-        basis = effect.basis(held if isinstance(effect.shape, Table) else free)
-        # The points are the last of every pair behind the campaign's own rows.
-        basis = replace(basis, columns=basis.columns[-2 * count + 1 :: 2])
-        basis.apply(values[first : first + basis.size], errors, origin)
-        bases.append(basis)
-        first += basis.size
-    perfect = evaluate(chain, positions, none, origin, geometric.tip)
+    chain, origin = geometric.chain, np.zeros((len(positions), 3))
+    errors, bases = joint_errors(geometric, positions, values)
+    perfect = evaluate(chain, positions, np.zeros_like(errors), origin, geometric.tip)
     real = evaluate(chain, positions, errors, origin, geometric.tip, jacobian=True)
     assert real.by_error is not None
     slopes = [basis.displacement(real.by_error) for basis in bases]
     return (
         real.residual - perfect.residual,
-        np.concatenate([np.zeros((count, 3, 0)), *slopes], axis=-1),
+        np.concatenate([np.zeros((len(positions), 3, 0)), *slopes], axis=-1),
         perfect.work_rotation,
     )
 

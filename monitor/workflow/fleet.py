@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -12,10 +12,12 @@ from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
 from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
-from monitor.store import Database, FleetSums, fleet_sums, latest_tolerances
+from monitor.store import Database, FleetSums, fleet_sums, latest_maps, latest_tolerances
+from monitor.units import MICROMETRE
 from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.drift import SHORTEST_DAYS
 from monitor.workflow.models import resolve
+from monitor.workflow.trend.volumetric import VOLUMETRIC
 
 #: A drift that reaches the limit within so many years needs attention now.
 SOON_YEARS = 1.0
@@ -52,7 +54,7 @@ class FleetTableRow:
     unit: str
     n: int
     days: int
-    mean: float
+    mean: float | None
     sd_all: float | None
     sd_pooled: float | None
     between_days: float | None
@@ -135,6 +137,9 @@ def _rank(
     return kind, measure, years
 
 
+AS_USUAL = "as usual"
+#: Of a limit of the volumetric error.
+UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
 #: The classes, the most urgent first.
 ATTENTION = (
     "out of tolerance",
@@ -142,8 +147,9 @@ ATTENTION = (
     "the latest day stands out",
     "drifts",
     "days differ much more than runs",
-    "as usual",
+    AS_USUAL,
     "one day only, nothing to compare it with",
+    UNJUDGED,
 )
 
 
@@ -189,9 +195,9 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
     }  # fmt: skip
     kind, measure, years = _rank(sums, cells, drift, q_values["drift"], limit)
     order = np.lexsort((sums.parameter, sums.machine, -measure, kind))
-    rows = (
+    parameters = [
         FleetTableRow(
-            rank=rank,
+            rank=0,
             machine=str(sums.machine[i]),
             parameter=str(sums.parameter[i]),
             attention=ATTENTION[int(kind[i])],
@@ -218,13 +224,58 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
             limit=_number(limit[i]),
             years_to_limit=_number(years[i]) if kind[i] == 1 else None,
         )
-        for rank, i in enumerate(order[: request.top or None], start=1)
+        for i in order[: request.top or None]
+    ]
+    volumetric = _volumetric_rows(db, set(sums.machine.tolist()))
+    measures = {id(row): float(measure[i]) for row, i in zip(parameters, order, strict=False)}
+    measures |= {id(row): _share(row) for row in volumetric}
+    ranked = sorted(
+        [*parameters, *volumetric],
+        key=lambda row: (ATTENTION.index(row.attention), -measures[id(row)], row.machine, row.parameter),
     )
     return FleetAnswer(
         machines=len(np.unique(sums.machine)),
-        rows=len(sums.machine),
+        rows=len(sums.machine) + len(volumetric),
         values=int(sums.runs.sum()),
         false_discovery_rate=RATE,
-        attention={label: int((kind == number).sum()) for number, label in enumerate(ATTENTION)},
-        table=tuple(rows),
+        attention={
+            label: int((kind == number).sum()) + sum(row.attention == label for row in volumetric)
+            for number, label in enumerate(ATTENTION)
+        },
+        table=tuple(
+            replace(row, rank=rank) for rank, row in enumerate(ranked[: request.top or None], start=1)
+        ),
     )
+
+
+def _share(row: FleetTableRow) -> float:
+    """The part of its limit that a volumetric error takes, 0 where there is none."""
+    return 0.0 if row.latest is None or row.limit is None else row.latest / row.limit
+
+
+def _volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
+    """A row for every machine with a limit of the volumetric error: the worst error of its last map against it.
+
+    The map is that of the latest run of which one was stored, by ``map`` or by a weekly report; without one the limit
+    is not judged.
+    """
+    limits = {
+        machine: limit
+        for (machine, name), limit in latest_tolerances(db).items()
+        if name == VOLUMETRIC and machine in machines
+    }
+    worst = latest_maps(db) if limits else {}
+    rows = []
+    for machine, limit in limits.items():
+        latest = worst.get(machine)
+        attention = UNJUDGED if latest is None else ATTENTION[0] if latest >= limit else AS_USUAL
+        rows.append(
+            FleetTableRow(
+                rank=0, machine=machine, parameter="volumetric error", attention=attention, unit=MICROMETRE.name,
+                n=0 if latest is None else 1, days=0 if latest is None else 1, mean=latest, sd_all=None, sd_pooled=None,
+                between_days=None, bartlett=None, bartlett_p=None, bartlett_q=None, anova_f=None, anova_p=None,
+                anova_q=None, slope_per_year=None, u_slope=None, drift_p=None, drift_q=None, latest=latest,
+                latest_at=None, since=None, limit=limit, years_to_limit=None,
+            )
+        )  # fmt: skip
+    return rows

@@ -163,6 +163,28 @@ def test_uncertainty(typed: Any, filled: Path) -> None:
     assert set(found["validation"]["differences"]) == set(found["validation"]["tolerances"])
 
 
+def test_uncertainty_says_the_frame_of_every_parameter_and_the_machine_frame(
+    typed: Any, filled: Path
+) -> None:
+    found = typed("uncertainty", "five-days", "--run", 20, "--method", "guf", "--json", db=filled).document
+    assert list(found["frames"]) == THIRTEEN
+    assert found["frames"]["EA0C"] == {"kind": "preceding axis", "axis": "B"}
+    assert found["frames"]["EB0Z"] == {"kind": "machine frame", "axis": None}
+    assert found["frames"]["EXX"] == {"kind": "own axis", "axis": "X"}
+    frame, guf = found["machine_frame"], found["guf"]
+    assert frame["sums"]["EA0C"] == {"EA0B": 1.0, "EA0C": 1.0}
+    assert frame["estimate"]["EA0C"] == pytest.approx(guf["estimate"]["EA0B"] + guf["estimate"]["EA0C"])
+    # GUM 5.2.2 of a sum of two, and of two sums that share one.
+    u, names = guf["u"], found["parameters"]
+    shared = guf["correlation"][names.index("EA0B")][names.index("EA0C")] * u["EA0B"] * u["EA0C"]
+    assert frame["u"]["EA0C"] ** 2 == pytest.approx(u["EA0B"] ** 2 + u["EA0C"] ** 2 + 2.0 * shared)
+    place, other = frame["parameters"].index("EA0C"), frame["parameters"].index("EA0B")
+    assert frame["covariance"][place][other] == pytest.approx(u["EA0B"] ** 2 + shared)
+    prose = typed("uncertainty", "five-days", "--run", 20, "--method", "guf", db=filled).out
+    assert "EA0B + EA0C" in prose
+    assert "the other location errors have the values above in the machine frame, too" in prose
+
+
 def test_uncertainty_by_the_framework_alone(typed: Any, filled: Path) -> None:
     found = typed("uncertainty", "cold-cold", "--method", "guf", "--json", db=filled).document
     assert found["run"] == 44

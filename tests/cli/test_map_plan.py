@@ -11,7 +11,7 @@ import pytest
 
 def _rows(file: str) -> list[dict[str, str]]:
     with Path(file).open(encoding="utf-8", newline="") as text:
-        return list(csv.DictReader(text))
+        return list(csv.DictReader(line for line in text if not line.startswith("#")))
 
 
 @pytest.fixture

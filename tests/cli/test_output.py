@@ -119,13 +119,15 @@ def test_identify_table_for_people(typed: Any, filled: Path) -> None:
     assert lines[1].split() == [
         "parameter",
         "unit",
+        "relative",
+        "to",
         *(word for run in range(15, 21) for word in ("run", str(run))),
         "u",
     ]
     assert len(lines) == 2 + 13 + 1
     for line in lines[2:15]:
-        assert re.fullmatch(r"E\w+ +µ\S+( +-?\d+\.\d+){6} +\d+\.\d+", line)
-        values = line.split()[2:]
+        assert re.fullmatch(r"E\w+ +µ\S+ +(machine|axis \w+( itself)?)( +-?\d+\.\d+){6} +\d+\.\d+", line)
+        values = line.split()[-7:]
         # Every value ends at the place of the second digit of its uncertainty.
         assert {len(value.partition(".")[2]) for value in values} == {len(values[-1].partition(".")[2])}
 

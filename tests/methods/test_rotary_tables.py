@@ -35,9 +35,9 @@ PITCH = (20.0, 50.0)
 class Layout:
     """The paper's 154 touches and what the closed forms make of a deviation of each along its normal."""
 
-    def __init__(self, simulator) -> None:
+    def __init__(self, simulator, height=160.0) -> None:
         rp = importlib.import_module("simulator.rotary_probing")
-        self.rp, self.plan = rp, rp.paper_plan()
+        self.rp, self.plan = rp, rp.paper_plan(rp.block(height=height))
         self.chain = sys.modules["simulator.chain"].read_topology("w C A Y b X Z t")
         seen = rp.touch(self.chain, self.plan, {}, np.random.default_rng(0))
         self.position = np.column_stack([seen[axis] for axis in "XYZ"])
@@ -147,6 +147,24 @@ def test_table_6_combined_uncertainties_within_15_per_cent(layout):
             assert found_u == pytest.approx(2.4, rel=0.1)
         else:
             assert abs(found_u - printed) <= 0.15 * printed + 0.05, (symbol, found_u, printed)
+
+
+def test_table_6_no_height_of_the_side_rows_explains_dy_ca(simulator, layout, monkeypatch):
+    """docs/rotary-probing.md: 2.4 and 2.7 µm with rows at 160 and 135 mm, 5.3 and 4.6 µm by Eq. (17) as printed; 3.5
+    printed."""
+    monkeypatch.setattr(sys.modules[__name__], "RUNS", 1000)
+    of_y, of_c = PARAMETERS.index("EY0A"), PARAMETERS.index("EY0C")
+    for rows, expected, as_printed in ((layout, 2.4, 5.3), (Layout(simulator, 135.0), 2.7, 4.6)):
+        right = rows.slopes
+        found = []
+        # dy_CA = s - dy_AY with s the half sum; as printed the sum itself stands there.
+        for slope in (right[of_c], 2.0 * (right[of_c] + right[of_y]) - right[of_y]):
+            rows.slopes = right.copy()
+            rows.slopes[of_c] = slope
+            parts = rows.contributions(np.random.default_rng(6), 2.0, 2.0).values()
+            found.append(float(np.sqrt(sum(part[of_c] ** 2 for part in parts))))
+        rows.slopes = right
+        assert found == pytest.approx([expected, as_printed], rel=0.05)
 
 
 def test_e11_the_printed_columns_do_not_add_up_to_table_6_exactly():

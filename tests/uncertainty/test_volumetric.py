@@ -10,7 +10,8 @@ from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import solve
 from monitor.methods.samba.method import problem_of
 from monitor.methods.samba.virtual import ERRORS, GAINS, virtual_campaign
-from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
+from monitor.uncertainty.geometric_errors import GeometricErrors
+from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 
 RANGES = {"X": (-200.0, 200.0), "Y": (-150.0, 150.0), "Z": (-100.0, 220.0)}
 

@@ -11,11 +11,12 @@ from monitor.effects.shapes.formula import FormulaShape
 from monitor.effects.shapes.harmonic import Harmonic
 from monitor.effects.shapes.nodes import Nodes, nodes_text
 from monitor.effects.shapes.poly import Poly
-from monitor.effects.shapes.reversal import Reversal
+from monitor.effects.shapes.reversal import REVERSAL_VALUE, Reversal, has_reversal_value
 from monitor.effects.shapes.table import TABLE_NODES, Table
 from monitor.exceptions import EffectError
 
 __all__ = [
+    "REVERSAL_VALUE",
     "TABLE_NODES",
     "Compliance",
     "Const",
@@ -26,6 +27,7 @@ __all__ = [
     "Poly",
     "Reversal",
     "Table",
+    "has_reversal_value",
     "nodes_text",
     "parse_shape",
 ]

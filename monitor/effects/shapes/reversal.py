@@ -11,6 +11,15 @@ from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape
 from monitor.records import Array
 
+#: ISO 230-2:2014, 3.15: the reversal value is the difference of the positions reached from the two directions, so twice
+#: the amplitude, which adds to one and is taken off the other.
+REVERSAL_VALUE = 2.0
+
+
+def has_reversal_value(effect: str) -> bool:
+    """Whether an effect, as written, is a play of constant size: one that a reversal value states."""
+    return effect.partition(":")[2] == "reversal"
+
 
 @dataclass(frozen=True)
 class Reversal(DescribedShape):
@@ -29,7 +38,8 @@ class Reversal(DescribedShape):
         if error.is_of_drive:
             return Explanation(
                 f"backlash or wind-up of the drive of {name}: worn nut, loose coupling or thrust bearing, friction",
-                f"check nut, coupling and thrust bearing of {name}; then set the control's backlash compensation",
+                f"check nut, coupling and thrust bearing of {name}; then set the control's backlash compensation "
+                "to the reversal value, which is twice the amplitude",
                 POSITIONING,
             )
         return Explanation(

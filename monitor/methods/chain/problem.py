@@ -116,6 +116,28 @@ class ChainProblem(ABC):
         return np.zeros((len(self.runs), 0)), np.zeros((len(self.runs), 0, nuisance.shape[1]))
 
     @property
+    def standard_lengths(self) -> Array:
+        """Change (e,) of each calibrated quantity with a strain of the measurement standard of 1, in the unit that its
+        deviation has as an input of the uncertainty: 0 where no standard expands."""
+        return np.zeros(len(self.extra_names))
+
+    @property
+    def touches_centres(self) -> bool:
+        """Whether a row is the centre of a ball, from touches all around it."""
+        return False
+
+    @property
+    def touch_normals(self) -> Array | None:
+        """Outward normals (n, 3) of the touched surface in the frame of the last work axis; None where a row is no
+        single touch."""
+        return None
+
+    @property
+    def touched_balls(self) -> npt.NDArray[np.bool_]:
+        """Whether (n,) a row is a touch of a ball."""
+        return np.full(len(self.context), self.touches_centres)
+
+    @property
     def movable(self) -> tuple[str, ...]:
         """The targets that may come loose and stand elsewhere, each with three coordinates of its own."""
         return ()

@@ -53,6 +53,16 @@ class TouchProblem(ChainProblem):
         return np.tile(np.concatenate([nominal, self.tip]), (len(self.runs), 1))
 
     @property
+    def standard_lengths(self) -> Array:
+        """The calibrated distances, in mm."""
+        return np.array([distance.length[0] for distance in self.distances])
+
+    @property
+    def touches_centres(self) -> bool:
+        """Always."""
+        return True
+
+    @property
     def movable(self) -> tuple[str, ...]:
         """The balls."""
         return self.targets

@@ -107,6 +107,14 @@ class LShapeProblem(ChainProblem):
     def extra_names(self) -> tuple[str, ...]:
         return tuple(name for name in self.own_names if name.startswith("module "))
 
+    @property
+    def standard_lengths(self) -> Array:
+        """Places of the modules from the reference, in their standard uncertainties; tilts do not change."""
+        centres = np.array([self.piece.modules[index].centre for index in self.calibrated])
+        strained = np.zeros((len(self.calibrated), len(_CALIBRATION)))
+        strained[:, :2] = centres - np.array(self.piece.modules[self.piece.reference].centre)
+        return strained.ravel() / self.piece.place_uncertainty
+
     def _parts(self, nuisance: Array) -> tuple[Array, Array]:
         """Setup (n, 5) of every row's placement and deviations (n, 4) of its module, in mm and rad."""
         count = len(SETUP) * len(self._used)

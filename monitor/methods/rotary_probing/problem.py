@@ -88,6 +88,16 @@ class RotaryProblem(ChainProblem):
         """The linear axes: they stop where the tip meets the surface."""
         return tuple(index for index, joint in enumerate(self.context.chain.joints) if not joint.turns)
 
+    @property
+    def touch_normals(self) -> Array:
+        """The normals."""
+        return self.normal
+
+    @property
+    def touched_balls(self) -> npt.NDArray[np.bool_]:
+        """The touches of spheres."""
+        return self.ball
+
     def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """Points of the surface (of the surface that the tip's centre meets) and the tip."""
         mine = nuisance[self._run]

@@ -15,8 +15,10 @@ from monitor.readers.machine_file import MachinePart, read_machine
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, method_rules
 from monitor.readers.setups_file import probe_of, read_setups
+from monitor.readers.sources_file import read_sources
 from monitor.readers.toml_table import Table, parse_toml
 from monitor.records import Artefact, Campaign, Probe, SourceFile
+from monitor.sources import Source
 
 TOML = "campaign.toml"
 FILES = (TOML, runs_file.FILE, probings_file.FILE)
@@ -39,6 +41,7 @@ class _Head:
     probe: Probe | None
     artefact: Artefact | None
     balls: list[str] | None
+    sources: tuple[Source, ...] = ()
 
 
 _EMPTY = _Head(None, None, None, MachinePart(None, None, {}), None, None, None)
@@ -88,7 +91,7 @@ def _campaign(
     probe = head.probe or probe_of(head.artefact.setups, part.probings)
     return Campaign(
         head.name, head.method, head.machine.machine, probe, head.artefact, runs.runs, part.probings,
-        files,
+        files, head.sources,
     )  # fmt: skip
 
 
@@ -107,8 +110,9 @@ def _head(text: str | None, faults: Faults) -> _Head:
     fits = _artefact_fits(top, artefact, rules)
     setups = read_setups(top) if has_setups else ()
     artefact = None if artefact is None or setups is None else replace(artefact, setups=setups)
+    sources = read_sources(top, machine.axes)
     top.finish()
-    return _Head(name, method, rules, machine, probe, artefact if fits else None, balls)
+    return _Head(name, method, rules, machine, probe, artefact if fits else None, balls, sources)
 
 
 def _check_plan(head: _Head, part: probings_file.ProbingsPart, faults: Faults) -> None:

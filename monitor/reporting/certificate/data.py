@@ -13,10 +13,12 @@ import numpy as np
 
 from monitor.documents import to_document
 from monitor.reporting.certificate.dcc import dcc_xml
+from monitor.reporting.certificate.machine_frame_result import MachineFrameResult
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric import POINTS_FILE
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
+from monitor.reporting.frames import sum_words
 from monitor.reporting.texts import texts_of
 
 
@@ -55,6 +57,10 @@ def certificate_files(
         files.append(Attached(f"results-{number}.csv", _estimates(result), description, "Data"))
         description = texts("files.covariance", state=result.state)
         files.append(Attached(f"covariance-{number}.csv", _covariance(result), description, "Data"))
+        if result.machine_frame is not None and result.machine_frame.names:
+            description = texts("files.machine_frame", state=result.state)
+            content = _machine_frame(result.machine_frame)
+            files.append(Attached(f"machine-frame-{number}.csv", content, description, "Data"))
     for number, volumetric in enumerate(record.volumetric, start=1):
         description = texts("files.map", state=volumetric.state)
         files.append(Attached(POINTS_FILE.format(place=number), _points(volumetric), description, "Data"))
@@ -91,6 +97,23 @@ def _estimates(result: ResultSet) -> bytes:
         "tolerance",
     ]
     return _table([head, *rows])
+
+
+def _machine_frame(result: MachineFrameResult) -> bytes:
+    """Location errors in the machine frame: estimate, standard uncertainty, covariance as in the covariance matrix."""
+    head = ["parameter", "sum_of", "unit", "estimate", "standard_uncertainty"]
+    rows = [
+        [
+            name,
+            sum_words(result.sums[name]),
+            unit,
+            *(repr(float(number)) for number in (value, u, *covariance)),
+        ]
+        for name, unit, value, u, covariance in zip(
+            result.names, result.units, result.estimate, result.u, result.covariance, strict=True
+        )
+    ]
+    return _table([[*head, *(f"covariance_{name}" for name in result.names)], *rows])
 
 
 def _limit(limit: float) -> str:

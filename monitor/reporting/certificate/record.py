@@ -8,10 +8,11 @@ What does not apply is said by the laboratory in words, with ``NotApplicable``.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
 
+from monitor.documents import OMITTED
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.texts import ENGLISH
@@ -90,19 +91,27 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class ConformityVerdict:
-    """What is stated of one parameter: its tolerance (limit of the absolute value) and probability of conformity."""
+    """What is stated of one parameter: its tolerance (limit of the absolute value) and probability of conformity.
+
+    ``guard_band`` w of the rule in the parameter's unit; None in a record of an earlier version. ``consumers_risk`` and
+    ``producers_risk`` are the global risks of the rule (JCGM 106:2012, 9.5) where the spread of the process is stated.
+    """
 
     name: str
     unit: str
     tolerance: float
     verdict: Verdict
     probability: float
+    guard_band: float | None = field(default=None, metadata=OMITTED)
+    consumers_risk: float | None = field(default=None, metadata=OMITTED)
+    producers_risk: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
 class ConformityStatement:
     """A statement of conformity: decision rule and risk in words, the verdicts, the joint probability of conformity.
 
+    ``process`` says in words by which spread of the true values the global risks were found, None where by none.
     ``state``: to which results it applies; ``basis``: from where the tolerances are, and by which distribution the
     probabilities were found (ISO/IEC 17025:2017, 7.8.6.2).
     """
@@ -113,6 +122,7 @@ class ConformityStatement:
     joint_probability: float
     state: str
     basis: str
+    process: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from monitor.documents import OMITTED
+
+
+@dataclass(frozen=True)
+class ReversalValue:
+    """The reversal value of a play (ISO 230-2), twice its amplitude, with its standard uncertainty."""
+
+    value: float
+    u: float
+    unit: str
 
 
 @dataclass(frozen=True)
 class MissingEffect:
-    """An effect that the model lacks, its cause and what to do."""
+    """An effect that the model lacks, its cause and what to do; of a play its ``reversal`` value."""
 
     effect: str
     meaning: str
@@ -17,6 +28,7 @@ class MissingEffect:
     rms_before_um: float | None
     rms_after_um: float | None
     not_ruled_out: tuple[str, ...]
+    reversal: ReversalValue | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,7 @@ class PrintedMachine:
     refused: tuple[tuple[str, str], ...]
     imports: tuple[PrintedRefusal, ...]
     pictures: PrintedPictures
+    reversal: str
 
 
 def fleet_context(fleet: Fleet) -> dict[str, Any]:
@@ -153,7 +154,18 @@ def _page(health: MachineHealth) -> PrintedMachine:
         refused=health.quality.refused,
         imports=tuple(printed_refusal(refusal) for refusal in health.quality.refused_imports),
         pictures=printed_pictures(health.model),
+        reversal=_reversal(health),
     )
+
+
+def _reversal(health: MachineHealth) -> str:
+    """The reversal value of the first missing effect, where that is a play; it stands beside what to do about it."""
+    missing = () if health.model is None else health.model.missing
+    if not missing or missing[0].reversal is None:
+        return ""
+    reversal = missing[0].reversal
+    value, u = in_words(reversal.value, reversal.u)
+    return f"{value} ± {u} {reversal.unit} (ISO 230-2: from one direction to the other, twice the amplitude)"
 
 
 def _range(condition: ConditionRange) -> str:
@@ -208,7 +220,12 @@ def _drift(parameter: ParameterHealth) -> str:
         first, last = parameter.drift.crosses_between
         when = f" ({first} at the earliest)" if first else ""
         when = f" ({first} to {last})" if first and last else when
-        sentence += f"; tolerance reached about {parameter.drift.crosses_at}{when}"
+        past = parameter.history.times and parameter.drift.crosses_at <= parameter.history.times[-1].date()
+        sentence += (
+            f"; already beyond its tolerance since about {parameter.drift.crosses_at}"
+            if past
+            else f"; tolerance reached about {parameter.drift.crosses_at}{when}"
+        )
     return sentence
 
 
@@ -236,6 +253,15 @@ def _map(error_map: VolumetricMap | None) -> tuple[tuple[str, str], ...]:
         ),
         ("root mean square", f"{plain(float(f'{error_map.rms_um:.3g}'))} µm over {error_map.region}"),
     ]
+    if error_map.limit_um is not None and error_map.probability_out is not None:
+        beyond = "beyond it" if error_map.worst_um > error_map.limit_um else "within it"
+        lines.append(
+            (
+                "limit",
+                f"{plain(error_map.limit_um)} µm for the worst: {beyond}, "
+                f"P(out): {percent(error_map.probability_out)}",
+            )
+        )
     worst_poses = sorted(error_map.by_pose, key=lambda pose: -pose.worst_um)[:_POSES_SHOWN]
     if worst_poses:
         poses = "; ".join(

@@ -6,10 +6,11 @@ that could not be made is a text that says why, never an empty place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from typing import Literal
 
+from monitor.documents import OMITTED
 from monitor.reporting.health.comparison import ModelHealth
 from monitor.reporting.svg.map_slices import Slice
 
@@ -25,8 +26,9 @@ State = Literal[
 ]
 #: The states by urgency, the most urgent first, and what each means.
 STATES: dict[State, str] = {
-    "out of tolerance": "a parameter is more likely beyond its tolerance than within it",
-    "may be out of tolerance": "the probability that a parameter is beyond its tolerance exceeds the stated limit",
+    "out of tolerance": "a parameter or the volumetric error is more likely beyond its tolerance than within it",
+    "may be out of tolerance": "the probability that a parameter or the volumetric error is beyond its tolerance "
+    "exceeds the stated limit",
     "changed": "a parameter or an artefact changed this week",
     "model fails": "the model does not explain the measurements: an effect is missing",
     "suspect data": "bad points were found and left out; nothing else",
@@ -87,9 +89,13 @@ class ParameterHealth:
 
 @dataclass(frozen=True)
 class Change:
-    """Something that happened: found by the statistics (with its p-value) or recorded by people (kind ``event``)."""
+    """Something that happened: found by the statistics (with its p-value) or recorded by people (kind ``event``).
 
-    kind: Literal["change", "event"]
+    What a parameter stepped by at a recorded event is an ``event step``: said like a change, but explained, so that it
+    does not make the state of the machine.
+    """
+
+    kind: Literal["change", "event step", "event"]
     after: datetime | None
     at: datetime
     what: str
@@ -149,7 +155,8 @@ class VolumetricMap:
     """The stored volumetric error map: where it is worst, its expanded uncertainty there, and pose by pose (µm).
 
     ``slices`` are its middle with the rotary axes at zero; empty where the machine has no three linear axes. Their
-    expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``.
+    expanded uncertainties hold with the coverage factor ``k`` for the probability ``p``. ``limit_um`` of the
+    machine's file for the worst of them, and the probability to be beyond it.
     """
 
     run: int
@@ -162,6 +169,8 @@ class VolumetricMap:
     slices: tuple[Slice, ...] = ()
     k: float = 2.0
     p: float = 0.95
+    limit_um: float | None = field(default=None, metadata=OMITTED)
+    probability_out: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     runs = _certified(db, campaign, measured, request)
     identity = CertificateIdentity(number, day, label(runs[-1].evaluated.model))
     record = dataclasses.replace(_record(stated, runs, request, identity), replaces=replaced)
-    inputs = inputs_of(runs, request.linear_axes, request.fonts)
+    inputs = inputs_of(runs, request.asked, request.fonts)
     pdf = certificate_pdf(record, request.fonts, to_document(inputs))
     if request.key is not None:
         pdf = sign(pdf, request.key)
@@ -94,7 +94,7 @@ def _certified(
     db: Database, campaign: Campaign, measured: Sequence[Measured], request: CertificateRequest
 ) -> list[CertifiedRun]:
     model = resolve(db, request.model, campaign.method)
-    return [certified_run(db, campaign, model, run, request.linear_axes) for run in measured]
+    return [certified_run(db, campaign, model, run, request.asked) for run in measured]
 
 
 def _save(
@@ -137,7 +137,12 @@ def _record(
     if request.conformity is not None:
         # Of the state in which the machine is handed back.
         statement = statement_of(
-            results[-1], request.conformity, texts, campaign=last.campaign.name, dof=last.dof
+            results[-1],
+            request.conformity,
+            texts,
+            campaign=last.campaign.name,
+            freedoms=dict(zip(last.names, map(float, last.dof_by_parameter), strict=True)),
+            process=request.process,
         )
         record = dataclasses.replace(record, conformity=statement)
     if request.draft and record.title:

@@ -37,6 +37,7 @@ class MachineMissing:
 
     ``heldout_..`` are None with one run of few poses, ``heldout_days_..`` with fewer than three days. ``coinciding``
     are rivals that no data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart.
+    ``reversal_value`` of a play (ISO 230-2) is twice its amplitude: what a backlash compensation is set to.
     """
 
     rank: int
@@ -61,6 +62,7 @@ class MachineMissing:
     standard_deviations_apart: DeviationsApart
     varies_from_run_to_run: bool
     searched: SearchedValue | None = field(default=None, metadata=OMITTED)
+    reversal_value: Estimate | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from monitor.workflow.explain.shared_answer import (
     rivals,
     searched_value,
 )
+from monitor.workflow.identify.answer import Estimate, reversal_value
 
 
 def micrometres(length: float | None) -> float | None:
@@ -88,6 +89,9 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         standard_deviations_apart=DeviationsApart(effect.separation.before, effect.separation.after),
         varies_from_run_to_run=effect.varies,
         searched=searched_value(effect),
+        reversal_value=reversal_value(
+            effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
+        ),
     )
 
 

@@ -25,6 +25,7 @@ from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExp
 from monitor.workflow.health.forecast import DriftForecast, stated_drift
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import local_time
+from monitor.workflow.history.event_steps import EventStep
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
@@ -85,6 +86,7 @@ def moment_of(t: float, series: Series) -> datetime:
 def changes_noted(
     past: Mapping[str, ParameterPast],
     events: Sequence[MachineEvent],
+    steps: Sequence[EventStep],
     explanation: MachineExplanation | None,
     runs: Sequence[RecordedRun],
     week: Week,
@@ -97,6 +99,9 @@ def changes_noted(
             after = moment_of(change.interval[0], parameter.series)
             sentence = _change_in_words(change, parameter.series.unit)
             noted.append(Change("change", after, at, sentence, change.p_value, week.holds(at)))
+    for step in steps:
+        at = step.event.at.replace(tzinfo=None)
+        noted.append(Change("event step", None, at, _step_in_words(step), step.p_value, week.holds(at)))
     starts = {run.run: run.local_start for run in runs}
     for move in () if explanation is None else explanation.changes:
         if not isinstance(move, ChangedParameter) and move.run in starts:
@@ -111,6 +116,16 @@ def event_noted(event: MachineEvent, week: Week) -> Change:
     """An event as the page states it."""
     at = event.at.replace(tzinfo=None)
     return Change("event", None, at, f"{event.kind}: {event.description}", None, week.holds(at))
+
+
+def _step_in_words(step: EventStep) -> str:
+    """What a parameter stepped by at an event, and that one knows since when."""
+    size, u = in_words(step.size, step.u, sign=True)
+    days = "" if step.by_days else " by the runs; too few days to know how days differ"
+    return (
+        f"{step.parameter} stepped by {size} {step.unit} at the event '{step.event.description}' "
+        f"(u = {u} {step.unit}{days})"
+    )
 
 
 def _change_in_words(change: FoundChange, unit: str) -> str:

@@ -25,7 +25,7 @@ from monitor.workflow.health.facts import (
     parameter_health,
 )
 from monitor.workflow.health.forecast import drift_forecast
-from monitor.workflow.health.map import stated_map
+from monitor.workflow.health.map import probability_beyond, stated_map
 from monitor.workflow.health.model import model_health
 from monitor.workflow.health.refusals import refused_of
 from monitor.workflow.health.request import ReportOptions
@@ -40,12 +40,15 @@ from monitor.workflow.health.verdict import (
     refusals_in_words,
     since_when,
     state_of,
+    with_volumetric,
 )
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.calendar import days_since_1970
+from monitor.workflow.history.event_steps import event_steps
 from monitor.workflow.history.past import machine_past, splitting_events
 from monitor.workflow.history.runs import only_runs
 from monitor.workflow.models import resolve
+from monitor.workflow.trend.volumetric import VOLUMETRIC
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,14 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     history = only_runs(history, past.runs)
     parameter_pasts = machine_past(history, splitting_events(past.events))
     limits = campaign_tolerances(db, last.campaign)
-    judged = conformity_of(stated, limits)
+    limit_um, beyond = limits.get(VOLUMETRIC), None
+    if limit_um is not None and results.map is not None:
+        beyond = probability_beyond(results.map, limit_um)
+    elif limit_um is not None:
+        remarks.append(
+            f"the volumetric error has a limit of {limit_um:g} µm, but no map: it is not judged against it"
+        )
+    judged = with_volumetric(conformity_of(stated, limits), beyond)
     parameters, drifts = [], {}
     for name in () if stated is None else stated.parameters:
         if stated is None or name not in parameter_pasts:
@@ -135,7 +145,14 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         judgement = Judgement(limits.get(name), judged.single.get(name), drifts[name])
         parameters.append(parameter_health(parameter, starts, stated, judgement, week))
     of_campaign = [run for run in past.runs if run.campaign == last.campaign]
-    noted = changes_noted(parameter_pasts, past.events, explanation, of_campaign, week)
+    noted = changes_noted(
+        parameter_pasts,
+        past.events,
+        event_steps(parameter_pasts, past.events),
+        explanation,
+        of_campaign,
+        week,
+    )
     quality = data_quality(db, past.runs_of_week, explanation, stated, past.refused, remarks)
     state = state_of(judged, noted, explanation, quality, past.options.risk)
     return MachineHealth(
@@ -147,7 +164,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         basis="" if stated is None else stated.input_covariance, factor=factor_in_words(stated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=condition_ranges(past.runs_of_week),
         model=model_health(explanation, results.versions, measured.span), quality=quality,
-        map=stated_map(results.map),
+        map=stated_map(results.map, limit_um, beyond),
     )  # fmt: skip
 
 

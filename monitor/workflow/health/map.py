@@ -8,8 +8,26 @@ from monitor.reporting.health.records import PoseError, VolumetricMap
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 
 
-def stated_map(answer: VolumetricAnswer | None) -> VolumetricMap | None:
-    """The map as the report states it; None where there is none."""
+def probability_beyond(answer: VolumetricAnswer, limit_um: float) -> float:
+    """The probability that the worst error of a map is beyond its limit (JCGM 106:2012, 7), by Student's t
+    distribution.
+
+    That of the point that is worst by the estimates: the length of a vector with its own uncertainty.
+    """
+    from scipy.special import ndtr, stdtr
+
+    beyond = answer.worst.error_um - limit_um
+    if answer.worst.u_um <= 0.0:
+        return float(beyond > 0.0)
+    freedom = answer.degrees_of_freedom
+    z = beyond / answer.worst.u_um
+    return float(ndtr(z) if freedom is None else stdtr(freedom, z))
+
+
+def stated_map(
+    answer: VolumetricAnswer | None, limit_um: float | None = None, probability_out: float | None = None
+) -> VolumetricMap | None:
+    """The map as the report states it, with its limit where there is one; None where there is no map."""
     if answer is None:
         return None
     return VolumetricMap(
@@ -26,6 +44,8 @@ def stated_map(answer: VolumetricAnswer | None) -> VolumetricMap | None:
         slices=answer.slices,
         k=answer.k,
         p=answer.p,
+        limit_um=limit_um,
+        probability_out=probability_out,
     )
 
 

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from monitor.reporting.health.comparison import ErrorStep, MissingEffect, ModelHealth
+from monitor.reporting.health.comparison import ErrorStep, MissingEffect, ModelHealth, ReversalValue
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.version_answer import CurveVersion, HistoryAnswer, MachineVersion
 from monitor.workflow.health.runs import Span
+from monitor.workflow.identify.answer import Estimate
 
 
 def model_health(
@@ -42,6 +43,7 @@ def model_health(
                 _finite(effect.rms_before_um),
                 _finite(effect.rms_after_um),
                 effect.indistinguishable_from,
+                _reversal(effect.reversal_value),
             )
             for effect in explanation.missing
         ),
@@ -50,6 +52,10 @@ def model_health(
         against=explanation.residual_against,
         steps=tuple(_steps(explanation, () if versions is None else versions.steps)),
     )
+
+
+def _reversal(value: Estimate | None) -> ReversalValue | None:
+    return None if value is None else ReversalValue(value.value, value.u, value.unit)
 
 
 def _finite(value: float | None) -> float | None:

@@ -22,6 +22,7 @@ from monitor.uncertainty.conformity import conformity
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.health.forecast import DriftForecast
 from monitor.workflow.health.weeks import Week
+from monitor.workflow.trend.volumetric import VOLUMETRIC
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
 
@@ -48,13 +49,26 @@ def conformity_of(stated: UncertaintyAnswer | None, limits: Mapping[str, float])
     return Conformity(single, float(1.0 - result.joint), all(name in limits for name in names))
 
 
+def with_volumetric(judged: Conformity, probability_out: float | None) -> Conformity:
+    """The judgement with that of the volumetric error beside it; as it was where there is none.
+
+    The volumetric error is made of the same parameters. The probability of any to be out is at most the sum, which is
+    taken: an alarm must not hide behind a correlation that nobody stored.
+    """
+    if probability_out is None:
+        return judged
+    single = {**judged.single, VOLUMETRIC: probability_out}
+    return Conformity(single, min(1.0, (judged.any or 0.0) + probability_out), judged.every_has_one)
+
+
 def changed_in_words(
     noted: Sequence[Change], explanation: MachineExplanation | None, quality: DataQuality
 ) -> str:
-    """What is new this week: changes, then events, what the model lacks, and data that never came in."""
+    """What is new this week: changes, then steps at events, then events, what the model lacks, and data that never
+    came in."""
     sentences = [
         change.what
-        for kind in ("change", "event")
+        for kind in ("change", "event step", "event")
         for change in noted
         if change.this_week and change.kind == kind
     ]
@@ -81,8 +95,9 @@ def since_when(
     """Since when the machine is in this state: beyond a tolerance, another one than before, or not explained by the
     model, which then is so from the first run ``compared`` with it."""
     beyond = [parameter.out_since for parameter in parameters if parameter.out_since is not None]
-    if state == "out of tolerance" and beyond:
-        return min(beyond)
+    if state in ALARMS:
+        # Of the volumetric error there is no value run by run: no day is better than a wrong one.
+        return min(beyond, default=None)
     if state == "model fails":
         return compared
     changed = [change for change in noted if change.kind == "change"]

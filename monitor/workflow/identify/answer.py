@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED
+from monitor.effects.shapes import REVERSAL_VALUE, has_reversal_value
 from monitor.methods.chain.identification import TakenUp
+from monitor.records import FrameOfReference
 from monitor.reporting.refused import RefusedParameters
 
 
@@ -17,6 +19,13 @@ class Estimate:
     value: float
     u: float
     unit: str
+
+
+def reversal_value(effect: str, amplitude: Estimate) -> Estimate | None:
+    """The reversal value (ISO 230-2) of a play of that amplitude; None for an effect, as written, of another shape."""
+    if not has_reversal_value(effect):
+        return None
+    return Estimate(REVERSAL_VALUE * amplitude.value, REVERSAL_VALUE * amplitude.u, amplitude.unit)
 
 
 @dataclass(frozen=True)
@@ -100,7 +109,8 @@ class IdentifyAnswer:
     """The runs of a campaign under a model; ``added`` are the effects that all runs share, ``taken_up`` the errors that
     no plan gives a number of their own, where the method names them.
 
-    A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither.
+    A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither; a machine has ``frames``, what
+    each parameter is stated relative to, and the ``reversal_values`` (ISO 230-2) of plays among the added effects.
     """
 
     campaign: str
@@ -113,6 +123,8 @@ class IdentifyAnswer:
     added_refused: tuple[RefusedParameters, ...]
     autocorrelation: CurveNoise | None = field(default=None, metadata=OMITTED)
     taken_up: tuple[TakenUp, ...] | None = field(default=None, metadata=OMITTED)
+    frames: Mapping[str, FrameOfReference] | None = field(default=None, metadata=OMITTED)
+    reversal_values: Mapping[str, Estimate] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

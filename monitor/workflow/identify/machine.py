@@ -7,13 +7,15 @@ import numpy as np
 from monitor.methods import campaign_method
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.problem import Solver, solve_problem
+from monitor.methods.model import chain_of
 from monitor.records import Array, Campaign, Machine
 from monitor.reporting.refused import refusal_sentence, refused_parameters
 from monitor.store import StoredIdentification, StoredModel, StoredRun
 from monitor.units import MICROMETRE, Unit
-from monitor.workflow.identify.answer import Estimate, IdentifyAnswer, MachineRun
+from monitor.workflow.identify.answer import Estimate, IdentifyAnswer, MachineRun, reversal_value
 from monitor.workflow.identify.notes import note
 from monitor.workflow.models import as_model
+from monitor.workflow.uncertainty.machine_frame import frames_of
 
 
 def identified(
@@ -29,20 +31,26 @@ def identified(
 
 def machine_answer(machine: Machine, identification: Identification) -> IdentifyAnswer:
     """The identification of a machine in display units, with notes."""
+    added = _estimates(
+        identification.added,
+        identification.added_units,
+        identification.added_estimate,
+        identification.added_covariance,
+    )
+    values = {
+        name: value for name, each in added.items() if (value := reversal_value(name, each)) is not None
+    }
     return IdentifyAnswer(
         campaign=identification.campaign,
         model=identification.model,
         machine=machine.id,
         method=identification.method,
         runs=tuple(_run(machine, identification, run) for run in identification.runs),
-        added=_estimates(
-            identification.added,
-            identification.added_units,
-            identification.added_estimate,
-            identification.added_covariance,
-        ),
+        added=added,
         added_refused=tuple(map(refused_parameters, identification.added_refused)),
         taken_up=identification.taken_up or None,
+        frames=frames_of((*identification.parameters, *identification.added), chain_of(machine)),
+        reversal_values=values or None,
     )
 
 

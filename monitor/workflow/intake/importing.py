@@ -84,6 +84,11 @@ def _import(db: Database, folder: Path) -> Imported:
             check_base(campaign)
             imported = import_curve(db, campaign)
         else:
+            if campaign.sources:
+                # Loaded here: hardly any campaign states sources, and the solver takes a third of a second.
+                from monitor.workflow.intake.checked_sources import check_sources
+
+                check_sources(campaign)
             notes = (*check_copies(db, campaign), *doubts(campaign))
             imported = import_campaign(db, campaign, notes)
     except StoreError:

@@ -74,6 +74,23 @@ class DatedChange:
 
 
 @dataclass(frozen=True)
+class StepAtEvent:
+    """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
+
+    ``scatter_of`` says by what the uncertainty is: ``days`` or, where they are too few, ``runs``.
+    """
+
+    at: str
+    kind: str
+    description: str
+    size: float
+    u: float
+    unit: str
+    p_value: float
+    scatter_of: str
+
+
+@dataclass(frozen=True)
 class ConditionEffect:
     """How a parameter goes with a recorded condition, which ran ``from_`` a value ``to`` another.
 
@@ -266,6 +283,7 @@ class ParameterTrend:
     why_no_backtest: str | None
     control: ParameterCharts
     q_value: float | None
+    event_steps: tuple[StepAtEvent, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -284,7 +302,9 @@ class VolumetricTest:
 class VolumetricForecast:
     """When the volumetric error reaches its limit; ``why`` says why that is not forecast.
 
-    ``held`` parameters have no drift and stay where they are; those ``left_out`` are no error of the chain.
+    ``held`` parameters have no drift and stay where they are; those ``left_out`` are no error of the chain. An error
+    that is beyond its limit already is so since ``beyond_since``, by the same drifts; by then at the latest, where
+    they begin.
     """
 
     limit_um: float | None
@@ -303,6 +323,7 @@ class VolumetricForecast:
     backtest: VolumetricTest | None = None
     why_no_backtest: str | None = None
     points: int | None = field(default=None, metadata=OMITTED)
+    beyond_since: str | None = field(default=None, metadata=OMITTED)
     why: str | None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC
 
@@ -24,9 +24,16 @@ from monitor.store import (
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
+from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.runs import same_hours, selected_campaigns
-from monitor.workflow.trend.answer import ControlCharts, ParameterTrend, RecordedEvent, TrendAnswer
+from monitor.workflow.trend.answer import (
+    ControlCharts,
+    ParameterTrend,
+    RecordedEvent,
+    StepAtEvent,
+    TrendAnswer,
+)
 from monitor.workflow.trend.control import Charts, points_of
 from monitor.workflow.trend.forecast import backtested, limit_forecast
 from monitor.workflow.trend.parameter import (
@@ -138,6 +145,7 @@ def _answer(
     check = _next_check(history, request)
     page = _Page(request, history, charts, check)
     parameters = _with_discovery_rates({name: page.parameter(parameter) for name, parameter in past.items()})
+    parameters = _with_event_steps(parameters, event_steps(past, events))
     control = ControlCharts(
         charts.period(), charts.of_vector(history.parameters, np.random.default_rng(SEED))
     )
@@ -224,6 +232,26 @@ class _Page:
             for name in list(dict.fromkeys(method.tolist()))[1:]:
                 channels[f"method {name}"] = (method == name).astype(np.float64)
         return channels
+
+
+def _with_event_steps(
+    parameters: Mapping[str, ParameterTrend], steps: Sequence[EventStep]
+) -> dict[str, ParameterTrend]:
+    """The parameters with what each stepped by at recorded events."""
+    return {
+        name: replace(
+            parameter,
+            event_steps=tuple(
+                StepAtEvent(
+                    step.event.at.astimezone(UTC).isoformat(), step.event.kind, step.event.description, step.size,
+                    step.u, step.unit, step.p_value, "days" if step.by_days else "runs",
+                )
+                for step in steps
+                if step.parameter == name
+            ),
+        )
+        for name, parameter in parameters.items()
+    }  # fmt: skip
 
 
 def _with_discovery_rates(parameters: Mapping[str, ParameterTrend]) -> dict[str, ParameterTrend]:

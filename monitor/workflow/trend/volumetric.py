@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from datetime import timedelta
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,8 @@ from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import VolumetricForecast, VolumetricTest
 from monitor.workflow.trend.forecast import HORIZON_YEARS, interval_or_none
 
+#: Times between the begin of the drifts and now at which the error is compared with its limit, for the day since when.
+SINCE_STEPS = 400
 #: The tolerance of the machine file that is no parameter's.
 VOLUMETRIC = "volumetric"
 METHOD = (
@@ -103,7 +106,8 @@ def _vectors(
     # Loaded here: pages without a limit of the volumetric error start without the methods and all that they need.
     from monitor.discovery import fit
     from monitor.effects import ChainEffect
-    from monitor.uncertainty.volumetric import GeometricErrors, grid, middle, volumetric_error
+    from monitor.uncertainty.geometric_errors import GeometricErrors
+    from monitor.uncertainty.volumetric import grid, middle, volumetric_error
     from monitor.workflow.identify.fitting import machine_problem
     from monitor.workflow.models import resolve
     from monitor.workflow.volumetric.error_map import poses_of, ranges_of
@@ -196,6 +200,21 @@ def _backtest(
     ), None  # fmt: skip
 
 
+def _beyond_since(
+    parameters: _Extrapolated, vectors: _Vectors, limit: float, now: float, offset: timedelta
+) -> str | None:
+    """Since when the drifts put the error beyond its limit without a break; None where it is not beyond it now."""
+    begins = max(float(drift.piece.t[0]) for drift in parameters.drifts.values())
+    times = np.linspace(min(begins, now), now, SINCE_STEPS)
+    levels = np.column_stack(
+        [line.level_at + line.slope * (times - line.at) for line in parameters.lines.values()]
+    )
+    inside = np.flatnonzero(ErrorVectors(vectors.sensitivity, vectors.at_zero).longest(levels) <= limit)
+    if len(inside) and inside[-1] == len(times) - 1:
+        return None
+    return date(float(times[0 if not len(inside) else inside[-1] + 1]), offset)
+
+
 def volumetric_forecast(
     db: Database,
     history: MachineHistory,
@@ -243,6 +262,7 @@ def volumetric_forecast(
     return replace(
         none,
         latest_um=ahead.latest,
+        beyond_since=_beyond_since(parameters, vectors, limit, now, offset),
         crosses_limit_at=None if ahead.crossing.at is None else date(ahead.crossing.at, offset),
         crosses_limit_interval=interval_or_none(low, high),
         predicted_um=float(ahead.predicted[0]),

@@ -1,102 +1,178 @@
 """Compensation tables from a volumetric map, as plain CSV; a controller's own format is made from them.
 
-``positioning-csv``: one file with a table for every linear axis, along the line through the datum with the rotary
-axes at zero: the positioning error of the axis itself (its EXX and what was added to it) as a function of its
-reading. ``volumetric-csv``: the error of the tip relative to the workpiece at every point of the map. Errors are
-actual less commanded; the correction, to be added to the commanded reading, is the negative. No controller's own
-format is written: none could be tried on a controller.
+``positioning-csv``: a table for every axis with a positioning error of its own (EXX, ECC and what was added to them),
+along the line through the middle of the strokes with the rotary axes at zero; rotary axes in a file of their own.
+``volumetric-csv``: the error of the tip relative to the workpiece at every point of the map, and the corrections of
+the linear axes' readings that cancel it. A correction is always of a reading as the control shows it; the lines
+before the columns' names say what is added to what. No controller's own format is written: none could be tried on a
+controller.
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from monitor.effects import ChainEffect
-from monitor.machine import MOTION
+from monitor.exceptions import InputError
+from monitor.machine import Joint
 from monitor.records import Array
-from monitor.uncertainty.volumetric import middle, volumetric_error
-from monitor.units import DEGREE, MICROMETRE
+from monitor.uncertainty.reading_corrections import (
+    PositioningError,
+    positioning_error,
+    positions_itself,
+    reading_corrections,
+)
+from monitor.uncertainty.volumetric import middle
+from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 from monitor.workflow.figure_files import make_folder
+from monitor.workflow.volumetric.compensation_header import positioning_header, volumetric_header
 from monitor.workflow.volumetric.error_map import VolumetricMap
 
 Row = list[Any]
-# Compensation points along an axis; straight lines between them leave 1/4000 of a quadratic error of the stroke.
+#: Compensation points along an axis at first; straight lines between them leave 1/4000 of a quadratic error of the
+#: stroke.
 TABLE_POINTS = 33
+#: They are doubled until straight lines leave less than this part of the largest error of the axis (or LEAST_LEFT, mm
+#: and rad, below what any control interpolates), at most to MOST_POINTS: a period of 2 mm over a stroke of 500 mm.
+PART_LEFT = 0.005
+LEAST_LEFT = 1e-5
+MOST_POINTS = 4097
 
 
 def write_tables(mapped: VolumetricMap, form: str, folder: Path) -> tuple[str, ...]:
-    """Write the tables of a format; the names of the files."""
+    """Write the tables of a format; the names of the files.
+
+    Raises InputError where the model has no positioning error of any axis to write.
+    """
+    if form == "positioning-csv":
+        written = _positioning(mapped)
+    else:
+        written = {"volumetric": (volumetric_header(mapped), list(_volumetric(mapped)))}
     make_folder(folder)
     evaluated = mapped.evaluated
-    name = f"{evaluated.campaign.name}-run-{evaluated.run}-{form.removesuffix('-csv')}.csv"
-    rows = _positioning(mapped) if form == "positioning-csv" else _volumetric(mapped)
-    path = folder / name
-    with path.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)
-    return (str(path),)
+    paths = []
+    for name, (header, rows) in written.items():
+        path = folder / f"{evaluated.campaign.name}-run-{evaluated.run}-{name}.csv"
+        with path.open("w", encoding="utf-8", newline="") as file:
+            file.writelines(f"# {line}\n" for line in header)
+            csv.writer(file, lineterminator="\n").writerows(rows)
+        paths.append(str(path))
+    return tuple(paths)
 
 
 def _number(value: float, digits: int = 4) -> str:
     return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
-def _along(mapped: VolumetricMap, axis: int) -> tuple[Array, Array, Array]:
-    """Readings (n,) of the linear axis at an index of the chain, its positioning error along itself, its u; mm."""
-    errors = mapped.errors
-    joint = errors.chain.joints[axis]
-    readings = np.linspace(*mapped.ranges[joint.name], TABLE_POINTS)
-    positions = np.tile(middle(errors.chain, mapped.ranges), (TABLE_POINTS, 1))
+def _numbers(values: Iterable[float]) -> list[str]:
+    return [_number(value) for value in values]
+
+
+def _evenly(mapped: VolumetricMap, axis: int, count: int) -> tuple[Array, PositioningError]:
+    """Readings (count,) of the axis at an index, mm or rad, and its error there."""
+    chain = mapped.errors.chain
+    joint = chain.joints[axis]
+    visited = joint.sign * mapped.errors.context.positions[:, axis]
+    low, high = (visited.min(), visited.max()) if joint.turns else mapped.ranges[joint.name]
+    readings = np.linspace(low, high, count)
+    positions = np.tile(middle(chain, mapped.ranges), (count, 1))
     positions[:, axis] = joint.sign * readings
-    of_axis = np.array(
-        [
-            _is_positioning(mapped, effect, axis)
-            for effect in errors.effects
-            for _ in effect.parameters(errors.context)
+    return readings, positioning_error(mapped.errors, axis, positions)
+
+
+def _along(mapped: VolumetricMap, axis: int) -> tuple[Array, PositioningError, float]:
+    """Readings of the axis at an index, its error there, and what straight lines between them leave at most."""
+    count = TABLE_POINTS
+    while True:
+        between, finer = _evenly(mapped, axis, 2 * count - 1)
+        lines = (finer.errors[:-2:2] + finer.errors[2::2]) / 2.0
+        remaining = float(np.abs(finer.errors[1:-1:2] - lines).max())
+        if remaining <= max(PART_LEFT * np.abs(finer.errors).max(), LEAST_LEFT) or count >= MOST_POINTS:
+            return between[::2], PositioningError(finer.errors[::2], finer.u[::2]), remaining
+        count = 2 * count - 1
+
+
+def _positioning(mapped: VolumetricMap) -> dict[str, tuple[Sequence[str], list[Row]]]:
+    """The tables of the linear and of the rotary axes that have a positioning error, by the names of their files."""
+    joints = mapped.errors.chain.joints
+    known = [
+        axis
+        for axis, joint in enumerate(joints)
+        if joint.kind != "spindle" and positions_itself(mapped.errors, axis)
+    ]
+    if not known:
+        raise InputError(
+            f"--compensation positioning-csv: no positioning error of an axis is known from run {mapped.evaluated.run} "
+            f"with model {mapped.evaluated.model.name}; volumetric-csv writes what the known errors do at the tool"
+        )
+    tables: dict[str, tuple[Sequence[str], list[Row]]] = {}
+    for name, turns in (("positioning", False), ("positioning-rotary", True)):
+        axes = [axis for axis in known if joints[axis].turns == turns]
+        if axes:
+            along = {axis: _along(mapped, axis) for axis in axes}
+            header = positioning_header(
+                mapped, {axis: remaining for axis, (_, _, remaining) in along.items()}, turns
+            )
+            rows = [row for axis in axes for row in _axis_rows(joints[axis], *along[axis][:2])]
+            columns = (
+                ["axis", "reading_deg", "error_urad", "correction_urad", "correction_deg", "u_urad"]
+                if turns
+                else ["axis", "reading_mm", "error_um", "correction_um", "u_um"]
+            )
+            tables[name] = (header, [columns, *rows])
+    return tables
+
+
+def _axis_rows(joint: Joint, readings: Array, error: PositioningError) -> Iterator[Row]:
+    unit = MICRORADIAN if joint.turns else MICROMETRE
+    for reading, size, u in zip(readings, error.errors, error.u, strict=True):
+        shown = unit.to_display(float(size))
+        yield [
+            joint.name,
+            _number(DEGREE.to_display(float(reading)) if joint.turns else reading),
+            *_numbers((shown, -shown)),
+            *([_number(DEGREE.to_display(-float(size)), 8)] if joint.turns else []),
+            _number(unit.to_display(float(u))),
         ]
-    )
-    only = volumetric_error(errors, positions, None, np.where(of_axis, errors.estimate, 0.0))
-    # An error of the carriage moves the tip with the tool, against it with the workpiece; in readings it is the same.
-    direction = np.array(joint.direction) * joint.sign * (1.0 if joint.branch == "tool" else -1.0)
-    slopes = np.einsum("nik,i->nk", only.sensitivity[:, :, of_axis], direction)
-    covariance = errors.covariance[np.ix_(of_axis, of_axis)]
-    return readings, only.vectors @ direction, np.sqrt(np.einsum("nk,kl,nl->n", slopes, covariance, slopes))
-
-
-def _is_positioning(mapped: VolumetricMap, effect: ChainEffect, axis: int) -> bool:
-    """Whether an effect is a positioning error of the axis at an index of the chain."""
-    term = effect.term
-    return (term.joint, term.stage, term.component) == (axis, MOTION, mapped.errors.chain.joints[axis].main)
-
-
-def _positioning(mapped: VolumetricMap) -> Iterator[Row]:
-    yield ["axis", "reading_mm", "error_um", "correction_um", "u_um"]
-    um = MICROMETRE.factor
-    for axis, joint in enumerate(mapped.errors.chain.joints):
-        if joint.turns or not any(_is_positioning(mapped, effect, axis) for effect in mapped.errors.effects):
-            continue
-        for reading, error, u in zip(*_along(mapped, axis), strict=True):
-            yield [joint.name, _number(reading), _number(error / um), _number(-error / um), _number(u / um)]
 
 
 def _volumetric(mapped: VolumetricMap) -> Iterator[Row]:
     chain, error, um = mapped.errors.chain, mapped.error, MICROMETRE.factor
+    corrected = reading_corrections(mapped.errors, error)
     shown = [index for index, joint in enumerate(chain.joints) if joint.kind != "spindle"]
+    linear = [chain.joints[index].name.lower() for index in corrected.joints]
     yield [
         *(f"{chain.joints[i].name.lower()}_{'deg' if chain.joints[i].turns else 'mm'}" for i in shown),
         *(f"error_{axis}_um" for axis in "xyz"),
-        *(f"correction_{axis}_um" for axis in "xyz"),
+        *(f"correction_{axis}_um" for axis in linear),
         *(f"u_{axis}_um" for axis in "xyz"),
+        *(f"u_correction_{axis}_um" for axis in linear),
+        "not_corrected_um",
     ]
     u = np.sqrt(np.maximum(np.diagonal(error.covariance, axis1=1, axis2=2), 0.0))
-    for position, vector, u_vector in zip(error.positions, error.vectors, u, strict=True):
+    uncorrected = np.linalg.norm(corrected.uncorrected, axis=1)
+    for row, position in enumerate(error.positions):
         readings = [
             chain.joints[i].sign
             * (DEGREE.to_display(float(position[i])) if chain.joints[i].turns else float(position[i]))
             for i in shown
         ]
-        yield [*map(_number, readings), *(_number(v / um) for v in (*vector, *-vector, *u_vector))]
+        yield [
+            *_numbers(readings),
+            *_numbers(
+                np.concatenate(
+                    [
+                        error.vectors[row],
+                        corrected.corrections[row],
+                        u[row],
+                        corrected.u[row],
+                        uncorrected[row : row + 1],
+                    ]
+                )
+                / um
+            ),
+        ]

@@ -11,7 +11,8 @@ from monitor.exceptions import DataError, InputError
 from monitor.machine import Chain
 from monitor.records import Array, Campaign
 from monitor.reporting.refused import RefusedParameters
-from monitor.uncertainty.volumetric import GeometricErrors, VolumetricError, grid, middle, volumetric_error
+from monitor.uncertainty.geometric_errors import GeometricErrors
+from monitor.uncertainty.volumetric import VolumetricError, grid, middle, volumetric_error
 from monitor.units import MICROMETRE
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 from monitor.workflow.volumetric.known_errors import geometric_errors

@@ -13,7 +13,7 @@ from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
 from monitor.refusal import Reason, ReasonKind, Refusal
 from monitor.reporting.refused import RefusedParameters, refused_parameters
-from monitor.uncertainty.volumetric import GeometricErrors
+from monitor.uncertainty.geometric_errors import GeometricErrors
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 
 

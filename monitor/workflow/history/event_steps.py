@@ -1,0 +1,120 @@
+"""Steps of the parameters at recorded events: what an event changed, in size, as trend and report say it.
+
+The search for changes splits the history at an event and looks within the pieces, so that a step at the event itself is
+never found again. Here it is stated: the mean of the piece after the event less that of the piece before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from monitor.records import Array
+from monitor.store import NOTE, MachineEvent
+from monitor.workflow.history.calendar import days_since_1970
+from monitor.workflow.history.past import ParameterPast
+from monitor.workflow.history.series import Series
+
+#: Probability of any stated step at an event where there is none, over all parameters and events of a machine. Larger
+#: than that of the search: when to look is known beforehand, and an event that was recorded may well have changed
+#: something.
+EVENT_FALSE_ALARM = 0.05
+
+
+@dataclass(frozen=True)
+class EventStep:
+    """A parameter that stepped at an event: ``size`` with its standard uncertainty ``u``, in its display unit.
+
+    ``at`` is the time of the event (days since 1970). ``by_days`` says whether ``u`` and ``p_value`` are by the
+    scatter of the means of days; otherwise by that of the runs, which knows nothing of how days differ.
+    """
+
+    parameter: str
+    unit: str
+    event: MachineEvent
+    at: float
+    size: float
+    u: float
+    p_value: float
+    by_days: bool
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """Both sides of an event compared by the means of their days (None: too few) and by their runs."""
+
+    step: EventStep
+    by_runs: tuple[float, float] | None
+
+
+def event_steps(
+    past: Mapping[str, ParameterPast], events: Sequence[MachineEvent], false_alarm: float = EVENT_FALSE_ALARM
+) -> tuple[EventStep, ...]:
+    """The steps at events that may have changed the machine, of all parameters, in the order of time.
+
+    By the scatter of the days: those whose p-value lies below ``false_alarm`` over the number of comparisons
+    (Bonferroni), so that ``false_alarm`` is the probability of any where there is none. Where a few days leave that
+    open, a step is stated by the scatter of the runs (``by_days`` is false), which knows nothing of how days differ.
+    Of events between the same two runs the last one stands for all.
+    """
+    moments = {days_since_1970(event.at): event for event in events if event.kind != NOTE}
+    compared = [pair for parameter in past.values() for pair in _of_parameter(parameter, moments)]
+    level = false_alarm / max(len(compared), 1)
+    steps = (_stated(pair, level, false_alarm) for pair in compared)
+    return tuple(sorted((step for step in steps if step is not None), key=lambda step: step.at))
+
+
+def _stated(pair: _Compared, level: float, alone: float) -> EventStep | None:
+    """The step as it may be stated, None where it may not: by days at ``level``; by runs where days are not against
+    it."""
+    step = pair.step
+    if step.by_days and step.p_value < level:
+        return step
+    if pair.by_runs is None or (step.by_days and step.p_value >= alone) or pair.by_runs[1] >= level:
+        return None
+    u, p_value = pair.by_runs
+    return replace(step, u=u, p_value=p_value, by_days=False)
+
+
+def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) -> list[_Compared]:
+    steady = past.series.steady
+    ends = np.array([-np.inf, *sorted({*moments, *(change.at for change in past.search.changes)}), np.inf])
+    pairs: dict[int, _Compared] = {}
+    for at, event in sorted(moments.items()):
+        first = int(np.searchsorted(steady.t, at))
+        # An end between the same two runs bounds nothing: only those with a run in between do.
+        earlier = ends[np.searchsorted(steady.t, ends) < first].max(initial=-np.inf)
+        later = ends[np.searchsorted(steady.t, ends) > first].min(initial=np.inf)
+        before = steady.part((steady.t >= earlier) & (steady.t < at))
+        after = steady.part((steady.t >= at) & (steady.t < later))
+        days, runs = _student(_means(before), _means(after)), _student(before.values, after.values)
+        if runs is None and days is None:
+            continue
+        size = float(_means(after).mean() - _means(before).mean())
+        u, p_value = days or runs or (np.nan, 1.0)
+        pairs[first] = _Compared(
+            EventStep(steady.name, steady.unit, event, at, size, u, p_value, days is not None), runs
+        )
+    return list(pairs.values())
+
+
+def _student(first: Array, second: Array) -> tuple[float, float] | None:
+    """Standard uncertainty of the difference of two means and its p-value, with a common scatter; None without one."""
+    freedom = len(first) + len(second) - 2
+    if min(len(first), len(second)) < 1 or freedom < 1:
+        return None
+    squares = float(np.sum((first - first.mean()) ** 2) + np.sum((second - second.mean()) ** 2))
+    u = float(np.sqrt(squares / freedom * (1.0 / len(first) + 1.0 / len(second))))
+    if u <= 0.0:
+        return None
+    # Loaded here: pages without an event do not wait for it.
+    from scipy.special import stdtr
+
+    return u, float(2.0 * stdtr(freedom, -abs(second.mean() - first.mean()) / u))
+
+
+def _means(series: Series) -> Array:
+    _, index = np.unique(series.days, return_inverse=True)
+    return np.asarray(np.bincount(index, series.values) / np.bincount(index))

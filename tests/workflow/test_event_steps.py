@@ -1,0 +1,82 @@
+"""Steps at recorded events: size, uncertainty and p-value by other people's t test, rates over many machines, words."""
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from monitor.store import MachineEvent
+from monitor.workflow.history.changes import ChangeSearch
+from monitor.workflow.history.drift import PieceDrift
+from monitor.workflow.history.event_steps import event_steps
+from monitor.workflow.history.past import ParameterPast
+from monitor.workflow.history.series import Series
+
+START = datetime(2026, 3, 2, 8, tzinfo=UTC)
+REPAIR = MachineEvent(START + timedelta(days=2.5), "repair", "zero of B reset")
+
+
+def _past(name, by_day):
+    """A parameter whose runs of each day are the rows of an array."""
+    days, runs = by_day.shape
+    first = START.timestamp() / 86400.0
+    t = first + np.repeat(np.arange(days), runs) + np.tile(np.arange(runs) * 0.05, days)
+    series = Series(
+        name, "µrad", by_day.ravel(), np.full(days * runs, 1.0), t, np.repeat(np.arange(days), runs),
+        np.zeros(days * runs), np.zeros(days * runs, dtype=np.bool_), timedelta(),
+    )  # fmt: skip
+    return ParameterPast(
+        series, np.ones(days * runs, dtype=np.bool_), ChangeSearch(), PieceDrift(series, -np.inf)
+    )
+
+
+def _runs(rng, days_before, days_after, step, day_sd):
+    values = rng.standard_normal((days_before + days_after, 4)) + day_sd * rng.standard_normal(
+        (days_before + days_after, 1)
+    )
+    values[days_before:] += step
+    return values
+
+
+def test_a_step_is_that_of_a_t_test_of_the_days():
+    values = _runs(np.random.default_rng(2), 3, 4, 15.0, 1.0)
+    (step,) = event_steps({"EB0C": _past("EB0C", values)}, [REPAIR])
+    means = values.mean(axis=1)
+    test = stats.ttest_ind(means[3:], means[:3])
+    assert step.by_days
+    assert step.size == pytest.approx(means[3:].mean() - means[:3].mean())
+    assert step.u == pytest.approx(step.size / test.statistic)
+    assert step.p_value == pytest.approx(test.pvalue)
+    assert step.event is REPAIR
+
+
+def test_a_note_and_an_event_without_runs_on_both_sides_state_nothing():
+    past = {"EB0C": _past("EB0C", _runs(np.random.default_rng(2), 3, 4, 15.0, 1.0))}
+    early = MachineEvent(START - timedelta(days=9), "repair", "before all runs")
+    assert event_steps(past, [MachineEvent(REPAIR.at, "note", "looked at"), early]) == ()
+
+
+def test_one_day_before_and_one_after_are_compared_by_their_runs_and_said_to_be():
+    late = MachineEvent(START + timedelta(days=0.5), "crash", "tool broken")
+    values = _runs(np.random.default_rng(3), 1, 1, 15.0, 0.0)
+    (step,) = event_steps({"EB0C": _past("EB0C", values)}, [late])
+    assert not step.by_days
+    assert step.p_value == pytest.approx(stats.ttest_ind(values[1], values[0]).pvalue)
+
+
+@pytest.mark.parametrize("day_sd", [0.0, 1.0, 2.0])
+def test_false_steps_by_days_hold_their_rate_whatever_the_days_do(day_sd):
+    rng = np.random.default_rng(17)
+    machines = 300
+    stated = sum(
+        any(
+            step.by_days
+            for step in event_steps(
+                {f"E{k}": _past(f"E{k}", _runs(rng, 3, 4, 0.0, day_sd)) for k in range(4)}, [REPAIR]
+            )
+        )
+        for _ in range(machines)
+    )
+    # Nominal 5 % of machines; three standard deviations of 300.
+    assert stated / machines < 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / machines)

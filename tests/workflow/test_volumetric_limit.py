@@ -1,0 +1,103 @@
+"""A limit of the volumetric error binds the weekly report and the fleet as it does the trend page."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from scipy import stats
+
+from monitor.cli.trend_output import _volumetric
+from monitor.documents import from_document, to_document
+from monitor.readers import read_campaign
+from monitor.reporting.health.page import _map
+from monitor.reporting.health.records import VolumetricMap
+from monitor.store import Database, import_campaign
+from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.health.map import probability_beyond, stated_map
+from monitor.workflow.health.verdict import Conformity, state_of, with_volumetric
+from monitor.workflow.identify.identify import identify
+from monitor.workflow.identify.request import IdentifyRequest
+from monitor.workflow.trend.answer import VolumetricForecast
+from monitor.workflow.volumetric.request import VolumetricRequest
+from monitor.workflow.volumetric.volumetric import volumetric_map
+
+
+@dataclass(frozen=True)
+class _Page:
+    """As a page of the report has its map."""
+
+    map: VolumetricMap | None
+
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "five-days"
+NOTHING = SimpleNamespace(suspect=())
+
+
+@pytest.fixture(scope="module")
+def limited(tmp_path_factory):
+    """A machine whose file allows 150 µm, identified and mapped: about 187 µm at worst. Map, rows before, rows
+    after."""
+    folder = tmp_path_factory.mktemp("limited")
+    campaign = read_campaign(EXAMPLE)
+    machine = replace(campaign.machine, tolerances={"volumetric": 150.0, "EXX": 300.0})
+    with Database(folder / "limited.duckdb") as db:
+        import_campaign(db, replace(campaign, machine=machine))
+        identify(db, IdentifyRequest("five-days"))
+        before = fleet(db, FleetRequest(top=0))
+        mapped = volumetric_map(db, VolumetricRequest("five-days", 20, points=2))
+        return mapped, before, fleet(db, FleetRequest(top=0))
+
+
+def test_the_fleet_says_out_of_tolerance_first_and_before_a_map_that_the_limit_is_not_judged(limited):
+    mapped, before, after = limited
+    unjudged = [row for row in before.table if row.parameter == "volumetric error"]
+    assert [row.attention for row in unjudged] == [
+        "limit not judged: no map is stored (monitor map CAMPAIGN)"
+    ]
+    first = after.table[0]
+    assert (first.rank, first.parameter, first.attention) == (1, "volumetric error", "out of tolerance")
+    assert (first.limit, first.latest) == (150.0, pytest.approx(mapped.worst.error_um))
+    assert after.attention["out of tolerance"] == 1
+    assert [row.rank for row in after.table] == list(range(1, 15))
+
+
+def test_jcgm106_7_probability_beyond_the_limit(limited):
+    mapped, _, _ = limited
+    limit = mapped.worst.error_um + 0.5 * mapped.worst.u_um
+    expected = stats.t(mapped.degrees_of_freedom).sf(0.5)
+    assert probability_beyond(mapped, limit) == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_report_is_out_of_tolerance_where_only_the_volumetric_error_is(limited):
+    mapped, _, _ = limited
+    within = Conformity({"EXX": 0.001}, 0.001, every_has_one=True)
+    assert state_of(within, (), None, NOTHING, 0.05) == "in tolerance"
+    beyond = with_volumetric(within, probability_beyond(mapped, 150.0))
+    assert state_of(beyond, (), None, NOTHING, 0.05) == "out of tolerance"
+    assert state_of(with_volumetric(within, 0.06), (), None, NOTHING, 0.05) == "may be out of tolerance"
+    # Without a tolerance of any parameter the limit alone judges.
+    alone = with_volumetric(Conformity({}, None, every_has_one=False), 0.9)
+    assert state_of(alone, (), None, NOTHING, 0.05) == "out of tolerance"
+    lines = dict(_map(stated_map(mapped, 150.0, 0.999999)))
+    assert lines["limit"] == "150.0 µm for the worst: beyond it, P(out): > 99.9 %"
+
+
+def test_beyond_the_limit_is_said_as_since_when_and_not_as_a_day_that_is_past():
+    ahead = VolumetricForecast(
+        limit_um=60.0, latest_um=61.3, crosses_limit_at="2026-03-06T12:00:00", crosses_limit_interval=None,
+        next_check="2026-04-06T12:00:00", predicted_um=62.0, predicted_interval_um=(58.0, 66.0),
+        in_tolerance_at_next_check=0.2, recommended_interval_days=0.0, beyond_since="2026-02-20T08:00:00", method="",
+        why=None,
+    )  # fmt: skip
+    first = next(_volumetric(ahead, "2026-03-06T12:00:00"))
+    assert first.endswith("limit 60 µm; already beyond it since 2026-02-20")
+    later = replace(ahead, latest_um=55.0, crosses_limit_at="2026-05-01T00:00:00", beyond_since=None)
+    assert "reaches its limit on 2026-05-01" in next(_volumetric(later, "2026-03-06T12:00:00"))
+
+
+def test_a_report_of_before_the_limit_is_still_read(limited):
+    mapped, _, _ = limited
+    document = to_document(_Page(stated_map(mapped)))
+    assert not {"limit_um", "probability_out"} & set(document["map"])
+    assert from_document(_Page, document).map == stated_map(mapped)
