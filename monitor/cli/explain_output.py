@@ -107,6 +107,10 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         f"{effect.peak_um:.1f} µm at the {at}; {output.stated('p', effect.p_value)}, "
         f"{output.stated('q', effect.q_value)}"
     )
+    if effect.shape_unknown:
+        output.say(
+            f"   shape unknown; nearest in the catalogue: {effect.nearest_shape}; --json has the curve"
+        )
     if effect.reversal_value is not None:
         output.say(f"   {reversal_words(effect.reversal_value)}")
     searched = effect.searched
@@ -115,9 +119,12 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         unit = "" if searched.unit == "1" else f" {searched.unit}"
         output.say(f"   {searched.what} {output.rounded(searched.value, searched.u)}{u}{unit}")
     um = output.micrometres
+    poses = ""
+    if effect.heldout_poses_after_um is not None:
+        poses = f", on held-out poses {um(effect.heldout_poses_before_um)} -> {um(effect.heldout_poses_after_um)} µm"
     output.say(
         f"   RMS {um(effect.rms_before_um)} -> {um(effect.rms_after_um)} µm; on held-out {explanation.held_out} "
-        f"{um(effect.heldout_before_um)} -> {um(effect.heldout_after_um)} µm"
+        f"{um(effect.heldout_before_um)} -> {um(effect.heldout_after_um)} µm{poses}"
     )
 
 

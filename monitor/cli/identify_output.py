@@ -35,9 +35,8 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
         [*_rows(shown, answer.frames or {}), ["RMS", "µm", "", *(f"{run.rms_um:.2f}" for run in shown), ""]],
         text_columns=3,
     )
-    notes = [run.note for run in shown if run.note]
-    if notes:
-        output.say(notes[0] + (f" (and {len(notes) - 1} more of these runs)" if len(notes) > 1 else ""))
+    for note in (run.note for run in runs if run.note):
+        output.say(note)
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
     for taken in answer.taken_up or ():

@@ -11,6 +11,7 @@ from typing import Any
 
 from monitor.cli.behind import add_behind, further_sources
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
 from monitor.workflow.certificate.request import METHODS, RULES
 
@@ -53,6 +54,11 @@ def add_issuing(parser: ArgumentParser) -> None:
         "the statement then has the global risks of its rule (JCGM 106); repeat it",
     )  # fmt: skip
     parser.add_argument("--map", action="store_true", help="state the volumetric error too, with its figure")
+    parser.add_argument(
+        "--accept", action="append", type=_accepted, default=[], metavar="GROUND=REASON",
+        help="issue it although this ground speaks against it, for a reason that is printed; may be repeated: "
+        + ", ".join(kind.value for kind in GroundKind),
+    )  # fmt: skip
     add_fonts(parser)
     signing = parser.add_argument_group("signature (extra [sign]; for a token, extra [token])")
     signing.add_argument("--sign", type=Path, metavar="P12", help="sign with the key of a PKCS#12 file")
@@ -95,6 +101,17 @@ def _day(text: str) -> date:
         raise ArgumentTypeError(f"'{text}' is no day; write it as 2026-03-02") from error
 
 
+def _accepted(text: str) -> tuple[GroundKind, str]:
+    name, _, reason = text.partition("=")
+    try:
+        return GroundKind(name.strip()), reason.strip()
+    except ValueError as error:
+        raise ArgumentTypeError(
+            f"there is no ground '{name}'; there are {', '.join(kind.value for kind in GroundKind)}; "
+            "write --accept GROUND=REASON"
+        ) from error
+
+
 def issuing(options: Namespace) -> dict[str, Any]:
     """The options as the fields of ``CertificateOptions``. Raises InputError."""
     axes = None
@@ -119,6 +136,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "with_map": options.map,
         "fonts": tuple(options.font),
         "key": _key(options),
+        "accept": dict(options.accept),
     }
 
 

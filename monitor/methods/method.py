@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
+from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.chain.gross import gross_readings
 from monitor.methods.chain.identification import Identification, StepwiseCoefficient, TakenUp
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
@@ -165,6 +167,16 @@ class Method:
         return Model(self.name)
 
 
+def _suspected(problem: ChainProblem) -> str:
+    """Which readings are grossly off, as the end of a refusal; empty where none stands out."""
+    gross = gross_readings(problem)
+    rows = ", ".join(
+        f"run {reading.run}, sequence {reading.sequence} ({reading.target})" for reading in gross
+    )
+    one = "this reading" if len(gross) == 1 else "these readings"
+    return f". First look at {one}, which the others contradict: {rows}" if gross else ""
+
+
 class ProblemOf(Protocol):
     """Makes the least-squares problem of a campaign under a model.
 
@@ -236,9 +248,12 @@ class ChainMethod(Method):
         model = model or self.own_model
         problem = self.problem_of(campaign, model)
         self.refuse(campaign, problem)
+        try:
+            solution = solve(problem)
+        except DataError as error:
+            raise DataError(f"{error}{_suspected(problem)}") from error
         return replace(
-            identification(campaign, model, problem, solve(problem), self.advice),
-            taken_up=self.taken_up(problem),
+            identification(campaign, model, problem, solution, self.advice), taken_up=self.taken_up(problem)
         )
 
 

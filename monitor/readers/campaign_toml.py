@@ -32,8 +32,8 @@ def campaign_toml(campaign: Campaign) -> str:
         *_machine(campaign.machine),
         *(() if _is_derived(campaign) else _probe(campaign.probe)),
         *_artefact(campaign.artefact),
-        *(line for setup in campaign.artefact.setups for line in _setup(setup)),
         *_sources(campaign.sources),
+        *(line for setup in campaign.artefact.setups for line in _setup(setup)),
     ]
     return "\n".join(lines) + "\n"
 

@@ -92,10 +92,10 @@ def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
         del data["reflectors"]
     if artefact.l_shape is None:
         del data["l_shape"]
-    if not artefact.setups:
-        del data["setups"]
     if sources:
         data["sources"] = [to_document(source) for source in sources]
+    if not artefact.setups:
+        del data["setups"]
     return _text(data)
 
 

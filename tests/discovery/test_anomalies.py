@@ -7,13 +7,14 @@ import pytest
 from by_path import simulator
 
 from monitor.discovery import Verdict, fit
-from monitor.discovery.machine.anomalies import bad_points, ball_moves, plan_cells
+from monitor.discovery.machine.anomalies import bad_points, ball_moves
+from monitor.discovery.machine.plan_cells import plan_cells
 from monitor.methods.samba.method import problem_of
 
 
 def test_places_are_the_same_probing_of_every_run(virtual_campaigns):
     campaign, told = virtual_campaigns.virtual(1, days=1, runs_per_day=3)
-    places = plan_cells(fit(problem_of(campaign)))
+    places = plan_cells(problem_of(campaign))
     assert len(set(places)) == 62
     for sequence in (1, 30, 62):
         assert len(set(places[told["sequence"] == sequence])) == 1
@@ -24,7 +25,7 @@ def test_places_of_plans_that_differ_go_by_what_was_probed(virtual_campaigns):
         1, days=1, runs_per_day=2, keep=lambda told: (told["run"] == 1) | (told["sequence"] > 20)
     )
     found = fit(problem_of(campaign))
-    places = plan_cells(found)
+    places = plan_cells(found.problem)
     context = found.problem.context
     second = np.flatnonzero(context.run == 2)
     for row in second[:10]:

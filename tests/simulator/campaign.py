@@ -65,6 +65,7 @@ def simulate(
     first_travel: str = "reading",
     bad_points: Sequence[tuple[int, int, tuple[float, float, float]]] = (),
     decimals: int | None = 6,
+    noise: Callable[[np.random.Generator, np.ndarray], np.ndarray] | None = None,
 ) -> dict[str, object]:
     """Simulate a campaign; nothing is written.
 
@@ -74,6 +75,7 @@ def simulate(
     channels: makers or (N,) arrays by column name (default: x_axis_degC and y_axis_degC, straight ramps);
     the schedule's `ambient_degC` is always a channel. first_travel: see `travel_signs`.
     bad_points: (run, sequence, (x, y, z) in µm) added to single probings. decimals: None for no rounding.
+    noise: instead of white noise, from a generator and the run (N,) of every probing, (N, 3) in parts of `noise_um`.
 
     Returns a dict: `run`, `sequence`, `time_s`, `target` (names), `readings` {axis: (N,) mm or deg},
     `columns` {campaign column: (N,)}, `channels`, and the truth: `exact` readings, `balls`, `tip_mm`, `bar_length_mm`,
@@ -108,6 +110,7 @@ def simulate(
         run_fraction=fraction,
         channels=made | {"ambient_degC": schedule.ambient_degC[run - 1]},
         gravity=gravity_seen(chain, readings, np.array(machine.down)),
+        angles={axis.name: readings[axis.name] for axis in chain.rotary},
     )
     errors = Errors(machine, now, np.array([balls[t] for t in plan_targets(plan)] * runs), np.asarray(tip_mm))
     still = {name: np.zeros(run.size) for name in readings}
@@ -124,12 +127,15 @@ def simulate(
         if not any(e.shape == "reversal" for e in effects):
             break
 
-    noise = plan.probe_uncertainty_um if noise_um is None else noise_um
+    size_um = plan.probe_uncertainty_um if noise_um is None else noise_um
+    coloured = None if noise is None else noise(rng, run)
     seen, exact = {}, {}
     for axis in chain.axes:
         exact[axis.name] = np.degrees(readings[axis.name]) if axis.rotary else readings[axis.name]
     for k, axis in enumerate(chain.linear):
-        seen[axis.name] = exact[axis.name] + noise * 1e-3 * rng.standard_normal(run.size)
+        seen[axis.name] = exact[axis.name] + size_um * 1e-3 * (
+            rng.standard_normal(run.size) if coloured is None else coloured[:, k]
+        )
         for bad_run, bad_sequence, off in bad_points:
             seen[axis.name][(run == bad_run) & (sequence == bad_sequence)] += off[k] * 1e-3
         if decimals is not None:

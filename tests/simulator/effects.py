@@ -9,8 +9,8 @@ the largest norm, over all probings of the campaign, of the displacement of the 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,6 +26,7 @@ class Effect:
     tau_s: time constant of `@warmup`. reference: what is taken off an `@channel` (default 20 degC, ISO 1).
     grid: nodes of `table`, in mm or rad of q. at: (run, sequence) from which a ball is moved.
     targets: the balls that `artefact:expansion` and `stem:gravity` act on (default: all, the bar too).
+    curve: of the shape `curve`: values (N,) from displacements q, travel signs and circumstances.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Effect:
     grid: Sequence[float] | None = None
     at: tuple[int, int] = (1, 1)
     targets: Sequence[str] | None = None
+    curve: Callable[[np.ndarray, np.ndarray, Circumstances], np.ndarray] | None = None
 
     @property
     def term(self) -> str:
@@ -67,6 +69,7 @@ class Circumstances:
     run_fraction: np.ndarray  # 0 at the first probing of a run, 1 at the last
     channels: Mapping[str, np.ndarray]
     gravity: Mapping[str, np.ndarray]
+    angles: Mapping[str, np.ndarray] = field(default_factory=dict)  # rad, of the rotary axes
 
 
 def place(effect: Effect, chain: Chain) -> tuple[Axis, bool, int]:
@@ -125,6 +128,8 @@ def axis_columns(
 ) -> np.ndarray:
     """(N, n) columns of an effect on an axis."""
     frame = ("before:" if location else "") + axis.name
+    if effect.shape == "curve" and effect.curve is not None:
+        return products(effect.curve(q, travel, now)[:, None], driver_columns(effect, frame, now))
     return products(shape_columns(effect, q, travel), driver_columns(effect, frame, now))
 
 

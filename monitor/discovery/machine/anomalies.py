@@ -14,7 +14,8 @@ import numpy.typing as npt
 import scipy
 
 from monitor.discovery.machine.fit import Fit
-from monitor.machine import MOTION
+from monitor.discovery.machine.plan_cells import plan_cells
+from monitor.methods.chain.gross import off_reading
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
 
@@ -55,23 +56,6 @@ class BallMove:
         return float(np.linalg.norm(self.shift))
 
 
-def plan_cells(fit: Fit) -> npt.NDArray[np.int64]:
-    """The cell (n,) of the plan: the same number for the same target at the same pose, touch by touch."""
-    context = fit.problem.context
-    measured = fit.problem.measured_joints
-    posed = [joint for joint in range(len(context.chain.joints)) if joint not in measured]
-    angles = np.round(context.positions[:, posed], 6) + 0.0
-    occurrences: dict[tuple[object, ...], int] = {}
-    numbers: dict[tuple[object, ...], int] = {}
-    cells = np.empty(len(context), dtype=np.int64)
-    for row in range(len(context)):
-        key = (str(context.target[row]), *angles[row])
-        in_run = (int(context.run[row]), *key)
-        occurrence = occurrences[in_run] = occurrences.get(in_run, -1) + 1
-        cells[row] = numbers.setdefault((*key, occurrence), len(numbers))
-    return cells
-
-
 @dataclass(frozen=True)
 class _Deviations:
     """Deviation (n, d) of every probing from the other runs', in standard uncertainties, and its spread."""
@@ -91,7 +75,7 @@ class _Deviations:
 def _deviations(fit: Fit) -> _Deviations:
     problem = fit.problem
     white = np.where(fit.left_out[:, None], 0.0, fit.vectors / fit.problem.sigma)
-    cells = plan_cells(fit)
+    cells = plan_cells(problem)
     weighted = ~fit.left_out
     count = np.bincount(cells, weights=weighted)
     total = np.stack([np.bincount(cells, weights=white[:, axis]) for axis in range(white.shape[1])], axis=1)
@@ -130,22 +114,6 @@ def _statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], 
     )
 
 
-def _as_reading(fit: Fit, row: int, vector: Array) -> tuple[str, float]:
-    """The reading that explains most of a residual (d,), and by how much it is off, in mm."""
-    chain = fit.problem.context.chain
-    linear = fit.problem.measured_joints
-    if not linear:
-        most = int(np.abs(vector).argmax())
-        return fit.problem.components[most], float(vector[most])
-    directions = np.array(
-        [np.array(chain.joints[joint].direction) * chain.joints[joint].sign for joint in linear]
-    )
-    shifts = np.einsum("nrac,ac->nra", fit.by_error[:, :, linear, MOTION, :3], directions)
-    off = np.linalg.pinv(fit.problem.observe(shifts)[row]) @ vector
-    most = int(np.abs(off).argmax())
-    return chain.joints[linear[most]].name.lower(), float(off[most])
-
-
 def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     """The worst point of every run that is too far off, at a false-alarm probability ``alpha`` a campaign."""
     deviations = _deviations(fit)
@@ -167,7 +135,7 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
         p = float(scipy.special.chdtrc(rank[worst], chi_square[worst]))
         row, size = int(rows[worst]), sizes[worst]
         if p * tests <= alpha:
-            axis, off = _as_reading(fit, row, size * fit.problem.sigma[row])
+            axis, off = off_reading(fit.problem, fit.by_error, row, size * fit.problem.sigma[row])
             points.append(
                 BadPoint(
                     row=row,

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.machine.anomalies import plan_cells
 from monitor.discovery.machine.fit import Fit
+from monitor.discovery.machine.plan_cells import plan_cells
 from monitor.discovery.search.comparison import (
     Comparison,
     LackOfFit,
@@ -51,7 +51,7 @@ def pure_error(fit: Fit) -> tuple[float, float, float]:
     """Sum of squares and degrees of freedom of the whitened residual over the runs, and the lack-of-fit sum."""
     weighted = ~fit.left_out
     white = fit.vectors[weighted] / fit.problem.sigma[weighted]
-    error, lack, repeated = split(white, plan_cells(fit)[weighted])
+    error, lack, repeated = split(white, plan_cells(fit.problem)[weighted])
     # The runs' own unknowns take their part of the scatter in proportion to the rows.
     return error, repeated / len(white) * fit.degrees_of_freedom, lack
 

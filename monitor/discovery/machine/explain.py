@@ -14,9 +14,11 @@ import numpy as np
 
 from monitor.discovery.machine.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.compare import ChainComparison, compare
+from monitor.discovery.machine.correlation import Correlation
 from monitor.discovery.machine.cures import Mistake
-from monitor.discovery.machine.fit import Fit, fit
+from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
+from monitor.discovery.machine.poses import poses_of_rows
 from monitor.discovery.machine.refine import Refined, refine_all
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
@@ -46,7 +48,8 @@ class Explanation:
 
     ``suspect`` points were left out, ``moves`` and ``steps`` are changes reported as such; ``blind`` effects leave
     nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
-    recorded column follows it. Where the file itself looks wrong, ``mistakes`` says how, and nothing else is reported.
+    recorded column follows it. ``unfitted`` stood out but could not be fitted, and were skipped. Where the file itself
+    looks wrong, ``mistakes`` says how, and nothing else is reported.
     """
 
     comparison: ChainComparison
@@ -58,6 +61,7 @@ class Explanation:
     refused: tuple[tuple[str, str], ...]
     final: Fit
     mistakes: tuple[Mistake, ...] = ()
+    unfitted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,7 @@ class _Search:
     refined: Sequence[Refined]
     suspects: Suspects
     under: Fit
+    unfitted: tuple[str, ...] = ()
 
     @property
     def effects(self) -> list[MachineEffect]:
@@ -98,23 +103,27 @@ def explain(
     rate: float = 0.01,
     rng: np.random.Generator,
     first: Fit | None = None,
+    gross: Sequence[BadPoint] = (),
 ) -> Explanation:
     """Explain what a model lacks. ``rate`` is the false discovery rate of each scan; ``rng`` serves the step search;
-    ``first`` is the fit of ``problem`` where it is known.
+    ``first`` is the fit of ``problem`` where it is known, with the ``gross`` readings left out.
 
     Raises DataError where the model cannot be fitted.
     """
     foreseen = problem.for_search()
     # The fit of the problem as it is serves only where nothing else is foreseen.
-    first = fit(foreseen) if first is None or foreseen is not problem else first
+    certain = Suspects({point.row: point for point in gross})
+    if first is None or foreseen is not problem:
+        first = fit(foreseen, certain.left_out(foreseen) if gross else None)
     surroundings = surroundings_of(campaign, foreseen)
     variants = _variants(campaign, foreseen, surroundings.drivers)
-    search = _search(first, foreseen, variants, surroundings.drivers, rate)
+    search = _search(first, foreseen, variants, surroundings.drivers, rate, certain)
     suspects = search.suspects
     missing = missing_effects(search.scene, search.result, search.refined, surroundings)
     if suspects.varying:
         effects = [*suspects.move_effects(foreseen), *search.effects]
-        steady = fit(with_effects(foreseen, effects), search.under.left_out, first)
+        steady, _ = fit_those_possible(foreseen, effects, search.under.left_out, first)
+        steady = steady.with_correlation(_correlation(search.under))
         varying = varying_effects(steady, suspects.varying, variants, rate, surroundings)
         missing += tuple(replace(effect, rank=effect.rank + len(missing)) for effect in varying)
     # A bad point or a ball that moved is reported as that: what counts is the verdict without them.
@@ -130,26 +139,57 @@ def explain(
         blind=_blind(search.scene, missing),
         refused=search.scene.refused,
         final=search.under,
+        unfitted=search.unfitted,
     )
 
 
 def _search(
-    first: Fit, problem: ChainProblem, variants: Sequence[ChainVariant], drivers: Sequence[str], rate: float
+    first: Fit,
+    problem: ChainProblem,
+    variants: Sequence[ChainVariant],
+    drivers: Sequence[str],
+    rate: float,
+    suspects: Suspects,
 ) -> _Search:
-    """Search effects and suspects in turn, each under the others, until nothing changes."""
-    suspects = Suspects()
+    """Search effects and suspects in turn, each under the others and the ``suspects`` that ``first`` leaves out, until
+    nothing changes."""
+    gross = suspects
+    correlation: Correlation | None = None
+    unfitted: list[str] = []
     for _ in range(MOST_ROUNDS):
         out, single = suspects.left_out(problem), suspects.effects(problem)
-        current = fit(with_effects(problem, single), out, first) if suspects.any else first
-        scene, result = search_chain(scene_of(current, variants), drivers, rate)
+        current = first if suspects.same_as(gross) else fit(with_effects(problem, single), out, first)
+        current = current.with_correlation(correlation)
+        able = [variant for variant in variants if variant.family not in unfitted]
+        scene, result = search_chain(scene_of(current, able), drivers, rate)
         refined = refine_all(scene, result.candidates)
+        under, unable = fit_those_possible(
+            current.problem, [finding.candidate.effect for finding in refined], out, current
+        )
+        if unable:
+            unfitted += [
+                finding.candidate.family for finding in refined if finding.candidate.effect in unable
+            ]
+            continue
         effects = [finding.candidate.effect for finding in refined]
-        under = fit(with_effects(problem, [*single, *effects]), out, current) if effects else current
-        more = find_suspects(under, problem, effects, suspects, variants, scene if under is current else None)
+        # What all runs share and what the effects explain is no noise of neighbours.
+        before, correlation = correlation, _correlation(under)
+        if correlation != before:
+            continue
+        # Readings are judged under the present effects, again from the start: what looked bad without them may be good.
+        begin = under
+        if not suspects.same_as(gross):
+            begin = fit(with_effects(problem, effects), gross.left_out(problem), current)
+        more = find_suspects(begin, problem, effects, gross, able, scene if begin is current else None)
         if more.same_as(suspects):
             break
         suspects = more
-    return _Search(scene, result, refined, suspects, under)
+    return _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted)))
+
+
+def _correlation(under: Fit) -> Correlation | None:
+    """The correlation of neighbours under a model; None where readings share their poses and are counted by these."""
+    return under.correlation() if poses_of_rows(under) is None else None
 
 
 def _steps(campaign: Campaign, search: _Search, rng: np.random.Generator) -> list[Step]:

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from monitor.effects import Basis
+from monitor.discovery.machine.correlation import (
+    Correlation,
+    Whitening,
+    deviations,
+    estimate,
+    rows_of,
+    turned_into_readings,
+)
+from monitor.discovery.machine.plan_cells import plan_cells
+from monitor.effects import Basis, Effect
+from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Solution, eliminate, project_out
 from monitor.methods.chain.problem import ChainProblem, solve_problem
 from monitor.records import Array
@@ -29,11 +40,16 @@ class Nuisance:
 
 @dataclass(frozen=True)
 class Fit:
-    """A problem and its least-squares point; ``left_out`` (n,) marks probings without weight."""
+    """A problem and its least-squares point; ``left_out`` (n,) marks probings without weight.
+
+    Where neighbours of a run resemble each other, ``whitening`` makes the whitened numbers of the search independent;
+    the least-squares point itself stays that of equal weights.
+    """
 
     problem: ChainProblem
     solution: Solution
     left_out: npt.NDArray[np.bool_]
+    whitening: Whitening | None = None
 
     @cached_property
     def vectors(self) -> Array:
@@ -69,6 +85,10 @@ class Fit:
         an unknown of that run: no other run predicts it.
         """
         local, common = self.solution.last.local, self.solution.last.common
+        if self.whitening is not None:
+            local, common = (
+                np.moveaxis(self.whitening(np.moveaxis(rows, 2, 0)), 0, 2) for rows in (local, common)
+            )
         acts = np.any(common != 0.0, axis=1)
         single = acts.sum(axis=0) == 1
         most = int(acts[:, single].sum(axis=1).max(initial=0))
@@ -83,6 +103,36 @@ class Fit:
         scale = np.linalg.norm(shared, axis=0)
         rank = int(np.linalg.matrix_rank(shared / np.where(scale == 0, 1.0, scale))) if shared.size else 0
         return Nuisance(basis, shared, rank)
+
+    @cached_property
+    def white(self) -> Array:
+        """The whitened residual (R, N) with what every run's own unknowns can do taken out, independent numbers."""
+        residual = self.solution.last.residual
+        if self.whitening is None:
+            return residual
+        return project_out(self.nuisance.basis, self.whitening(residual)[..., None])[..., 0]
+
+    def correlation(self) -> Correlation | None:
+        """The correlation of neighbours that the residuals show; None where they show none.
+
+        Of several runs only what they do not share counts: an effect that the model lacks makes neighbours alike too.
+        """
+        rows = rows_of(self.problem)
+        cells = self.problem.padded(plan_cells(self.problem)[:, None, None].astype(np.float64) + 1.0).reshape(
+            rows.weighted.shape
+        )
+        rows = replace(rows, turned=turned_into_readings(self.problem, self.by_error))
+        last = self.solution.last
+        residual = deviations(last.residual, rows, cells.astype(np.int64) - 1)
+        own = last.local if len(residual) > 1 else np.concatenate([last.local, last.common], axis=2)
+        return estimate(residual, eliminate(own).basis, rows)
+
+    def with_correlation(self, correlation: Correlation | None) -> Fit:
+        """The fit with the noise of neighbours correlated as said."""
+        if correlation is None:
+            return replace(self, whitening=None)
+        rows = replace(rows_of(self.problem), turned=turned_into_readings(self.problem, self.by_error))
+        return replace(self, whitening=Whitening(rows, correlation))
 
     @cached_property
     def degrees_of_freedom(self) -> int:
@@ -116,7 +166,8 @@ def fit(
 ) -> Fit:
     """The least-squares point of a problem; probings that are left out get no weight.
 
-    ``start`` is an earlier fit of the same runs with the same base, from which the search begins.
+    ``start`` is an earlier fit of the same runs with the same base, from which the search begins and whose correlation
+    of neighbours is kept.
     """
     out = np.zeros(len(problem.context), dtype=bool) if left_out is None else left_out
     weighted = replace(problem, sigma=np.where(out[:, None], np.inf, problem.sigma)) if out.any() else problem
@@ -126,4 +177,28 @@ def fit(
     names = start.problem.added_names
     if names == weighted.added_names[: len(names)]:
         common[: len(names)] = start.solution.common
-    return Fit(weighted, solve_problem(weighted, start.solution.local, common), out)
+    fitted = Fit(weighted, solve_problem(weighted, start.solution.local, common), out)
+    return fitted if start.whitening is None else fitted.with_correlation(start.whitening.correlation)
+
+
+def fit_those_possible(
+    problem: ChainProblem, effects: Sequence[Effect], out: npt.NDArray[np.bool_], start: Fit
+) -> tuple[Fit, tuple[Effect, ...]]:
+    """Fit a problem with further effects in common; return the fit and the effects that could not be fitted.
+
+    Effects whose coefficients only products of small errors determine may keep the steps from settling. Then they are
+    added one after the other, and each that cannot be fitted beside those before is left out.
+    Raises DataError where nothing of it can be fitted.
+    """
+    try:
+        return fit(replace(problem, added=(*problem.added, *effects)), out, start), ()
+    except (DataError, np.linalg.LinAlgError):
+        current = fit(problem, out, start)
+    able: list[Effect] = []
+    for effect in effects:
+        try:
+            current = fit(replace(problem, added=(*problem.added, *able, effect)), out, current)
+        except (DataError, np.linalg.LinAlgError):
+            continue
+        able.append(effect)
+    return current, tuple(effect for effect in effects if effect not in able)

@@ -1,17 +1,23 @@
 """The readings of a chain that are left out in turn: whole runs or days, or blocks of poses of one run.
 
 The base parameters are free in every run, so a run that was left out still finds its own; only the effects
-that all runs share are predicted from the others. A single run with many poses is cut into blocks of
-neighbouring poses, which are dealt out at random to ten parts; each part is predicted, base parameters included,
-from the other nine.
+that all runs share are predicted from the others. Runs of one plan share its poses, and an effect that mimics
+another one does so in every run; poses that are left out of all runs show it. A single run with many poses is cut
+into blocks of neighbouring poses, which are dealt out at random to ten parts; each part is predicted, base
+parameters included, from the other nine.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
+from monitor.discovery.search.projection import orthonormal, without
+from monitor.records import Array
 
 PARTS = 10
 # Neighbours in time share drifts and lags, so that blocks of them are left out; five blocks to a part.
@@ -20,6 +26,10 @@ BLOCKS = 50
 READINGS_AN_UNKNOWN = 10
 # Deals the blocks out; the held-out error moves by about a hundredth with another deal.
 SEED = 20260302
+# Fewer poses than this cannot do without a tenth of them.
+FEWEST_POSES = 8
+# A direction of which the rows that stay determine less than this part is not predicted.
+PREDICTED = 1e-2
 
 
 def pose_parts(fit: Fit) -> npt.NDArray[np.int64] | None:
@@ -42,3 +52,69 @@ def pose_parts(fit: Fit) -> npt.NDArray[np.int64] | None:
     parts = np.full(fit.solution.last.residual.size, -1, dtype=np.int64)
     parts[: len(numbers)] = numbers
     return parts
+
+
+@dataclass(frozen=True)
+class PoseFold:
+    """Numbers of some poses in every run that are left out together: rows (R, m) of each run, and what a residual of
+    the whole fit (R, m) becomes (R, m, m) when every run's own unknowns are determined without them."""
+
+    rows: npt.NDArray[np.int64]
+    predicted: Array
+
+
+def pose_folds(fit: Fit) -> tuple[PoseFold, ...]:
+    """The poses of a plan dealt out to ten folds; empty where there are too few poses."""
+    problem = fit.problem
+    context = problem.context
+    measured = problem.measured_joints
+    posed = [joint for joint in range(len(context.chain.joints)) if joint not in measured]
+    _, pose = np.unique(np.round(context.positions[:, posed], 6) + 0.0, axis=0, return_inverse=True)
+    poses = int(pose.max()) + 1
+    if poses < FEWEST_POSES:
+        return ()
+    # Blocks of neighbouring poses, where there are hundreds: neighbours share drifts and lags.
+    part = np.random.default_rng(SEED).permutation(np.arange(poses) % min(PARTS, poses))
+    numbers = problem.sigma.shape[1]
+    rows = np.repeat(part[pose.reshape(-1)] + 1.0, numbers).reshape(-1, numbers)
+    fold = problem.padded(np.where(np.isfinite(problem.sigma), rows, 0.0))
+    basis = fit.nuisance.basis
+    folds = []
+    for number in range(1, int(fold.max()) + 1):
+        inside = [np.flatnonzero(of_run == number) for of_run in fold]
+        most = max(len(members) for members in inside)
+        taken = np.zeros((len(fold), most), dtype=np.int64)
+        present = np.zeros((len(fold), most), dtype=bool)
+        for run, members in enumerate(inside):
+            taken[run, : len(members)], present[run, : len(members)] = members, True
+        own = np.where(present[..., None], np.take_along_axis(basis, taken[..., None], axis=1), 0.0)
+        remaining = np.eye(most) * present[:, None, :] - own @ np.swapaxes(own, 1, 2)
+        values, vectors = np.linalg.eigh(remaining)
+        # What only the rows left out determine (a ball touched once) nothing predicts.
+        inverse = np.where(values > PREDICTED, 1.0 / np.where(values > PREDICTED, values, 1.0), 0.0)
+        folds.append(PoseFold(taken, (vectors * inverse[:, None, :]) @ np.swapaxes(vectors, 1, 2)))
+    return tuple(folds)
+
+
+def held_out_by_poses(residual: Array, columns: Array, folds: Sequence[PoseFold]) -> float | None:
+    """Root mean square of whitened residuals (R, N) of poses that took no part in the fit of ``columns`` (R N, c), nor
+    in that of the runs' own unknowns; None where nothing can be left out.
+
+    Left-out residuals follow from those of the whole fit by its hat matrix (Cook and Weisberg, Residuals and influence
+    in regression, 1982, section 2.2).
+    """
+    basis = orthonormal(columns)
+    remainder = without(basis, residual.reshape(-1, 1)).reshape(residual.shape)
+    shared = basis.reshape(*residual.shape, -1)
+    squares, number = 0.0, 0.0
+    for fold in folds:
+        left_out = np.take_along_axis(remainder, fold.rows, axis=1)
+        own = np.take_along_axis(shared, fold.rows[..., None], axis=1)
+        alone = (fold.predicted @ left_out[..., None])[..., 0]
+        reaction = fold.predicted @ own
+        gram = np.eye(own.shape[2]) - np.einsum("rmc,rmd->cd", own, reaction)
+        onto = np.einsum("rmc,rm->c", reaction, left_out)
+        error = alone + reaction @ (np.linalg.pinv(gram, rcond=PREDICTED, hermitian=True) @ onto)
+        squares += float(np.sum(error**2))
+        number += float(np.sum(np.any(fold.predicted != 0.0, axis=2)))
+    return float(np.sqrt(squares / number)) if number else None

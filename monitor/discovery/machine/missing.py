@@ -8,24 +8,29 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from monitor.discovery.machine.curves import Curve, curve_of
 from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.machine.refine import Refined
 from monitor.discovery.machine.rivals import RivalSearch
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
 from monitor.discovery.machine.separate import Separation, separating_poses
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.search.amplitudes import amplitudes, length_of
+from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.missing import Missing, Rival
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import least_likelihood
-from monitor.discovery.search.scan import Finding, reduced
+from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects.drivers import EachRun
 from monitor.effects.words import describe
 from monitor.records import Array
 
 # An effect of less than twice its standard uncertainty is no answer.
 SMALLEST_RATIO = 2.0
+# Two effects that all but cancel are each hundreds of times as large as the error that they take away; the effects of
+# the trial of power are at most 32 times as large.
+LARGEST_RATIO = 300.0
 
 
 @dataclass(frozen=True)
@@ -33,25 +38,32 @@ class ChainMissing(Missing):
     """A missing effect of a chain; lengths in mm.
 
     Held-out errors are of runs left out (with one run of many poses: of blocks of poses; with one of few: None), those
-    of days None with fewer than three days. ``separation`` holds the poses that would separate the rivals; ``varies``
-    says that the effect has another size in every run.
+    of days None with fewer than three days, those of poses are of poses left out of every run. ``separation`` holds the
+    poses that would separate the rivals; ``varies`` says that the effect has another size in every run. Where the
+    catalogue does not have its shape, ``nearest`` is the entry that comes closest, and ``curve`` the shape.
     """
 
     held_out_days_before: float | None
     held_out_days_after: float | None
+    held_out_poses_before: float | None
+    held_out_poses_after: float | None
     separation: Separation
     varies: bool
+    nearest: str | None = None
+    curve: Curve | None = None
 
 
 @dataclass(frozen=True)
 class _Selection:
     """The findings of a scan together, at their best values: the most convincing first.
 
-    ``poses`` (M,) is the pose of every row, None where poses have no several rows.
+    ``poses`` (M,) is the pose of every row, None where poses have no several rows. Errors are ``shown`` in readings of
+    equal weight, whatever neighbours share.
     """
 
     scene: ChainScene
     candidates: Sequence[ChainCandidate]
+    shown: ChainScene
     poses: npt.NDArray[np.int64] | None
     surroundings: Surroundings
 
@@ -72,7 +84,10 @@ def missing_effects(
     if poses is not None:
         factors = widening(scene, candidates, poses)
         covariance = factors[:, None] * covariance * factors
-    selection = _Selection(scene, candidates, poses, surroundings)
+    shown = scene
+    if scene.fit.whitening is not None:
+        shown = scene_of(scene.fit.with_correlation(None), [candidate.variant for candidate in candidates])
+    selection = _Selection(scene, candidates, shown, poses, surroundings)
     return tuple(
         _missing(selection, index, finding, refined[index], (estimate[part], covariance[part, part]))
         for index, (finding, part) in enumerate(zip(result.findings, _parts(candidates), strict=True))
@@ -91,8 +106,9 @@ def _parts(candidates: Sequence[ChainCandidate]) -> Iterator[slice]:
 def standing_out(scene: ChainScene, result: ChainScan) -> ChainScan:
     """The findings whose size, fitted together with the others, exceeds its standard uncertainty by a factor of two.
 
-    Two effects that can hardly be separated may each stand the scan and be fitted with sizes that cancel; the
-    weaker one is taken out, and the other's size is determined again.
+    Two effects that can hardly be separated may each stand the scan and be fitted with sizes that cancel, within their
+    uncertainty or hundreds of times as large as what they take away; the weaker one is taken out, and the other's size
+    is determined again.
     """
     return reduced(result, lambda findings: _too_small(scene, findings))
 
@@ -105,7 +121,10 @@ def _too_small(scene: ChainScene, findings: Sequence[Finding[ChainCandidate]]) -
     for index, part in enumerate(_parts(candidates)):
         effect = candidates[index].effect
         size, u = _amplitude(effect, sizes.estimate[part], sizes.covariance[part, part])
-        if u > 0 and abs(size) / u < SMALLEST_RATIO:
+        removed = weigh_beside(scene, [candidates[index]], except_for(candidates, index))[0].explained
+        peak = float(np.linalg.norm(candidates[index].raw @ sizes.estimate[part], axis=1).max())
+        cancels = peak > LARGEST_RATIO * scene.fit.sigma * float(np.sqrt(removed / scene.fit.readings))
+        if (u > 0 and abs(size) / u < SMALLEST_RATIO) or cancels:
             weak.append(index)
     return max(weak, key=lambda index: -findings[index].evidence.score, default=None)
 
@@ -124,7 +143,7 @@ def _amplitude(effect: MachineEffect, coefficients: Array, covariance: Array) ->
 
 def _name(candidate: ChainCandidate) -> str:
     """The effect as written; searched pitches, orders and nodes are part of it, a searched time constant is not."""
-    searched = candidate.family.endswith((":cyclic", ":harmonic", ":table"))
+    searched = candidate.family.endswith((":cyclic", ":harmonic", ":table", ":free"))
     return candidate.effect.text if searched else candidate.family
 
 
@@ -141,7 +160,9 @@ def _missing(
     candidate, effect = refined.candidate, refined.candidate.effect
     amplitude, u = _amplitude(effect, coefficients, covariance)
     p_value, q_value = _p_and_q(selection, finding, candidate)
-    before, after = selection.candidates[:index], selection.candidates[: index + 1]
+    shown = selection.shown
+    visible = selection.candidates if shown is scene else shown.candidates
+    before, after = visible[:index], visible[: index + 1]
     search = RivalSearch(scene, selection.candidates, surroundings.drivers)
     rivals = search.rivals(index, least_likelihood(finding.evidence), coefficients)
     return ChainMissing(
@@ -158,17 +179,23 @@ def _missing(
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,
-        rms_before=_rms(scene, before),
-        rms_after=_rms(scene, after),
-        held_out_before=_held_out(scene, before, surroundings.runs),
-        held_out_after=_held_out(scene, after, surroundings.runs),
-        held_out_days_before=_held_out(scene, before, surroundings.days),
-        held_out_days_after=_held_out(scene, after, surroundings.days),
+        rms_before=_rms(shown, before),
+        rms_after=_rms(shown, after),
+        held_out_before=_held_out(shown, before, surroundings.runs),
+        held_out_after=_held_out(shown, after, surroundings.runs),
+        held_out_days_before=_held_out(shown, before, surroundings.days),
+        held_out_days_after=_held_out(shown, after, surroundings.days),
         rivals=tuple(Rival(_name(rival), same) for rival, same in rivals),
+        held_out_poses_before=_held_out_poses(shown, before),
+        held_out_poses_after=_held_out_poses(shown, after),
         separation=separating_poses(
             scene.fit, effect, coefficients, [rival.effect for rival, _ in rivals], surroundings.strokes
         ),
         varies=isinstance(effect.driver, EachRun),
+        nearest=candidate.variant.nearest,
+        curve=None
+        if candidate.variant.nearest is None
+        else curve_of(scene.fit.problem.context, effect, coefficients, covariance),
     )
 
 
@@ -198,3 +225,10 @@ def _held_out(
     if any(isinstance(candidate.effect.driver, EachRun) for candidate in candidates):
         return None
     return scene.held_out_error_of(scene.columns(candidates), fold)
+
+
+def _held_out_poses(scene: ChainScene, candidates: Sequence[ChainCandidate]) -> float | None:
+    """Error in mm of poses left out of every run; None where one has another size in every run."""
+    if any(isinstance(candidate.effect.driver, EachRun) for candidate in candidates):
+        return None
+    return scene.held_out_error_by_poses(scene.columns(candidates))

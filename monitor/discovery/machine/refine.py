@@ -10,7 +10,7 @@ import scipy
 
 from monitor.discovery.machine.gears import STEP as ORDER_STEP
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
-from monitor.discovery.machine.variants import TIME_CONSTANTS_S
+from monitor.discovery.machine.variants import TIME_CONSTANTS_S, with_drivers
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.missing import Searched
@@ -27,6 +27,8 @@ from monitor.records import Array
 GRID_FACTOR = TIME_CONSTANTS_S[1] / TIME_CONSTANTS_S[0]
 # Relative step of the numerical derivative by the searched value.
 STEP = 1e-3
+# A warm-up has settled after so few readings that no data show how.
+SETTLED_READINGS = 1.0
 
 
 @dataclass(frozen=True)
@@ -145,8 +147,24 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     likely = searched.likely(value)
     if likely is not None and abs(likely - value) < 2.0 * u:
         value, refined = likely, at(likely)
+    if searched.unit == "min" and 60.0 * value < SETTLED_READINGS * _between_readings(scene):
+        # It has settled before the second reading: the plain effect.
+        return Refined(at_rest(scene, candidate), None, np.zeros((len(scene.residual), 0)))
     result = Searched(searched.name, value, u if np.isfinite(u) else None, searched.unit)
-    return Refined(refined, result, slope)
+    return Refined(refined, result if u < value else None, slope)
+
+
+def at_rest(scene: ChainScene, candidate: ChainCandidate) -> ChainCandidate:
+    """A candidate that follows a driver, without it."""
+    (bare,) = with_drivers(candidate.effect, ()) or [candidate.variant]
+    return scene_of(scene.fit, [bare]).candidates[0]
+
+
+def _between_readings(scene: ChainScene) -> float:
+    """The usual time in s between two readings of a run."""
+    context = scene.fit.problem.context
+    steps = np.diff(context.time)[np.diff(context.run) == 0]
+    return float(np.median(steps)) if len(steps) else 0.0
 
 
 def _uncertainty(scene: ChainScene, candidate: ChainCandidate, slope: Array, others: Array) -> float:

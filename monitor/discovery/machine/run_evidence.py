@@ -38,7 +38,7 @@ def _run_by_run(
 def weigh_in_each_run(
     candidates: Sequence[ChainCandidate], scene: ChainScene
 ) -> list[Evidence[ChainCandidate]]:
-    """Weigh candidates that have another size in every run, given what the model has already.
+    """Weigh candidates by how their size scatters from run to run, given what the model has already.
 
     The effects already added are common to all runs; that they take part of the columns out is neglected here
     (one coefficient against one a run).
@@ -51,7 +51,12 @@ def weigh_in_each_run(
     explained = np.zeros(len(pool.candidates))
     rank = np.zeros(len(pool.candidates), dtype=np.int64)
     for members, rows in pool.by_size.values():
-        explained[members], rank[members] = _run_by_run(columns, residual, pool.lengths, rows)
+        each, ranks = _run_by_run(columns, residual, pool.lengths, rows)
+        # What one size for all runs explains is no variation: it may be any effect that the model lacks.
+        onto = (pool.rows @ scene.residual / pool.lengths)[rows]
+        common, common_rank, _ = explained_by(pool.grams[rows.shape[1]], onto)
+        explained[members] = np.maximum(each - common, 0.0)
+        rank[members] = np.maximum(ranks - common_rank, 0)
     total = float(scene.residual @ scene.residual)
     likely = np.zeros(len(pool.candidates), dtype=bool)
     weighed = evidence_of(pool, np.minimum(explained, total), rank, (total, scene.degrees_of_freedom), likely)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.held_out import pose_parts
+from monitor.discovery.machine.held_out import PoseFold, held_out_by_poses, pose_folds, pose_parts
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
 from monitor.discovery.search.held_out import held_out_rms, held_out_sum
 from monitor.effects import ParsedEffect
@@ -63,7 +63,7 @@ class ChainScene:
     @cached_property
     def residual(self) -> Array:
         """The whitened residual (M,), run by run."""
-        return self.fit.solution.last.residual.reshape(-1)
+        return self.fit.white.reshape(-1)
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -83,6 +83,16 @@ class ChainScene:
     def held_out_error(self, columns: Array) -> float | None:
         """Root mean square error in mm of runs left out in turn, of blocks of poses where there is one run."""
         return self.held_out_error_of(columns, np.arange(len(self.fit.problem.runs)))
+
+    @cached_property
+    def _pose_folds(self) -> tuple[PoseFold, ...]:
+        return pose_folds(self.fit)
+
+    def held_out_error_by_poses(self, columns: Array) -> float | None:
+        """Root mean square error in mm of poses left out of every run with ``columns`` (M, c) of shared effects; None
+        where the plan has too few."""
+        error = held_out_by_poses(self.fit.white, columns, self._pose_folds)
+        return None if error is None else self.fit.sigma * error
 
     def held_out_error_of(self, columns: Array, fold: npt.NDArray[np.int64]) -> float | None:
         """Root mean square error in mm with ``columns`` (M, c) of shared effects; ``fold`` (R,) is that of every run.
@@ -151,6 +161,8 @@ def _projected(fit: Fit, raw: Sequence[Array]) -> tuple[Array, Array]:
             target[...] = white.reshape(len(moved), *sources.shape)
         else:
             target[...] = np.where(filled, white[:, np.where(filled, sources, 0)], 0.0)
+    if fit.whitening is not None:
+        projected = fit.whitening(projected)
     before = np.sqrt(np.einsum("krn,krn->k", projected, projected))
     for run, basis in enumerate(fit.nuisance.basis):
         part = projected[:, run]

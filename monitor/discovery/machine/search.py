@@ -10,7 +10,8 @@ from monitor.discovery.machine.gears import gear_variants
 from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainScene, scene_of
 from monitor.discovery.machine.tables import ChainScan, with_tables
-from monitor.discovery.search.scan import scan
+from monitor.discovery.machine.unknown_shapes import with_unknown_shapes
+from monitor.discovery.search.scan import by_error_taken_away, scan
 
 # More orders of gears than this are noise that no order explains.
 MOST_GEARS = 12
@@ -30,6 +31,7 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
         new = [variant for variant in variants if variant.effect.text not in gears]
         if not new or len(gears) > MOST_GEARS:
             scene, result = with_tables(scene, result, scanned)
-            return scene, standing_out(scene, result)
+            scene, result = with_unknown_shapes(scene, standing_out(scene, result))
+            return scene, by_error_taken_away(scene, standing_out(scene, result))
         gears |= {variant.effect.text for variant in new}
         scene = replace(scene, candidates=(*scene.candidates, *scene_of(scene.fit, new).candidates))

@@ -18,6 +18,7 @@ from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEff
 from monitor.discovery.machine.variants import each_run
 from monitor.discovery.machine.varying import most_varying
 from monitor.effects import parse_effect
+from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
 
 MOST_BAD_POINTS = 40
@@ -108,6 +109,7 @@ def find_suspects(
     suspects = earlier
     current = under
     while len(suspects.bad) < MOST_BAD_POINTS:
+        before = suspects
         single: list[BadPoint | BallMove] = [*bad_points(current), *ball_moves(current)]
         single.sort(key=lambda suspect: -suspect.chi_square)
         varying = most_varying(current, variants, scene) if len(suspects.varying) < MOST_VARYING else None
@@ -118,6 +120,10 @@ def find_suspects(
         else:
             suspects = suspects.with_single(single)
         effects = [*suspects.effects(problem), *selected]
-        current = fit(with_effects(problem, effects), suspects.left_out(problem), current)
+        try:
+            current = fit(with_effects(problem, effects), suspects.left_out(problem), current)
+        except (DataError, np.linalg.LinAlgError):
+            # What cannot be fitted is no suspect; those before it remain.
+            return before
         scene = None
     return suspects

@@ -95,10 +95,10 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
 
     Positions that all stand on a grid (modules 50 mm apart) take every pitch below twice its step for a longer one
     (Nyquist), and a cycle between fewer than ``FEWEST_POSITIONS`` positions fits whatever is there. Positions that lie
-    anyhow have no such limit.
+    anyhow have no such limit. A period longer than what was travelled is a bend.
     """
     limits = {
-        joint.name: _shortest_pitch(context.positions[:, index])
+        joint.name: (_shortest_pitch(context.positions[:, index]), float(np.ptp(context.positions[:, index])))
         for index, joint in enumerate(context.chain.joints)
         if joint.kind == "linear"
     }
@@ -107,7 +107,8 @@ def resolvable(variants: Iterable[ChainVariant], context: Context) -> list[Chain
         effect = variant.effect
         assert isinstance(effect, ChainEffect)
         assert isinstance(effect.shape, Cyclic)
-        if effect.shape.pitch >= limits[context.chain.joints[effect.term.joint].name]:
+        low, high = limits[context.chain.joints[effect.term.joint].name]
+        if low <= effect.shape.pitch <= high:
             separable.append(variant)
     return separable
 

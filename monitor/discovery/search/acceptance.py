@@ -8,7 +8,7 @@ from typing import Generic
 import numpy as np
 
 from monitor.discovery.search.candidate import Candidate
-from monitor.discovery.search.evidence import Evidence
+from monitor.discovery.search.evidence import Evidence, Pool
 from monitor.discovery.search.scene import CandidateT, Scene
 
 
@@ -21,6 +21,12 @@ class Acceptance(Generic[CandidateT]):
 
     def accepts(self, others: Sequence[CandidateT], candidate: CandidateT) -> bool:
         """Whether a candidate that stands out is believed beside others."""
+        return True
+
+    def stands_among(
+        self, pool: Pool[CandidateT], others: Sequence[CandidateT], evidence: Evidence[CandidateT]
+    ) -> bool:
+        """Whether noise would seldom bring forth a candidate of a pool beside others that is as convincing as this."""
         return True
 
     def at_best_value(self, selected: Sequence[CandidateT], index: int) -> CandidateT:

@@ -23,12 +23,14 @@ Effect = TypeVar("Effect", covariant=True)
 @dataclass(frozen=True)
 class Variant(Generic[Effect]):
     """An effect to be looked at. ``family`` is how it is written; ``tries`` variants of it are searched; ``odds`` are
-    those against it beforehand, where a simpler effect would do."""
+    those against it beforehand, where a simpler effect would do; ``nearest`` is how the catalogue comes closest to an
+    effect whose shape it does not have."""
 
     family: str
     effect: Effect
     tries: int = 1
     odds: float = 1.0
+    nearest: str | None = None
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,12 @@ candidate would do better: a mimic selected early is exchanged. The scan ends wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Generic
+
+import numpy as np
 
 from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.evidence import Evidence, Pool, best_of_families, weigh_beside
@@ -71,18 +73,26 @@ def scan(
     steps = _Steps(scene, Acceptance() if acceptance is None else acceptance)
     pool = _pool(scene)
     selected: list[CandidateT] = []
+    fallen: set[str] = set()
     for _ in range(MOST_STEPS):
         weighed = best_of_families(steps.weighed(pool, selected))
-        if not weighed or len(selected) >= most:
-            break
-        best = steps.best(weighed, selected, rate)
+        best = steps.best(pool, weighed, selected, rate, fallen) if len(selected) < most else None
         if best is None:
-            break
+            # What an exchange, a merger or a later effect has made doubtful is no finding; others have their turn.
+            standing = steps.standing(pool, selected, rate)
+            if len(standing) == len(selected):
+                break
+            fallen |= {candidate.family for candidate in selected} - {
+                candidate.family for candidate in standing
+            }
+            selected = standing
+            continue
         selected.append(best)
         selected[-1] = steps.rules.at_best_value(selected, len(selected) - 1)
         pool = pool.with_more([other for other in steps.rules.alternatives(best) if other.visible])
         selected = steps.exchanged(pool, selected)
         selected = steps.merged(pool, selected)
+    selected = steps.standing(pool, selected, rate)
     return ScanResult(findings_of(scene, selected, pool, steps.rules), tuple(weighed))
 
 
@@ -117,17 +127,58 @@ class _Steps(Generic[CandidateT]):
         return self.rules.separable(selected, weigh_beside(self.scene, pool, selected))
 
     def best(
-        self, weighed: Sequence[Evidence[CandidateT]], selected: Sequence[CandidateT], rate: float
+        self,
+        pool: Pool[CandidateT],
+        weighed: Sequence[Evidence[CandidateT]],
+        selected: Sequence[CandidateT],
+        rate: float,
+        fallen: Collection[str],
     ) -> CandidateT | None:
-        """The most convincing candidate that stands the control and is accepted beside the selected ones."""
-        families = {candidate.family for candidate in selected}
+        """The most convincing candidate that stands the control and is accepted beside the selected ones; families that
+        have ``fallen`` are not selected again."""
+        families = {candidate.family for candidate in selected}.union(fallen)
         q_values = control_false_discoveries([evidence.p_value for evidence in weighed], rate=rate).q_value
         for evidence, q_value in zip(weighed, q_values, strict=True):
             candidate = evidence.candidate
             standing = q_value <= rate and candidate.family not in families
-            if standing and self.rules.accepts(selected, candidate):
+            if (
+                standing
+                and self.rules.accepts(selected, candidate)
+                and self.rules.stands_among(pool, selected, evidence)
+            ):
                 return candidate
         return None
+
+    def standing(
+        self, pool: Pool[CandidateT], selected: Sequence[CandidateT], rate: float
+    ) -> list[CandidateT]:
+        """The selected candidates without those that do not stand beside the others, the most doubtful first."""
+        selected = list(selected)
+        families = family_count(self.scene)
+        while selected:
+            evidence = [
+                weigh_beside(self.scene, [candidate], except_for(selected, index))[0]
+                for index, candidate in enumerate(selected)
+            ]
+            doubtful = [
+                index
+                for index, weighed in enumerate(evidence)
+                if not self._stands(pool, except_for(selected, index), weighed, rate / families)
+            ]
+            if not doubtful:
+                break
+            del selected[max(doubtful, key=lambda index: evidence[index].p_value)]
+        return selected
+
+    def _stands(
+        self, pool: Pool[CandidateT], others: list[CandidateT], evidence: Evidence[CandidateT], level: float
+    ) -> bool:
+        """Whether a selected candidate still stands beside the others."""
+        return (
+            evidence.p_value <= level
+            and self.rules.accepts(others, evidence.candidate)
+            and self.rules.stands_among(pool, others, evidence)
+        )
 
     def exchanged(self, pool: Pool[CandidateT], selected: Sequence[CandidateT]) -> list[CandidateT]:
         """Exchange effects for better ones, given the others, until nothing improves."""
@@ -195,3 +246,14 @@ def reduced(
 def except_for(selected: Sequence[CandidateT], index: int) -> list[CandidateT]:
     """The selected candidates without that at an index."""
     return [*selected[:index], *selected[index + 1 :]]
+
+
+def by_error_taken_away(scene: Scene[CandidateT], result: ScanResult[CandidateT]) -> ScanResult[CandidateT]:
+    """The findings in the order of what they take of the error, each beside those before it."""
+    ordered: list[Finding[CandidateT]] = []
+    rest = list(result.findings)
+    while rest:
+        before = [finding.candidate for finding in ordered]
+        explained = [weigh_beside(scene, [finding.candidate], before)[0].explained for finding in rest]
+        ordered.append(rest.pop(int(np.argmax(explained))))
+    return replace(result, findings=tuple(ordered))

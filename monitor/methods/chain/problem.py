@@ -143,6 +143,16 @@ class ChainProblem(ABC):
         return ()
 
     @property
+    def moved_together(self) -> Array | None:
+        """The moves (q, s) of the own unknowns that placing all targets anew allows; None where they have no places."""
+        return None
+
+    @property
+    def far_off(self) -> npt.NDArray[np.bool_]:
+        """Rows (n,) that stand too far from the others of their target to be the same one; they have no say."""
+        return np.zeros(len(self.context), dtype=bool)
+
+    @property
     def target_word(self) -> str:
         """What a target is called."""
         return "ball"
@@ -178,6 +188,17 @@ class ChainProblem(ABC):
     def known_errors(self) -> tuple[tuple[ChainEffect, str], ...]:
         """Errors of the machine that are own unknowns, because they were measured by other means: effect and name."""
         return ()
+
+    @cached_property
+    def is_limited(self) -> npt.NDArray[np.bool_]:
+        """Which base coefficients (k,) are location angles or gains, that cannot exceed ``largest_error``."""
+        limited = np.zeros(len(self.base_names), dtype=bool)
+        for effect, columns in zip(self.base, self.base_columns, strict=True):
+            if isinstance(effect, ChainEffect) and (
+                effect.is_gain or (effect.term.is_rotation and effect.text == effect.term.symbol)
+            ):
+                limited[columns.start] = True
+        return limited
 
     @property
     def largest_error(self) -> float:
@@ -408,19 +429,18 @@ def _from_several_starts(problem: ChainProblem, begin: Array) -> Solution:
 def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
     """DataError where a location angle or a gain comes out too large to be an error, or too much is left."""
     for effect, columns in zip(problem.base, problem.base_columns, strict=True):
-        if isinstance(effect, ChainEffect) and (
-            effect.is_gain or (effect.term.is_rotation and effect.text == effect.term.symbol)
-        ):
-            free, values = solution.local_free[:, columns.start], solution.local[:, columns.start]
-            errors = np.where(free, values, 0.0)
-            worst = int(np.abs(errors).argmax())
-            if abs(errors[worst]) > problem.largest_error:
-                unit = "mm/mm" if effect.is_gain else "rad"
-                raise DataError(
-                    f"run {problem.runs[worst]}: {problem.base_names[columns.start]} comes out at {errors[worst]:.3g} "
-                    f"{unit}, which is no error of a machine: the readings contradict the machine file; check the axis "
-                    "signs, the topology, the units, the columns and the order of the targets"
-                )
+        if not problem.is_limited[columns.start]:
+            continue
+        free, values = solution.local_free[:, columns.start], solution.local[:, columns.start]
+        errors = np.where(free, values, 0.0)
+        worst = int(np.abs(errors).argmax())
+        if abs(errors[worst]) > problem.largest_error:
+            unit = "mm/mm" if isinstance(effect, ChainEffect) and effect.is_gain else "rad"
+            raise DataError(
+                f"run {problem.runs[worst]}: {problem.base_names[columns.start]} comes out at {errors[worst]:.3g} "
+                f"{unit}, which is no error of a machine: the readings contradict the machine file; check the axis "
+                "signs, the topology, the units, the columns and the order of the targets"
+            )
     wrong = problem.contradiction(solution)
     if wrong is not None:
         raise DataError(f"the readings contradict the machine file: {wrong}")

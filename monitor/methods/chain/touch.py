@@ -68,6 +68,17 @@ class TouchProblem(ChainProblem):
         return self.targets
 
     @property
+    def moved_together(self) -> Array:
+        """Three shifts and three turns of all balls together, and the tip."""
+        places = self.own_start[0][:-3].reshape(-1, 3)
+        arms = places - places.mean(axis=0)
+        turns = np.stack([np.cross(axis, arms).reshape(-1) for axis in np.eye(3)], axis=1)
+        balls = np.concatenate([np.tile(np.eye(3), (len(places), 1)), turns], axis=1)
+        moves = np.zeros((len(balls) + 3, 9))
+        moves[:-3, :6], moves[-3:, 6:] = balls, np.eye(3)
+        return moves
+
+    @property
     def measured_joints(self) -> tuple[int, ...]:
         """The linear axes: their readings are where the tip met the ball."""
         return tuple(index for index, joint in enumerate(self.context.chain.joints) if not joint.turns)

@@ -108,9 +108,9 @@ def _head(text: str | None, faults: Faults) -> _Head:
     probe = read_probe(top, required=not has_setups)
     artefact, balls = read_artefact(top)
     fits = _artefact_fits(top, artefact, rules)
+    sources = read_sources(top, machine.axes)
     setups = read_setups(top) if has_setups else ()
     artefact = None if artefact is None or setups is None else replace(artefact, setups=setups)
-    sources = read_sources(top, machine.axes)
     top.finish()
     return _Head(name, method, rules, machine, probe, artefact if fits else None, balls, sources)
 

@@ -18,6 +18,7 @@ from xml.etree import ElementTree as ET
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.completeness import check_complete
 from monitor.reporting.certificate.dcc_results import DCC, SI, add, geometric_errors, say, volumetric_error
+from monitor.reporting.certificate.grounds import accepted_statements
 from monitor.reporting.certificate.record import (
     CertificateRecord,
     ConformityStatement,
@@ -184,6 +185,7 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
         ("accreditation", record.accreditation),
         ("amendment", amendment(record.replaces, texts)),
     ]
+    statements += [("accepted", words) for words in accepted_statements(record.accepted or (), texts)]
     named = [(texts(f"dcc.{key}"), value) for key, value in statements]
     named[3:3] = [
         (texts("dcc.standard", name=statement.name), answer(statement.certificate, texts))

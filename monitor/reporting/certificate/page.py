@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from monitor.reporting.certificate.behind import PrintedBehind, printed_behind
 from monitor.reporting.certificate.completeness import check_complete
+from monitor.reporting.certificate.grounds import accepted_statements
 from monitor.reporting.certificate.machine_frame import PrintedMachineFrame, printed_machine_frame
 from monitor.reporting.certificate.matrix import Block, correlation_blocks
 from monitor.reporting.certificate.pictures import Picture, beside, map_picture, pictures_of
@@ -56,6 +57,7 @@ def certificate_context(record: CertificateRecord) -> dict[str, Any]:
         "texts": texts,
         "heading": texts.markup("page.number_issued", number=record.number, day=texts.day(record.issued_on)),
         "replaces": amendment(record.replaces, texts),
+        "accepted": accepted_statements(record.accepted or (), texts),
         "received_on": answer(record.received_on, texts),
         "performed_on": first if first == last else texts("page.from_to", first=first, last=last),
         "method": _method(record.method, texts),

@@ -13,6 +13,7 @@ from datetime import date
 from enum import StrEnum
 
 from monitor.documents import OMITTED
+from monitor.reporting.certificate.grounds import AcceptedGround
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.texts import ENGLISH
@@ -174,7 +175,8 @@ class CertificateRecord:
     that asks for each field. ``accreditation`` is printed where a laboratory has one;
     ``country`` (ISO 3166-1, two letters) is what a digital certificate asks for besides.
     ``replaces`` is the certificate that this one amends. ``volumetric`` maps follow from the ``results``; they are
-    printed where one was asked for.
+    printed where one was asked for. ``accepted`` are the grounds against it that the laboratory answers for; None where
+    there were none.
     """
 
     title: str | None
@@ -205,3 +207,4 @@ class CertificateRecord:
     replaces: Replaced | None = None
     volumetric: tuple[VolumetricResult, ...] = ()
     language: str = ENGLISH
+    accepted: tuple[AcceptedGround, ...] | None = field(default=None, metadata=OMITTED)

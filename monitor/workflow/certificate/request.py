@@ -10,6 +10,7 @@ from pathlib import Path
 
 from monitor.exceptions import InputError
 from monitor.records import LinearAxes
+from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import Key
 from monitor.sources import Source
 from monitor.workflow.uncertainty.request import Asked, holds_for
@@ -32,9 +33,10 @@ class CertificateOptions:
     stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the laboratory's word on
     conformity. ``process`` are standard deviations by parameter, in its unit, with which the true values of machines
     of this kind scatter about zero: the statement then has the global risks of its rule. ``with_map`` adds the
-    volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key`` signs it.
+    volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key`` signs it. ``accept`` names the
+    grounds against the certificate that the laboratory answers for, each with the reason that is printed on it.
 
-    Raises InputError for a method or a rule that there is not.
+    Raises InputError for a method or a rule that there is not, or a blank reason.
     """
 
     laboratory: Path
@@ -53,6 +55,7 @@ class CertificateOptions:
     with_map: bool = False
     fonts: tuple[Path, ...] = ()
     key: Key | None = None
+    accept: Mapping[GroundKind, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -65,6 +68,9 @@ class CertificateOptions:
             if not 0.0 < spread < math.inf:
                 raise InputError(f"--process {name}={spread:g}: a standard deviation is positive")
         holds_for(self.holds_for)
+        for kind, reason in self.accept.items():
+            if not reason.strip():
+                raise InputError(f"--accept {kind}=REASON: say why the laboratory accepts it; it is printed")
 
     @property
     def asked(self) -> Asked:

@@ -32,11 +32,25 @@ class DeviationsApart:
 
 
 @dataclass(frozen=True)
+class CurvePoint:
+    """A point of the curve of an unknown shape: the reading of the axis in mm or degrees, the direction of its last
+    travel (1 or -1), and the size with its standard uncertainty."""
+
+    at: float
+    direction: int
+    value: float
+    u: float
+
+
+@dataclass(frozen=True)
 class MachineMissing:
     """An effect that a machine's model lacks: size in ``unit``, evidence, errors before and after it is added, rivals.
 
-    ``heldout_..`` are None with one run of few poses, ``heldout_days_..`` with fewer than three days. ``coinciding``
-    are rivals that no data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart.
+    ``heldout_..`` are None with one run of few poses, ``heldout_days_..`` with fewer than three days,
+    ``heldout_poses_..`` (poses left out of every run) with fewer than eight poses. ``coinciding`` are rivals that no
+    data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart. Where the catalogue does
+    not have the shape of the effect, ``shape_unknown`` says so, ``nearest_shape`` is the entry that comes closest, and
+    ``curve`` the shape in ``unit``, without the constant and the slope that every run has of its own.
     ``reversal_value`` of a play (ISO 230-2) is twice its amplitude: what a backlash compensation is set to.
     """
 
@@ -56,11 +70,16 @@ class MachineMissing:
     heldout_after_um: float | None
     heldout_days_before_um: float | None
     heldout_days_after_um: float | None
+    heldout_poses_before_um: float | None
+    heldout_poses_after_um: float | None
     indistinguishable_from: tuple[str, ...]
     coinciding: tuple[str, ...]
     tell_apart_by: tuple[dict[str, float], ...]
     standard_deviations_apart: DeviationsApart
     varies_from_run_to_run: bool
+    shape_unknown: bool
+    nearest_shape: str | None
+    curve: tuple[CurvePoint, ...]
     searched: SearchedValue | None = field(default=None, metadata=OMITTED)
     reversal_value: Estimate | None = field(default=None, metadata=OMITTED)
 
@@ -177,8 +196,8 @@ class MachineExplanation:
     """The explanation of a machine; ``answer`` is the finding in a few sentences.
 
     ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why;
-    ``held_out`` are the parts left out in turn for the held-out errors. The residual is pictured where something is
-    missing.
+    ``held_out`` are the parts left out in turn for the held-out errors. ``not_fitted`` are effects that stood out but
+    could not be fitted, and were skipped. The residual is pictured where something is missing.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -194,6 +213,7 @@ class MachineExplanation:
     answer: str
     residual_map: ResidualMap | None
     residual_against: ResidualAgainst | None
+    not_fitted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

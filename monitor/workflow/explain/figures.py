@@ -19,6 +19,7 @@ from monitor.reporting.figures.drivers import (
 from monitor.reporting.figures.models import ErrorSteps, RankedEffects, error_falling, ranked_effects
 from monitor.reporting.figures.residuals import residual_bars, residual_vectors
 from monitor.reporting.figures.style import Figure
+from monitor.reporting.figures.unknown_shape import ShapeCurve, unknown_shape
 from monitor.reporting.numbers import round_result
 from monitor.units import MICROMETRE
 from monitor.workflow.explain.explain_answer import MachineExplanation, MachineMissing
@@ -83,6 +84,7 @@ def explanation_figures(answer: MachineExplanation, explanation: Explanation, fo
     noise_um = MICROMETRE.to_display(explanation.comparison.stated_uncertainty)
     files = save_figure(_ranked(missing, answer.answer), folder, "missing-effects")
     files += save_figure(_falling(missing, noise_um), folder, "error-falling")
+    files += _unknown_shapes(missing, folder)
     files += _failing(explanation, best, folder)
     prediction = _predicted(explanation, best)
     if prediction is not None:
@@ -106,6 +108,27 @@ def _ranked(missing: Sequence[MachineMissing], title: str) -> Figure:
         notes += ["not ruled out"] * len(rivals)
     effects = RankedEffects(names, peaks, groups, notes)
     return ranked_effects(effects, title=title, value_name="peak displacement / µm")
+
+
+def _unknown_shapes(missing: Sequence[MachineMissing], folder: Path) -> list[str]:
+    """Draw the curve of every effect whose shape the catalogue does not have."""
+    files = []
+    for effect in missing:
+        if effect.curve:
+            error = effect.effect.partition(":")[0]
+            figure = unknown_shape(
+                ShapeCurve(
+                    [point.at for point in effect.curve],
+                    [point.direction for point in effect.curve],
+                    [point.value for point in effect.curve],
+                    [point.u for point in effect.curve],
+                ),
+                title=f"{error}, shape unknown; nearest in the catalogue: {effect.nearest_shape}",
+                axis_name=f"reading of {error[2:].lstrip('0')}",
+                value_name=f"{error} / {effect.unit}",
+            )
+            files += save_figure(figure, folder, f"shape-of-{error.lower()}")
+    return files
 
 
 def _failing(explanation: Explanation, effect: str, folder: Path) -> list[str]:

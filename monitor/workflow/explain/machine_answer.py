@@ -14,6 +14,7 @@ from monitor.workflow.explain.explain_answer import (
     BadProbing,
     ChangedParameter,
     ChangedTarget,
+    CurvePoint,
     DeviationsApart,
     LikelyMistake,
     MachineExplanation,
@@ -61,6 +62,19 @@ def machine_comparison(comparison: ChainComparison) -> MachineComparison:
     )
 
 
+def _curve(effect: ChainMissing, unit: Unit) -> tuple[CurvePoint, ...]:
+    """The curve of an unknown shape in display units; empty where the catalogue has the shape."""
+    curve = effect.curve
+    if curve is None:
+        return ()
+    at = curve.at / DEGREE.factor if curve.turns else curve.at
+    rows = zip(at, curve.direction, curve.size, curve.u, strict=True)
+    return tuple(
+        CurvePoint(float(place), int(direction), unit.to_display(float(size)), unit.to_display(float(u)))
+        for place, direction, size, u in rows
+    )
+
+
 def _machine_missing(effect: ChainMissing) -> MachineMissing:
     unit, um = effect.units[0], MICROMETRE.to_display
     return MachineMissing(
@@ -80,6 +94,8 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         heldout_after_um=micrometres(effect.held_out_after),
         heldout_days_before_um=micrometres(effect.held_out_days_before),
         heldout_days_after_um=micrometres(effect.held_out_days_after),
+        heldout_poses_before_um=micrometres(effect.held_out_poses_before),
+        heldout_poses_after_um=micrometres(effect.held_out_poses_after),
         indistinguishable_from=rivals(effect),
         coinciding=coinciding(effect),
         tell_apart_by=tuple(
@@ -88,6 +104,9 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         ),
         standard_deviations_apart=DeviationsApart(effect.separation.before, effect.separation.after),
         varies_from_run_to_run=effect.varies,
+        shape_unknown=effect.nearest is not None,
+        nearest_shape=effect.nearest,
+        curve=_curve(effect, unit),
         searched=searched_value(effect),
         reversal_value=reversal_value(
             effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
@@ -151,4 +170,5 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         answer=machine_sentences(explanation, comparison.verdict, missing, len(suspect_data), changes),
         residual_map=residual_map,
         residual_against=residual_against,
+        not_fitted=explanation.unfitted,
     )

@@ -57,6 +57,11 @@ def machine_sentences(
             else (f"{target_word} {change.target}", "moved")
         )
         sentences.append(f"{subject} {verb} by {change.size:.1f} {change.unit} at run {change.run}.")
+    if explanation.unfitted:
+        sentences.append(
+            f"Could not be fitted and {'was' if len(explanation.unfitted) == 1 else 'were'} skipped: "
+            f"{', '.join(explanation.unfitted)}."
+        )
     return (GROSS if is_hopeless(explanation) else "") + " ".join(sentences)
 
 
@@ -69,6 +74,11 @@ def _missing_sentences(missing: Sequence[MachineMissing], verdict: Verdict) -> l
         ]
     first = missing[0]
     sentences = [f"The model lacks {first.effect}: {first.description.meaning}."]
+    if first.shape_unknown:
+        sentences.append(
+            f"The catalogue does not have its shape; {first.nearest_shape} comes nearest. Further effects stand beside "
+            "it whatever its shape is."
+        )
     if first.varies_from_run_to_run:
         sentences.append("It varies from run to run and no recorded column follows it.")
     if first.indistinguishable_from:

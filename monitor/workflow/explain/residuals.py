@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.discovery import Fit
-from monitor.discovery.machine.anomalies import plan_cells
+from monitor.discovery.machine.plan_cells import plan_cells
 from monitor.records import Array
 from monitor.units import HOUR, MICROMETRE, MINUTE
 
@@ -41,7 +41,7 @@ def in_machine_frame(fit: Fit, vectors: Array | None = None) -> tuple[Array, Arr
 
 def mean_over_runs(fit: Fit, positions: Array, vectors: Array) -> tuple[Array, Array]:
     """Means (m, 3) of positions and residuals (n, 3) at the m poses of the plan; probings left out take no part."""
-    pose = plan_cells(fit)
+    pose = plan_cells(fit.problem)
     weighed = ~fit.left_out
     count = np.bincount(pose[weighed]).astype(float)
     count[count == 0] = np.nan

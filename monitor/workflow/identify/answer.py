@@ -122,9 +122,9 @@ class IdentifyAnswer:
     added: Mapping[str, Estimate | CurveEstimate]
     added_refused: tuple[RefusedParameters, ...]
     autocorrelation: CurveNoise | None = field(default=None, metadata=OMITTED)
-    taken_up: tuple[TakenUp, ...] | None = field(default=None, metadata=OMITTED)
     frames: Mapping[str, FrameOfReference] | None = field(default=None, metadata=OMITTED)
     reversal_values: Mapping[str, Estimate] | None = field(default=None, metadata=OMITTED)
+    taken_up: tuple[TakenUp, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

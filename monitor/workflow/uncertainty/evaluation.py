@@ -38,7 +38,7 @@ from monitor.uncertainty.sourced_trials import Moves
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import as_model, resolve
+from monitor.workflow.models import as_model, resolve_for
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.beside import Linearised, beside_readings
@@ -101,7 +101,7 @@ def evaluate(db: Database, request: UncertaintyRequest) -> RunUncertainty:
 def evaluate_campaign(db: Database, whole: Campaign, request: UncertaintyRequest) -> RunUncertainty:
     """As ``evaluate``, of a campaign that is loaded."""
     campaign = runs_before(whole, request.before)
-    model = resolve(db, request.model, campaign.method)
+    model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     fitted = fit(campaign_method(campaign).problem_of(campaign, as_model(model)))
     selected = None
     if request.select is not None:

@@ -1,0 +1,210 @@
+"""Noise of neighbours: readings of one run that resemble those before them (drift, temperature, a slow probe).
+
+The noise of a reading is an independent part and a part that follows an autoregression of first order along the probing
+sequence. Both are estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) and
+taken out of all rows by the filter of Kalman (Trans. ASME J. Basic Eng. 82 (1960) 35), whose innovations are
+independent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.machine import MOTION
+from monitor.methods.chain.problem import ChainProblem
+from monitor.records import Array
+
+# Correlations of neighbours and shares of the correlated part that are tried; neighbours on this grid differ by less
+# than what 8 runs of 62 probings determine (about 0.05).
+CORRELATIONS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97, 0.99, 0.998)
+SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1)
+# More runs than this say nothing more that the grid could tell apart.
+MOST_RUNS = 5
+# Neighbours that resemble each other by less than so many standard deviations of white noise are white.
+NOTICED = 1.5
+# Twice the logarithm of the likelihood ratio from which on noise is correlated: 5 % of white campaigns with two
+# parameters. Taking white noise for hardly correlated noise costs next to nothing.
+LIKELIER = 6.0
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Correlation ``rho`` of the dependent part of two neighbours, and its ``share`` of the variance."""
+
+    rho: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The layout of whitened numbers (R, N): ``weighted`` (R, T) touches of d numbers each, ``turned`` (R, T, d, d)
+    into the directions of the readings (None where they are the readings); what stands behind is no reading."""
+
+    weighted: npt.NDArray[np.bool_]
+    numbers: int
+    turned: Array | None
+
+    @property
+    def count(self) -> int:
+        """How many of the N numbers are of readings."""
+        return int(self.weighted.shape[1]) * self.numbers
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """The filter that takes a correlation out of numbers (..., R, N) run by run, as a triangle of weights."""
+
+    rows: Rows
+    correlation: Correlation
+
+    @cached_property
+    def factors(self) -> tuple[Array, Array]:
+        """Lower triangles (R, T, T) that make the touches of every run independent, and the logarithm (R,) of the
+        determinant of the noise covariance for unit variance."""
+        rho, share = self.correlation.rho, self.correlation.share
+        weighted = self.rows.weighted
+        runs, touches = weighted.shape
+        triangle = np.zeros((runs, touches, touches))
+        level = np.zeros((runs, touches))
+        variance = np.ones((runs, touches))
+        predicted = np.full(runs, share)
+        for touch in range(touches):
+            if touch:
+                predicted = rho**2 * predicted + share * (1.0 - rho**2)
+            total, present = predicted + (1.0 - share), weighted[:, touch]
+            innovation = -rho * level
+            innovation[:, touch] += 1.0
+            triangle[:, touch] = innovation * (present / np.sqrt(total))[:, None]
+            gain = np.where(present, predicted / total, 0.0)
+            level = rho * level + innovation * gain[:, None]
+            variance[:, touch] = np.where(present, total, 1.0)
+            predicted = predicted * (1.0 - gain)
+        return triangle, self.rows.numbers * np.log(variance).sum(axis=1)
+
+    def __call__(self, numbers: Array) -> Array:
+        """Independent numbers (..., R, N) of equal variance from correlated ones."""
+        rows = self.rows
+        touches = rows.weighted.shape[1]
+        readings = numbers[..., : rows.count].reshape(*numbers.shape[:-1], touches, rows.numbers)
+        if rows.turned is not None:
+            readings = (rows.turned @ readings[..., None])[..., 0]
+        white = np.array(numbers)
+        white[..., : rows.count] = (self.factors[0] @ readings).reshape(*numbers.shape[:-1], rows.count)
+        return white
+
+
+def rows_of(problem: ChainProblem) -> Rows:
+    """The layout of the whitened numbers of a problem."""
+    weighted = np.isfinite(problem.sigma)
+    numbers = problem.sigma.shape[1]
+    padded = problem.padded(weighted.astype(float)).reshape(len(problem.runs), -1, numbers)
+    return Rows(np.all(padded > 0.5, axis=-1), numbers, None)
+
+
+def turned_into_readings(problem: ChainProblem, by_error: Array) -> Array | None:
+    """Rotations (R, T, d, d) of a row's numbers into the directions of the measured joints; None where the numbers are
+    no vectors of as many joints."""
+    chain, measured = problem.context.chain, list(problem.measured_joints)
+    if len(measured) != 3 or problem.sigma.shape[1] != 3:
+        return None
+    along = np.array([chain.joints[index].direction for index in measured])
+    moved = problem.observe(np.einsum("nrac,ac->nra", by_error[:, :, measured, MOTION, :3], along))
+    # Directions are at right angles but for errors of microradians.
+    turned = problem.padded(np.swapaxes(moved, 1, 2).reshape(len(moved), -1)[:, :, None])
+    return turned.reshape(len(problem.runs), -1, 3, 3)
+
+
+def deviations(residual: Array, rows: Rows, cells: npt.NDArray[np.int64]) -> Array:
+    """Residuals (R, N) less the mean of their ``cells`` (R, T) of the plan over the runs: what all runs share is an
+    effect and no noise. With one run they stay as they are."""
+    if len(residual) == 1:
+        return residual
+    runs, touches = rows.weighted.shape
+    vectors = residual[:, : rows.count].reshape(runs * touches, rows.numbers)
+    cell, weight = np.where(cells < 0, 0, cells).reshape(-1), rows.weighted.reshape(-1).astype(float)
+    count = np.bincount(cell, weights=weight)
+    mean = (
+        np.stack([np.bincount(cell, weights=weight * column) for column in vectors.T], axis=1)
+        / np.maximum(count, 1.0)[:, None]
+    )
+    result = np.array(residual)
+    result[:, : rows.count] = ((vectors - mean[cell]) * weight[:, None]).reshape(runs, rows.count)
+    return result
+
+
+def estimate(residual: Array, basis: Array, rows: Rows) -> Correlation | None:
+    """The correlation of residuals (R, N), whose own unknowns span ``basis`` (R, N, p); None where they are white.
+
+    ``residual`` are ``deviations``: the means over the runs take their part of the degrees of freedom.
+    """
+    runs = np.unique(np.linspace(0, len(residual) - 1, min(len(residual), MOST_RUNS)).astype(np.int64))
+    likelihood = _likelihood(
+        residual[runs],
+        basis[runs],
+        Rows(rows.weighted[runs], rows.numbers, None if rows.turned is None else rows.turned[runs]),
+        (len(residual) - 1) / len(residual) if len(residual) > 1 else 1.0,
+    )
+    if likelihood.resemblance() < NOTICED:
+        return None
+    best = min((Correlation(rho, 1.0) for rho in CORRELATIONS), key=likelihood.criterion)
+    # The more independent noise, the more alike has the rest to be.
+    start = CORRELATIONS.index(best.rho)
+    trials = [Correlation(rho, share) for share in SHARES for rho in CORRELATIONS[max(start - 1, 0) :: 2][:4]]
+    best = min((best, *trials), key=likelihood.criterion)
+    gain = likelihood.criterion(Correlation(0.0, 0.0)) - likelihood.criterion(best)
+    return best if gain > LIKELIER else None
+
+
+@dataclass(frozen=True)
+class _Likelihood:
+    """The restricted likelihood of noise: ``readings`` (R, T, d (p + 1)) are the residuals and then the span of each
+    run's own unknowns, ``rest`` (R, e, p + 1) the same of what is no reading."""
+
+    readings: Array
+    rest: Array
+    rows: Rows
+    share: float
+
+    def resemblance(self) -> float:
+        """The sum of products of neighbours, less what the fit alone makes of white noise, in standard deviations."""
+        numbers = self.rows.numbers
+        parts = self.readings.reshape(*self.rows.weighted.shape, numbers, -1)
+        residual, own = parts[..., 0], parts[..., 1:]
+        number = self.share * (int(self.rows.weighted.sum()) * numbers - float(np.sum(own**2)))
+        variance = max(float(np.sum(residual**2)) / max(number, 1.0), 1e-300)
+        product = float(np.sum(residual[:, 1:] * residual[:, :-1])) / variance
+        expected = -self.share * float(np.sum(own[:, 1:] * own[:, :-1]))
+        return (product - expected) / float(np.sqrt(max(number, 1.0)))
+
+    def criterion(self, correlation: Correlation) -> float:
+        """Minus twice the logarithm of the restricted likelihood, but for a constant."""
+        triangle, determinant = Whitening(replace(self.rows, turned=None), correlation).factors
+        runs, touches = self.rows.weighted.shape
+        white = (triangle @ self.readings).reshape(runs, touches * self.rows.numbers, -1)
+        white = np.concatenate([white, self.rest], axis=1)
+        residual, own = white[..., 0], white[..., 1:]
+        values, vectors = np.linalg.eigh(np.swapaxes(own, 1, 2) @ own)
+        able = values > 1e-9
+        onto = np.einsum("rij,ri->rj", vectors, np.einsum("rnp,rn->rp", own, residual))
+        squares = float(
+            np.sum(residual**2) - np.sum(np.where(able, onto**2 / np.where(able, values, 1.0), 0.0))
+        )
+        logarithm = float(determinant.sum() + np.sum(np.log(np.where(able, values, 1.0))))
+        number = self.share * (int(self.rows.weighted.sum()) * self.rows.numbers - int(able.sum()))
+        return self.share * logarithm + number * float(np.log(max(squares, 1e-300)))
+
+
+def _likelihood(residual: Array, basis: Array, rows: Rows, share: float) -> _Likelihood:
+    """The likelihood of residuals (R, N) whose own unknowns span ``basis`` (R, N, p), in the directions of the
+    readings."""
+    numbers = np.concatenate([residual[..., None], basis], axis=2)
+    runs, touches = rows.weighted.shape
+    readings = numbers[:, : rows.count].reshape(runs, touches, rows.numbers, -1)
+    if rows.turned is not None:
+        readings = rows.turned @ readings
+    readings = np.where(rows.weighted[..., None, None], readings, 0.0)
+    return _Likelihood(readings.reshape(runs, touches, -1), numbers[:, rows.count :], rows, share)

@@ -1,0 +1,51 @@
+"""The curve of an effect whose shape the catalogue does not have: its size where the axis stood, with its band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.discovery.machine.scene import MachineEffect
+from monitor.effects import ChainEffect, Context
+from monitor.records import Array
+
+# A curve is drawn through no more points than a figure shows.
+MOST_POINTS = 200
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Size (m,) and standard uncertainty (m,) of an effect, in internal units, at readings (m,) of the axis ``joint``
+    in mm or rad, to which it came in a direction (m,)."""
+
+    joint: str
+    turns: bool
+    at: Array
+    direction: Array
+    size: Array
+    u: Array
+
+
+def curve_of(context: Context, effect: MachineEffect, coefficients: Array, covariance: Array) -> Curve | None:
+    """The curve of an effect of the given coefficients (k,); None for what is no error of an axis."""
+    if not isinstance(effect, ChainEffect):
+        return None
+    columns = effect.shape.columns(context, effect.term.joint)
+    at = effect.joint.sign * context.places[:, effect.term.joint]
+    direction = context.travel[:, effect.term.joint]
+    first = np.flatnonzero(context.run == context.run[0])
+    rows = first[np.argsort(at[first], kind="stable")]
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.int64))]
+    # What the base has already, a constant and a slope, is no part of the shape.
+    plain = np.column_stack([np.ones(len(rows)), at[rows]])
+    shape = columns[rows] - plain @ np.linalg.lstsq(plain, columns[rows], rcond=None)[0]
+    variance = np.einsum("mi,ij,mj->m", shape, covariance, shape)
+    return Curve(
+        effect.joint.name,
+        effect.joint.turns,
+        at[rows],
+        direction[rows],
+        shape @ coefficients,
+        np.sqrt(np.maximum(variance, 0.0)),
+    )

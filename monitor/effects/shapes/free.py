@@ -1,0 +1,113 @@
+"""``free``: a shape that nobody knows, of position, direction, way since the last reversal, and the other axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from monitor.effects.context import Context
+from monitor.effects.joint_error import JointError
+from monitor.effects.shape import DescribedShape
+from monitor.exceptions import EffectError
+from monitor.records import Array
+
+# Hats over the travel of a linear axis: a twelfth of the stroke is as fine as 60 touches show.
+HATS = 12
+# Harmonics of a rotary axis: a bearing, a gear and a scale of a table err up to some eight times a turn.
+HARMONICS = 8
+# Play takes this part of the travel to build up.
+BUILD_UP = (1 / 40, 1 / 12, 1 / 4)
+
+
+@dataclass(frozen=True)
+class Free(DescribedShape):
+    """Parts of a flexible basis of one axis, numbered from 1; all of them where none is named, for a search.
+
+    Linear axes: hats over the visited range, the direction of travel (alone, times the position and its square, and
+    building up with the way since the last reversal), the position times that of every other axis. Rotary axes:
+    harmonics to the eighth, the direction (alone and times cosine and sine), cosine and sine times the other axes.
+    Every part is scaled to 1 at most.
+    """
+
+    parts: tuple[int, ...] = ()
+    pattern: ClassVar[str] = r"free\((?P<parts>[1-9]\d*(,[1-9]\d*)*)\)"
+
+    @classmethod
+    def of(cls, groups: Mapping[str, str]) -> Self:
+        return cls(tuple(int(word) for word in groups["parts"].split(",")))
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return tuple(f".{part}" for part in self.parts)
+
+    def columns(self, context: Context, joint: int) -> Array:
+        basis = flexible_basis(context, joint)
+        if not self.parts:
+            return basis
+        if max(self.parts) > basis.shape[1]:
+            raise EffectError(
+                f"free has the parts 1 to {basis.shape[1]} here; {max(self.parts)} is none of them"
+            )
+        return np.asarray(basis[:, [part - 1 for part in self.parts]])
+
+    def phrase(self, error: JointError) -> str:
+        return f", of a shape that no entry of the catalogue has: it depends on position and direction of {error.name}"
+
+
+def flexible_basis(context: Context, joint: int) -> Array:
+    """All parts (n, k) of the flexible basis of an axis."""
+    position, direction = context.places[:, joint], context.travel[:, joint]
+    others = [
+        part
+        for index in range(context.places.shape[1])
+        if index != joint
+        for part in _of_other(context, index)
+    ]
+    middle, half = (position.max() + position.min()) / 2.0, max(float(np.ptp(position)) / 2.0, 1e-12)
+    scaled = (position - middle) / half
+    if context.chain.joints[joint].turns:
+        parts = [wave(order * position) for order in range(1, HARMONICS + 1) for wave in (np.cos, np.sin)]
+        simple = [np.cos(position), np.sin(position), scaled]
+    else:
+        nodes = np.linspace(-1.0, 1.0, HATS)
+        parts = [np.interp(scaled, nodes, hat) for hat in np.eye(HATS)]
+        simple = [scaled, scaled**2]
+    parts += [direction, *(direction * part for part in simple)]
+    way = way_since_reversal(context, joint) / (2.0 * half)
+    parts += [direction * np.exp(-way / length) for length in BUILD_UP]
+    parts += [part * other for part in simple for other in others]
+    columns = np.column_stack(parts)
+    largest = np.abs(columns).max(axis=0)
+    return np.asarray(columns / np.where(largest > 0.0, largest, 1.0))
+
+
+def _of_other(context: Context, joint: int) -> list[Array]:
+    """What a product takes of another axis; nothing of one that stands still."""
+    position = context.places[:, joint]
+    spread = float(np.ptp(position))
+    if spread == 0.0:
+        return []
+    if context.chain.joints[joint].turns:
+        return [np.cos(position), np.sin(position), position / np.pi]
+    return [(position - position.mean()) / spread]
+
+
+def way_since_reversal(context: Context, joint: int) -> Array:
+    """The way (n,) that an axis went since it last reversed, from zero at the begin of every run."""
+    way = np.zeros(len(context))
+    position, direction = context.places[:, joint], context.travel[:, joint]
+    for run in np.unique(context.run):
+        rows = np.flatnonzero(context.run == run)
+        steps = np.abs(np.diff(position[rows], prepend=0.0))
+        reversals = np.concatenate([[True], np.diff(direction[rows]) != 0.0])
+        total = np.cumsum(steps)
+        # The way before the step in which the axis reversed does not count.
+        begin = np.maximum.accumulate(np.where(reversals, total - steps, 0.0))
+        way[rows] = total - begin
+    return way
+
+
+REGISTERED = (Free,)

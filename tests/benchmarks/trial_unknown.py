@@ -1,0 +1,230 @@
+"""Trial of `explain` beyond its catalogue: shapes that it does not have, and noise that is not white.
+
+    OMP_NUM_THREADS=1 python tests/benchmarks/trial_unknown.py --seeds 3 --empties 300
+
+Prints two tables with exact intervals. ``shapes``: an error of one of twenty families outside the catalogue is hidden;
+right is an answer that names its error alone (a product of two axes: the error of either). ``empty``: nothing is hidden
+in noise that depends on its neighbours, walks, is offset by days, has heavy tails or is rounded; right is no effect.
+Everything hidden stems from tests/simulator, which shares no code with the package.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from by_path import load
+from by_path import simulator as simulator_of
+
+from monitor.discovery import explain
+from monitor.methods.samba.method import problem_of
+
+ROOT = Path(__file__).resolve().parents[2]
+simulator = simulator_of()
+virtual_campaigns = load("virtual_campaigns", ROOT / "tests" / "discovery" / "virtual.py")
+interval = load("trial_discovery", ROOT / "tests" / "benchmarks" / "trial_discovery.py").interval
+Curve = Callable[[np.ndarray, np.ndarray, Any], np.ndarray]
+
+
+def since_reversal(q: np.ndarray, travel: np.ndarray, now: Any) -> np.ndarray:
+    """The way (N,) since the last reversal, from zero at the begin of a run."""
+    way = np.zeros(len(q))
+    for row in range(len(q)):
+        first = row == 0 or now.run[row] != now.run[row - 1]
+        step = abs(q[row] - (0.0 if first else q[row - 1]))
+        way[row] = step if first or travel[row] != travel[row - 1] else way[row - 1] + step
+    return way
+
+
+def play(length: float) -> Curve:
+    """A backlash that builds up over a length."""
+    return lambda q, t, now: t * (1 - 2 * np.exp(-since_reversal(q, t, now) / length))
+
+
+#: Families by name: the errors that are right, the effect that is hidden, its curve.
+FAMILIES: dict[str, tuple[tuple[str, ...], str, Curve]] = {
+    "play over 10 mm": (("EXX",), "EXX:curve", play(10.0)),
+    "play over 40 mm": (("EXX",), "EXX:curve", play(40.0)),
+    "play of Y over 25 mm": (("EYY",), "EYY:curve", play(25.0)),
+    "dead zone": (("EZZ",), "EZZ:curve", lambda q, t, now: t * (since_reversal(q, t, now) > 15.0)),
+    "stick-slip": (("EYY",), "EYY:curve", lambda q, t, now: t * np.exp(-since_reversal(q, t, now) / 20.0)),
+    "hysteresis that grows with the way": (("EXX",), "EXX:curve", lambda q, t, now: t * np.abs(q) / 100.0),
+    "hysteresis across": (("EYX",), "EYX:curve", lambda q, t, now: t * q / 100.0),
+    "wear bump": (("EYX",), "EYX:curve", lambda q, t, now: np.exp(-(((q - 30.0) / 25.0) ** 2))),
+    "wear of a scale": (("EZZ",), "EZZ:curve", lambda q, t, now: np.exp(-(((q - q.mean()) / 30.0) ** 2))),
+    "step in a scale": (("EXX",), "EXX:curve", lambda q, t, now: np.tanh((q - 12.0) / 4.0)),
+    "kink of a guideway": (("EYX",), "EYX:curve", lambda q, t, now: np.maximum(q, 0.0) / 100.0),
+    "joint of two rails": (("EAZ",), "EAZ:curve", lambda q, t, now: np.tanh((q - np.median(q)) / 10.0)),
+    "fifth harmonic of C": (("ECC",), "ECC:curve", lambda q, t, now: np.cos(5 * q + 0.7)),
+    "sixth harmonic of C, radial": (("EXC",), "EXC:curve", lambda q, t, now: np.cos(6 * q + 0.3)),
+    "seventh harmonic of B": (("EBB",), "EBB:curve", lambda q, t, now: np.cos(7 * q + 1.0)),
+    "eighth harmonic of C": (("ECC",), "ECC:curve", lambda q, t, now: np.cos(8 * q + 0.4)),
+    "sawtooth of a gear": (("ECC",), "ECC:curve", lambda q, t, now: (5 * q / (2 * np.pi)) % 1.0 - 0.5),
+    "X times B": (("EXX", "EXB"), "EXX:curve", lambda q, t, now: q * now.angles["B"] / 100.0),
+    "two time constants": (
+        ("EZC1",),
+        "EZC1:curve",
+        lambda q, t, now: (
+            2.0 - np.exp(-now.since_first_run_s / 900.0) - np.exp(-now.since_first_run_s / 9000.0)
+        ),
+    ),
+    "lag behind a temperature": (
+        ("EXX",),
+        "EXX:curve",
+        lambda q, t, now: (
+            q / 100.0 * np.concatenate([np.zeros(8), (now.channels["x_axis_degC"] - 20.0)[:-8]])
+        ),
+    ),
+}
+
+
+def autoregressive(rho: float) -> Callable[[np.random.Generator, np.ndarray], np.ndarray]:
+    """Noise whose neighbours in a run have the correlation rho."""
+
+    def noise(rng: np.random.Generator, run: np.ndarray) -> np.ndarray:
+        fresh = rng.standard_normal((len(run), 3))
+        values = fresh.copy()
+        for row in range(1, len(run)):
+            if run[row] == run[row - 1]:
+                values[row] = rho * values[row - 1] + np.sqrt(1 - rho**2) * fresh[row]
+        return values
+
+    return noise
+
+
+def walk(rng: np.random.Generator, run: np.ndarray) -> np.ndarray:
+    """A random walk of 0.25 a reading in every run, and independent noise of 0.7."""
+    steps = 0.25 * rng.standard_normal((len(run), 3))
+    values = np.zeros((len(run), 3))
+    for number in np.unique(run):
+        values[run == number] = np.cumsum(steps[run == number], axis=0)
+    return values + 0.7 * rng.standard_normal((len(run), 3))
+
+
+def of_days(rng: np.random.Generator, run: np.ndarray) -> np.ndarray:
+    """Independent noise, and an offset of every axis that four runs have in common."""
+    day = (run - 1) // 4
+    return 0.7 * rng.standard_normal((len(run), 3)) + rng.standard_normal((day.max() + 1, 3))[day]
+
+
+def heavy(rng: np.random.Generator, run: np.ndarray) -> np.ndarray:
+    """Student's t with three degrees of freedom, of unit variance."""
+    return rng.standard_t(3, (len(run), 3)) / np.sqrt(3.0)
+
+
+NOISES: dict[str, dict[str, Any]] = {
+    "white": {},
+    "rho 0.3": {"noise": autoregressive(0.3)},
+    "rho 0.6": {"noise": autoregressive(0.6)},
+    "rho 0.9": {"noise": autoregressive(0.9)},
+    "random walk": {"noise": walk},
+    "day offsets": {"noise": of_days},
+    "heavy tails": {"noise": heavy},
+    "rounded to 1 µm": {"decimals": 3},
+}
+PLANS = {4: (2, 2), 8: (2, 4), 20: (5, 4), 60: (15, 4), 1: (1, 1), 2: (1, 2), 7: (7, 1)}
+
+
+@dataclass(frozen=True)
+class Told:
+    """What an explanation named, and the seconds of processor time that it took."""
+
+    effects: tuple[str, ...]
+    seconds: float
+
+
+def told(campaign: Any, seed: int) -> Told:
+    """Explain a campaign."""
+    begin = time.process_time()
+    answer = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(seed))
+    return Told(tuple(effect.effect for effect in answer.missing), time.process_time() - begin)
+
+
+def shapes(seeds: range, peaks: tuple[float, ...], runs: int, only: str) -> Iterator[str]:
+    """The rows of the table of shapes; none without seeds."""
+    if not seeds:
+        return
+    yield "| hidden | peak | right error alone | led by it | seconds | else |"
+    yield "| --- | --- | --- | --- | --- | --- |"
+    days, each = PLANS[runs]
+    alone_of = dict.fromkeys(peaks, 0)
+    count_of = dict.fromkeys(peaks, 0)
+    for peak in peaks:
+        for name, (right, effect, curve) in FAMILIES.items():
+            if only not in name:
+                continue
+            answers = [
+                told(
+                    virtual_campaigns.virtual(
+                        seed,
+                        [simulator.Effect(effect, peak_um=peak, curve=curve)],
+                        days=days,
+                        runs_per_day=each,
+                    )[0],
+                    seed,
+                )
+                for seed in seeds
+            ]
+            errors = [[text.partition(":")[0] for text in answer.effects] for answer in answers]
+            alone = sum(bool(named) and set(named) <= set(right) for named in errors)
+            led = sum(bool(named) and named[0] in right for named in errors)
+            alone_of[peak] += alone
+            count_of[peak] += len(answers)
+            wrong = {" + ".join(answer.effects) or "nothing" for answer, named in zip(answers, errors, strict=True)
+                     if not named or not set(named) <= set(right)}  # fmt: skip
+            seconds = float(np.median([answer.seconds for answer in answers]))
+            shares = f"{alone} of {len(answers)} | {led} | {seconds:.1f}"
+            yield f"| {name} | {peak:g} µm | {shares} | {'; '.join(sorted(wrong))} |"
+        yield f"| all | {peak:g} µm | {interval(alone_of[peak], count_of[peak])} | | | |"
+
+
+def empties(seeds: range, runs: list[int], only: str) -> Iterator[str]:
+    """The rows of the table of empty campaigns."""
+    yield "| noise | runs | false effects | seconds | named |"
+    yield "| --- | --- | --- | --- | --- |"
+    for count in runs:
+        days, each = PLANS[count]
+        for name, options in NOISES.items():
+            if only not in name:
+                continue
+            answers = [
+                told(
+                    virtual_campaigns.virtual(20000 + seed, days=days, runs_per_day=each, **options)[0], seed
+                )
+                for seed in seeds
+            ]
+            false = [answer for answer in answers if answer.effects]
+            named = sorted({answer.effects[0] for answer in false})[:4]
+            seconds = float(np.median([answer.seconds for answer in answers]))
+            yield f"| {name} | {count} | {interval(len(false), len(answers))} | {seconds:.1f} | {', '.join(named)} |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--seeds", type=int, default=3, help="campaigns of every shape and peak")
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--empties", type=int, default=60, help="empty campaigns of every noise and plan")
+    parser.add_argument("--peaks", type=float, nargs="+", default=[8.0, 3.0], help="peaks in µm")
+    parser.add_argument("--shape-runs", type=int, default=20, choices=list(PLANS), help="runs with a shape")
+    parser.add_argument("--runs", type=int, nargs="+", default=[4, 8, 20, 60, 1, 2, 7], choices=list(PLANS))
+    parser.add_argument("--only", default="", help="shapes or noises whose name contains this")
+    options = parser.parse_args()
+    seeds = range(options.first, options.first + options.seeds)
+    for row in shapes(seeds, tuple(options.peaks), options.shape_runs, options.only):
+        print(row, flush=True)
+    print(flush=True)
+    for row in empties(range(options.first, options.first + options.empties), options.runs, options.only):
+        print(row, flush=True)
+
+
+if __name__ == "__main__":
+    main()

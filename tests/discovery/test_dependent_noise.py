@@ -1,0 +1,103 @@
+"""Noise that depends on its neighbours: the filter, the sign flips, and what is told of empty campaigns.
+
+All rates are in tests/benchmarks/trial_unknown.py; here a few campaigns and independent computations with numpy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy
+from by_path import load
+
+from monitor.discovery import explain, fit
+from monitor.discovery.machine.correlation import Correlation, Rows, Whitening
+from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.search.evidence import Pool, weigh_beside
+from monitor.discovery.search.sign_flips import p_value_by_flips, signs
+from monitor.effects import parse_effect
+from monitor.methods.samba.method import problem_of
+
+
+@pytest.fixture(scope="module")
+def trial():
+    from pathlib import Path
+
+    return load("trial_unknown", Path(__file__).resolve().parents[1] / "benchmarks" / "trial_unknown.py")
+
+
+def test_the_filter_is_the_inverse_of_the_triangle_of_cholesky():
+    """The covariance of a correlated and an independent part, with a touch that was left out."""
+    correlation = Correlation(0.8, 0.6)
+    weighted = np.ones((1, 9), dtype=bool)
+    weighted[0, 4] = False
+    lag = np.abs(np.subtract.outer(np.arange(9), np.arange(9)))
+    covariance = 0.6 * 0.8**lag + 0.4 * np.eye(9)
+    inside = np.ix_(weighted[0], weighted[0])
+    expected = np.linalg.inv(np.linalg.cholesky(covariance[inside]))
+    triangle, determinant = Whitening(Rows(weighted, 1, None), correlation).factors
+    np.testing.assert_allclose(triangle[0][inside], expected, atol=1e-12)
+    assert not triangle[0][4].any()
+    assert determinant[0] == pytest.approx(np.linalg.slogdet(covariance[inside])[1])
+
+
+@pytest.mark.parametrize(("rho", "days", "each"), [(0.6, 2, 2), (0.6, 1, 1), (0.9, 2, 2)])
+def test_the_correlation_of_neighbours_is_estimated(virtual_campaigns, trial, rho, days, each):
+    campaign, _ = virtual_campaigns.virtual(3, noise=trial.autoregressive(rho), days=days, runs_per_day=each)
+    correlation = fit(problem_of(campaign)).correlation()
+    assert correlation is not None
+    # 150 degrees of freedom a run determine a correlation to some 0.07.
+    assert correlation.rho * correlation.share == pytest.approx(rho, abs=0.2)
+
+
+def test_white_noise_stays_as_it_is(virtual_campaigns):
+    for seed in (1, 2, 3):
+        assert (
+            fit(problem_of(virtual_campaigns.virtual(seed, days=2, runs_per_day=2)[0])).correlation() is None
+        )
+
+
+def test_sign_flips_agree_with_fits_of_flipped_residuals(virtual_campaigns):
+    """Eight runs have 127 other sign patterns: each is fitted anew with numpy."""
+    campaign, _ = virtual_campaigns.virtual(5, days=2, runs_per_day=4)
+    problem = problem_of(campaign).for_search()
+    chain = problem.context.chain
+    texts = ("EXX:poly2", "EYX:poly2", "ECC:harmonic2", "EXX:reversal")
+    variants = [variant for text in texts for variant in variants_of(parse_effect(text, chain))]
+    scene = scene_of(fit(problem), variants)
+    pool = Pool(scene.candidates)
+    best = weigh_beside(scene, pool, [])[0]
+    p_value = p_value_by_flips(scene, pool, [], best, scene.run)
+    total, dof = float(scene.residual @ scene.residual), scene.degrees_of_freedom
+    beaten = 0
+    for flips in signs(8).T:
+        flipped = scene.residual * flips[scene.run]
+        scores = []
+        for candidate in scene.candidates:
+            size = np.linalg.matrix_rank(candidate.columns / np.linalg.norm(candidate.columns, axis=0))
+            coefficients = scipy.linalg.lstsq(candidate.columns, flipped, cond=1e-10)[0]
+            stays = float(np.sum((flipped - candidate.columns @ coefficients) ** 2))
+            scores.append(dof * np.log(total / stays) - size * np.log(dof))
+        beaten += max(scores) >= best.score
+    assert p_value == pytest.approx((1 + beaten) / 128)
+
+
+def test_nothing_is_told_of_empty_campaigns_in_correlated_noise(virtual_campaigns, trial, explained, seeds):
+    """At 1.5 % a campaign, two alarms in four are a chance of 1.3e-3."""
+    alarms = []
+    for seed in seeds(30, 2):
+        for rho in (0.3, 0.6):
+            campaign, _ = virtual_campaigns.virtual(
+                seed, noise=trial.autoregressive(rho), days=2, runs_per_day=2
+            )
+            alarms += explained(campaign).missing
+    assert len(alarms) <= 1
+
+
+def test_a_finding_stands_at_the_end_too(virtual_campaigns, trial):
+    """What an exchange or a merger has made doubtful is no finding: p = q = 1 was told in this noise."""
+    for seed in (201,):
+        campaign, _ = virtual_campaigns.virtual(seed, noise=trial.autoregressive(0.6), days=2)
+        answer = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1))
+        assert all(finding.q_value <= 0.01 for finding in answer.missing)
