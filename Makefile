@@ -46,8 +46,13 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_unknown.py --seeds 3 --empties 60
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_days.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_dependence.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_robots.py --seeds 10
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_mounts.py --seeds 30
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_methods.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_regions.py --replicates 80
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_outliers.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_curve.py --seeds 40
 
 wheel: setup  ## build the wheel and run the tests against it, away from the checkout

@@ -16,6 +16,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from monitor.sources import Source
+
 Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
 Kind = Literal["linear", "rotary", "spindle"]
@@ -23,6 +25,14 @@ Branch = Literal["work", "tool"]
 
 #: ISO 841: X, Y, Z and U, V, W, parallel to them, are linear axes; A, B, C turn.
 LINEAR_LETTERS = "XYZUVW"
+
+
+class ValidationVerdict(StrEnum):
+    """Whether Monte Carlo confirms a first-order result; the value is how documents store it."""
+
+    VALIDATED = "validated"
+    NOT_VALIDATED = "not validated"
+    UNDECIDED = "undecided"
 
 
 @dataclass(frozen=True)
@@ -203,9 +213,37 @@ class LShape:
 
 
 @dataclass(frozen=True)
+class Setup:
+    """One way in which an instrument is set up: what one of its readings is a statement about.
+
+    ``reading`` names the kind; ``standard_uncertainty`` is that of one reading, in mm or rad, None where
+    every row states its own. ``tool_point`` and
+    ``work_point`` (mm) are in the frames of the last tool and work axis; the unit vectors ``direction`` and
+    ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar is free where
+    ``length_uncertainty`` is None. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame`` that
+    in which a vector is read; ``known`` names the unknowns that are held at what is stated.
+    """
+
+    id: str
+    reading: str
+    standard_uncertainty: float | None
+    instrument: str | None = None
+    tool_point: Vector = (0.0, 0.0, 0.0)
+    work_point: Vector = (0.0, 0.0, 0.0)
+    direction: Vector | None = None
+    tool_direction: Vector | None = None
+    length: float | None = None
+    length_uncertainty: float | None = None
+    along: str | None = None
+    side: Branch = "tool"
+    frame: Branch = "work"
+    known: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Artefact:
     """The balls; the scale bar where the method needs one; the reflectors where the file lists them; the tables and
-    conditions of a self-calibration."""
+    conditions of a self-calibration; the setups of instruments."""
 
     id: str
     balls: tuple[Ball, ...]
@@ -213,6 +251,7 @@ class Artefact:
     reflectors: tuple[Reflector, ...] = ()
     l_shape: LShape | None = None
     self_calibration: SelfCalibration | None = None
+    setups: tuple[Setup, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -272,7 +311,7 @@ class SourceFile:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign: one machine, one artefact, one probe, and the runs of one plan."""
+    """A campaign: one machine, one artefact, one probe, the runs of one plan, and the stated sources of uncertainty."""
 
     name: str
     method: str
@@ -282,6 +321,7 @@ class Campaign:
     runs: tuple[Run, ...]
     probings: Probings
     files: tuple[SourceFile, ...] = ()
+    sources: tuple[Source, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,8 @@ import monitor
 PACKAGE = Path(monitor.__file__).parent
 
 # What every room may import. `from monitor import __version__` is for everyone: the package itself imports nothing.
-GROUND = {"__init__", "exceptions", "units", "records", "documents", "refusal"}
+# `sources` is read, stored, propagated and printed: four rooms that may not know each other.
+GROUND = {"__init__", "exceptions", "units", "records", "documents", "refusal", "sources"}
 
 # Room -> the rooms that it may import besides the ground and itself, the lowest first.
 ROOMS: dict[str, set[str]] = {

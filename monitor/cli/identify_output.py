@@ -35,11 +35,16 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
         [*_rows(shown, answer.frames or {}), ["RMS", "µm", "", *(f"{run.rms_um:.2f}" for run in shown), ""]],
         text_columns=3,
     )
-    notes = [run.note for run in shown if run.note]
-    if notes:
-        output.say(notes[0] + (f" (and {len(notes) - 1} more of these runs)" if len(notes) > 1 else ""))
+    for note in (run.note for run in runs if run.note):
+        output.say(note)
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
+    for taken in answer.taken_up or ():
+        if taken.by:
+            output.say(f"{taken.parameter} has no number of its own: {_doing_the_same(taken.by)}")
+    unseen = [taken.parameter for taken in answer.taken_up or () if not taken.by]
+    if unseen:
+        output.say(f"such readings see nothing of {', '.join(unseen)}")
     for name, estimate in answer.added.items():
         output.say(
             f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "
@@ -49,6 +54,13 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
             output.say(f"   {reversal_words(answer.reversal_values[name])}")
     for refusal in answer.added_refused:
         output.say(f"no number: {', '.join(refusal.parameters)}: {refusal.why}")
+
+
+def _doing_the_same(names: tuple[str, ...]) -> str:
+    """Half a sentence on what takes an error up."""
+    if len(names) == 1:
+        return f"{names[0]} does the same"
+    return f"{', '.join(names[:-1])} and {names[-1]} together do the same"
 
 
 def reversal_words(value: Estimate) -> str:

@@ -9,7 +9,9 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from monitor.cli.behind import add_behind, further_sources
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
 from monitor.workflow.certificate.request import METHODS, RULES
 
@@ -38,6 +40,7 @@ def add_issuing(parser: ArgumentParser) -> None:
         "--linear-axes", type=Path, metavar="FILE",
         help="errors of the linear axes (TOML), for methods that take these axes as known",
     )  # fmt: skip
+    add_behind(parser)
     parser.add_argument(
         "--method", choices=METHODS, default="guf",
         help="state the GUM framework's result, or the stored Monte Carlo result (default guf)",
@@ -45,7 +48,17 @@ def add_issuing(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--conformity", choices=RULES, help="state conformity with the machine's tolerances by this rule"
     )
+    parser.add_argument(
+        "--process", action="append", default=[], metavar="PARAMETER=S",
+        help="standard deviation, in its unit, with which the true values of machines of this kind scatter about zero: "
+        "the statement then has the global risks of its rule (JCGM 106); repeat it",
+    )  # fmt: skip
     parser.add_argument("--map", action="store_true", help="state the volumetric error too, with its figure")
+    parser.add_argument(
+        "--accept", action="append", type=_accepted, default=[], metavar="GROUND=REASON",
+        help="issue it although this ground speaks against it, for a reason that is printed; may be repeated: "
+        + ", ".join(kind.value for kind in GroundKind),
+    )  # fmt: skip
     add_fonts(parser)
     signing = parser.add_argument_group("signature (extra [sign]; for a token, extra [token])")
     signing.add_argument("--sign", type=Path, metavar="P12", help="sign with the key of a PKCS#12 file")
@@ -88,6 +101,17 @@ def _day(text: str) -> date:
         raise ArgumentTypeError(f"'{text}' is no day; write it as 2026-03-02") from error
 
 
+def _accepted(text: str) -> tuple[GroundKind, str]:
+    name, _, reason = text.partition("=")
+    try:
+        return GroundKind(name.strip()), reason.strip()
+    except ValueError as error:
+        raise ArgumentTypeError(
+            f"there is no ground '{name}'; there are {', '.join(kind.value for kind in GroundKind)}; "
+            "write --accept GROUND=REASON"
+        ) from error
+
+
 def issuing(options: Namespace) -> dict[str, Any]:
     """The options as the fields of ``CertificateOptions``. Raises InputError."""
     axes = None
@@ -104,12 +128,29 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "issued_on": options.date,
         "model": options.model,
         "linear_axes": axes,
+        "sources": further_sources(options.sources),
+        "holds_for": options.holds_for,
         "method": options.method,
         "conformity": options.conformity,
+        "process": _process(options.process),
         "with_map": options.map,
         "fonts": tuple(options.font),
         "key": _key(options),
+        "accept": dict(options.accept),
     }
+
+
+def _process(texts: list[str]) -> dict[str, float]:
+    process = {}
+    for text in texts:
+        name, _, number = text.partition("=")
+        try:
+            process[name] = float(number)
+        except ValueError as error:
+            raise InputError(
+                f"--process {text}: write a parameter, = and a standard deviation, for example EA0B=5"
+            ) from error
+    return process
 
 
 def _key(options: Namespace) -> Key | None:

@@ -7,11 +7,13 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.workflow.history import agreement
 from monitor.workflow.trend.answer import (
+    FEW_DAYS,
     Between,
     ConditionEffect,
     Cycle,
     DatedChange,
     ParameterTrend,
+    Season,
     StepAtEvent,
     TrendAnswer,
     VectorState,
@@ -50,6 +52,14 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     for name, parameter in parameters:
         yield from (_change(name, change) for change in parameter.changes)
         yield from (_event_step(name, step) for step in parameter.event_steps)
+    few = [
+        change.days for _, parameter in parameters for change in parameter.changes if change.days < FEW_DAYS
+    ]
+    if few:
+        yield (
+            f"{min(few)} days cannot tell a change from days that differ by much more than runs scatter: none of these "
+            "is allowed for where the other parameters do not show such days"
+        )
     for name, parameter in parameters:
         yield from _dependences(name, parameter)
     yield from _charts(answer)
@@ -57,6 +67,7 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from _volumetric(answer.volumetric_error, latest)
     yield from _next_check(answer)
     yield from _backtest(answer)
+    yield from _resemblance(answer)
     yield from dict.fromkeys(parameter.drift.why for _, parameter in parameters if parameter.drift.why)
     for event in answer.events:
         yield f"event {event.at[:10]}: {event.kind}, {event.description}"
@@ -276,6 +287,47 @@ def _next_check(answer: TrendAnswer) -> Iterator[str]:
     span = first.drift.span_days
     if intervals[name] > span:
         yield f"  its drift was seen over {span:.0f} days only; that it goes on for longer is an assumption"
+
+
+#: Blocks of days up to which nothing is known of how far days resemble each other.
+_FEW_BLOCKS = 5
+#: From this ratio on it is said that days differ, and from this factor that an interval is wider.
+_DAYS_DIFFER, _WIDER = 0.5, 1.1
+
+
+def _resemblance(answer: TrendAnswer) -> Iterator[str]:
+    """What the intervals of the slopes assume of days that differ and that resemble each other, and of the year."""
+    stated = {
+        name: parameter.drift for name, parameter in answer.parameters.items() if parameter.drift.resemblance
+    }
+    allowed = {name: drift.resemblance for name, drift in stated.items() if drift.resemblance is not None}
+    if not allowed:
+        return
+    ratios = {
+        name: drift.between_days / drift.within_days
+        for name, drift in stated.items()
+        if drift.between_days and drift.within_days
+    }
+    name = max(ratios, key=lambda parameter: ratios[parameter], default="")
+    if name and ratios[name] > _DAYS_DIFFER:
+        yield f"{name}: days differ by {ratios[name]:.2g} times the scatter of a run; allowed for"
+    name = max(allowed, key=lambda parameter: allowed[parameter].widening)
+    widest = allowed[name]
+    if widest.blocks <= _FEW_BLOCKS:
+        yield (
+            f"{widest.blocks} days cannot tell how far days resemble each other, nor a drift from days that differ: "
+            f"the intervals of the slopes are up to {widest.widening:.2g} times as wide as with independent days"
+        )
+    elif widest.widening > _WIDER:
+        yield (
+            f"{name}: autocorrelation between days {widest.correlation:.2g}, up to {widest.allowed_for:.2g} is allowed "
+            f"for: the slope's interval is {widest.widening:.2g} times as wide as with independent days"
+        )
+    seasons = {drift.season for drift in stated.values()}
+    if Season.NOT_TOLD in seasons:
+        yield "the history does not cover the year: a drift is not told from what the season does"
+    elif Season.ALLOWED_FOR in seasons:
+        yield "what goes up and down with the year is allowed for beside the slopes"
 
 
 def _backtest(answer: TrendAnswer) -> Iterator[str]:

@@ -9,7 +9,8 @@ from monitor.discovery.machine.cures import Mistake
 from monitor.discovery.machine.explain import Explanation, explain
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import ChainMissing
-from monitor.discovery.machine.mistakes import find_mistakes, is_gross
+from monitor.discovery.machine.mistakes import find_mistakes, find_other_names, is_gross
+from monitor.discovery.machine.robust import RobustFit, robust_fit
 from monitor.discovery.machine.version_error import VersionError, version_error
 from monitor.discovery.search.comparison import Verdict
 
@@ -19,12 +20,15 @@ __all__ = [
     "Explanation",
     "Fit",
     "Mistake",
+    "RobustFit",
     "Verdict",
     "VersionError",
     "compare",
     "explain",
     "find_mistakes",
+    "find_other_names",
     "fit",
     "is_gross",
+    "robust_fit",
     "version_error",
 ]

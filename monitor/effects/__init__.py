@@ -6,6 +6,8 @@ from monitor.effects.effect import (
     Basis,
     ChainEffect,
     Effect,
+    ParsedEffect,
+    TurnEffect,
     parse_effect,
     with_time_constant,
 )
@@ -16,6 +18,8 @@ __all__ = [
     "ChainEffect",
     "Context",
     "Effect",
+    "ParsedEffect",
+    "TurnEffect",
     "context_of",
     "parse_effect",
     "positions_of",

@@ -15,7 +15,7 @@ import numpy as np
 
 from monitor.effects.context import Context
 from monitor.effects.drivers import Always
-from monitor.effects.effect import ArtefactEffect, ChainEffect, parse_effect
+from monitor.effects.effect import ParsedEffect, parse_effect
 from monitor.machine import COMPONENTS, Chain
 from monitor.units import CONDITION_SUFFIXES
 
@@ -77,6 +77,15 @@ def of_tracker(
 ) -> tuple[str, ...]:
     """Return effects that hundreds of poses, observed from outside, can show: of drives, gears, read-out and tracker.
 
+    ``ratios`` are gear ratios by axis, as for ``of_drives``.
+    """
+    frame = [f"tracker:{motion}@{driver}" for driver in drivers for motion in ("shift", "turn")]
+    return (*of_drives(chain, ratios), *frame)
+
+
+def of_drives(chain: Chain, ratios: Mapping[str, float] | None = None) -> tuple[str, ...]:
+    """Return the effects of drives, gears and read-out.
+
     ``ratios`` are gear ratios by axis. A strain wave gear errs twice a turn of its generator, a gear pair once a
     turn of its pinion.
     """
@@ -92,8 +101,20 @@ def of_tracker(
         ]
         if ratios and joint.name in ratios:
             texts += [f"E{driven}:harmonic{times * ratios[joint.name]:.6g}" for times in (1, 2)]
-    texts += [f"tracker:{motion}@{driver}" for driver in drivers for motion in ("shift", "turn")]
     return tuple(texts)
+
+
+def of_sight(chain: Chain) -> tuple[str, ...]:
+    """Return the effects of what points somewhere: the tube and the axes sag, the air bends the line of sight.
+
+    The first axis of a mount sags alike wherever it turns: that is its own tilt, and left out.
+    """
+    sagging = [joint.name for joint in chain.tool[1:] if joint.turns]
+    return (
+        "flexure:tool@gravity",
+        *(f"flexure:{name}@gravity" for name in sagging),
+        "sight:up:formula(1/tan(elevation))",
+    )
 
 
 def drivers_of(context: Context) -> tuple[str, ...]:
@@ -117,7 +138,7 @@ def catalogue(
     drivers: Iterable[str],
     pitches: Mapping[str, float] | None = None,
     more: Iterable[str] | None = None,
-) -> tuple[ChainEffect | ArtefactEffect, ...]:
+) -> tuple[ParsedEffect, ...]:
     """Return every effect of the catalogue that is not in ``base``, in the order of its families.
 
     ``drivers`` are names without @; ``pitches`` the scale pitch in mm of axes whose file gives one; ``more`` the
@@ -135,7 +156,7 @@ def catalogue(
         *(of_balls(drivers) if more is None else more),
     ]
     excluded = {parse_effect(text, chain).text for text in base}
-    effects: dict[str, ChainEffect | ArtefactEffect] = {}
+    effects: dict[str, ParsedEffect] = {}
     for text in texts:
         effect = parse_effect(text, chain)
         if effect.text not in excluded:
@@ -143,6 +164,6 @@ def catalogue(
     return tuple(effects.values())
 
 
-def is_driven(effect: ChainEffect | ArtefactEffect) -> bool:
+def is_driven(effect: ParsedEffect) -> bool:
     """Return whether an effect has a driver."""
     return not isinstance(effect.driver, Always)

@@ -33,7 +33,8 @@ class Context:
     ``time`` (n,) s since the run began; ``day_time`` (n,) s since the first run of the day began; ``run_time``
     (n,) from 0 to 1 within a run; ``target`` (n,) names; ``nominal`` (n, 3) mm, where the target should be in
     the frame of the last work axis, NaN where the file does not say; ``columns`` recorded columns by their names in
-    the file, in its units.
+    the file, in its units; ``sight`` (n, 3) unit vectors along the tool in the frame of the last tool axis, None where
+    nothing says them.
     """
 
     chain: Chain
@@ -47,6 +48,7 @@ class Context:
     nominal: Array
     columns: Mapping[str, Array]
     expected: Array | None = None
+    sight: Array | None = None
 
     def __len__(self) -> int:
         return len(self.run)

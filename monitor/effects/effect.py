@@ -2,7 +2,7 @@
 
 ``parse_effect`` turns the text into an object with its basis functions at every probing, their effect on the
 tip-to-target vector, and the names and units of its coefficients. Effects of the chain add to the
-errors of one joint; effects of the artefact shift the target.
+errors of one joint, turns to several of them; effects of the artefact shift the target.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from monitor.effects.drivers import Always, WarmUp, parse_driver
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape, Shape
 from monitor.effects.shapes import Compliance, Const, Nodes, Poly, parse_shape
+from monitor.effects.turns import HEADS as TURN_HEADS
+from monitor.effects.turns import Turn, parse_turn, unknown_turn
 from monitor.effects.weight import weight_driver
 from monitor.exceptions import EffectError
 from monitor.machine import LOCATION, MOTION, Chain, Joint, Term, parse_term
@@ -71,7 +73,29 @@ class ArtefactBasis:
         target += np.sum(self.shifts * np.expand_dims(coefficients, -2), axis=-1)
 
 
-Basis = ChainBasis | ArtefactBasis
+@dataclass(frozen=True)
+class TurnBasis:
+    """A turn of all that a joint carries, at n probings: ``turns`` (n, 3, k) rad about X, Y, Z of its frame after its
+    motion. The three tilts are added as small ones: neglected are their products, 1e-6 for turns of 1 mrad."""
+
+    joint: int
+    turns: Array
+
+    @property
+    def size(self) -> int:
+        """The number of coefficients of the effect."""
+        return int(self.turns.shape[-1])
+
+    def displacement(self, by_error: Array) -> Array:
+        """Return the change (n, 3, k) of the tip-to-target vector for each coefficient, from ``by_error``."""
+        return np.asarray(by_error[:, :, self.joint, MOTION, 3:] @ self.turns)
+
+    def apply(self, coefficients: Array, errors: Array, target: Array) -> None:
+        """Add the effect, in place, to ``errors`` (n, J, 2, 6); ``coefficients`` is (k,) or (n, k)."""
+        errors[..., self.joint, MOTION, 3:] += np.sum(self.turns * np.expand_dims(coefficients, -2), axis=-1)
+
+
+Basis = ChainBasis | ArtefactBasis | TurnBasis
 
 
 class Effect(Protocol):
@@ -173,8 +197,55 @@ class ArtefactEffect:
         return ArtefactBasis(product)
 
 
-def parse_effect(text: str, chain: Chain) -> ChainEffect | ArtefactEffect:
+@dataclass(frozen=True)
+class TurnEffect:
+    """A turn with one coefficient for several terms."""
+
+    turn: Turn
+    driver: Driver
+    driver_text: str
+
+    @property
+    def text(self) -> str:
+        return self.turn.text + (f"@{self.driver_text}" if self.driver_text else "")
+
+    @property
+    def unit(self) -> Unit:
+        driver = self.driver.unit()
+        return self.turn.unit if driver is ONE else self.turn.unit.per(driver)
+
+    def parameters(self, context: Context) -> tuple[str, ...]:
+        return tuple(
+            f"{self.text}{s}{d}" for s in self.turn.labels(context) for d in self.driver.labels(context)
+        )
+
+    def basis(self, context: Context) -> TurnBasis:
+        turns = self.turn.turns(context)
+        driver = self.driver.columns(context, self.turn.joint(context.chain))
+        product = (turns[:, :, :, None] * driver[:, None, None, :]).reshape(len(turns), 3, -1)
+        return TurnBasis(self.turn.joint(context.chain), product)
+
+
+#: Every effect that a text can name.
+ParsedEffect = ChainEffect | ArtefactEffect | TurnEffect
+
+
+def _turn_effect(text: str, chain: Chain) -> TurnEffect:
+    """Return the turn that a text names, with a driver where one follows."""
+    turn, driver_text = parse_turn(text), ""
+    if turn is None:
+        body, driver_text = _split_driver(text)
+        turn = parse_turn(body) if driver_text else None
+    if turn is None:
+        raise unknown_turn(text)
+    turn.joint(chain)
+    return TurnEffect(turn, parse_driver(driver_text), driver_text)
+
+
+def parse_effect(text: str, chain: Chain) -> ParsedEffect:
     """Return the effect that a text names on a chain. Raises EffectError, which says what would be right."""
+    if text.strip().partition(":")[0] in TURN_HEADS:
+        return _turn_effect(text.strip(), chain)
     body, driver_text = _split_driver(text.strip())
     head, _, shape_text = body.partition(":")
     if head in HEADS:
@@ -205,6 +276,6 @@ def _split_driver(text: str) -> tuple[str, str]:
     return text[:at], text[at + 1 :]
 
 
-def with_time_constant(effect: ChainEffect | ArtefactEffect, seconds: float) -> ChainEffect | ArtefactEffect:
+def with_time_constant(effect: ParsedEffect, seconds: float) -> ParsedEffect:
     """Return the effect with the time constant of its warm-up fixed; its text keeps ``@warmup``."""
     return replace(effect, driver=WarmUp(seconds))

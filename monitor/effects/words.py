@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from monitor.effects.description import Description, Explanation, described
 from monitor.effects.driver import DescribedDriver
-from monitor.effects.effect import ArtefactEffect, ChainEffect
+from monitor.effects.effect import ArtefactEffect, ParsedEffect, TurnEffect
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape
 
 
-def describe(effect: ChainEffect | ArtefactEffect) -> Description:
+def describe(effect: ParsedEffect) -> Description:
     """Describe an effect in words."""
     if isinstance(effect, ArtefactEffect):
         return effect.change.described(_driver_phrase(effect))
+    if isinstance(effect, TurnEffect):
+        return effect.turn.described(_driver_phrase(effect))
     error = JointError(effect.term, effect.joint)
     explanations: list[Explanation | None] = [error.explanation()]
     phrase = f", of shape {effect.shape_text}"
@@ -28,7 +30,7 @@ def describe(effect: ChainEffect | ArtefactEffect) -> Description:
     return described(error.meaning + phrase + _driver_phrase(effect), explanation)
 
 
-def _driver_phrase(effect: ChainEffect | ArtefactEffect) -> str:
+def _driver_phrase(effect: ParsedEffect) -> str:
     if isinstance(effect.driver, DescribedDriver):
         return effect.driver.phrase
     return f", driven by {effect.driver_text}"

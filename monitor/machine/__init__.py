@@ -1,6 +1,6 @@
 """The machine as a serial chain: topology string, ISO 230-1 terms, tip-to-target vector and its Jacobian."""
 
-from monitor.machine.chain import ChainPose, evaluate
+from monitor.machine.chain import ChainPose, Orientation, evaluate, orientation
 from monitor.machine.frames import MachineFrame, frame_of, machine_frame
 from monitor.machine.gravity import gravity_in_joint_frames, torques_in_joint_frames
 from monitor.machine.inverse import refuse_untouchable, touching_positions, travel_slopes
@@ -15,12 +15,14 @@ __all__ = [
     "ChainPose",
     "Joint",
     "MachineFrame",
+    "Orientation",
     "Term",
     "chain_of_axes",
     "evaluate",
     "frame_of",
     "gravity_in_joint_frames",
     "machine_frame",
+    "orientation",
     "parse_term",
     "parse_topology",
     "refuse_untouchable",

@@ -140,3 +140,32 @@ def evaluate(
         _derivatives(work, tip_in_bed, to_work, -1.0, by_error[..., :count, :, :])
         _derivatives(tool, tip_in_bed, to_work, 1.0, by_error[..., count:, :, :])
     return ChainPose(residual, to_work @ tool.rotation, work.rotation, by_error)
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """How both sides of the chain are turned at n poses, in the bed's frame.
+
+    ``work`` and ``tool`` (..., 3, 3) turn vectors of the last work and tool axis's frame into the bed's. ``by_error``
+    (..., 3, J, 2, 6) is the turn vector of the joint's own side by every error of every joint, None unless asked for.
+    """
+
+    work: Array
+    tool: Array
+    by_error: Array | None
+
+
+def orientation(chain: Chain, positions: Array, errors: Array, *, jacobian: bool = False) -> Orientation:
+    """The orientation of both sides of a chain; arguments as in ``evaluate``."""
+    count = len(chain.work)
+    work = _multiply(chain.work, 0, positions, errors, jacobian)
+    tool = _multiply(chain.tool, count, positions, errors, jacobian)
+    by_error = None
+    if jacobian:
+        shape = np.broadcast_shapes(positions.shape[:-1], errors.shape[:-3])
+        by_error = np.zeros((*shape, 3, len(chain.joints), 2, 6))
+        for branch, first in ((work, 0), (tool, count)):
+            for index, turn in enumerate(branch.turns):
+                joint, stage = divmod(index, 2)
+                by_error[..., first + joint, stage, 3:] = turn
+    return Orientation(work.rotation, tool.rotation, by_error)

@@ -8,14 +8,16 @@ and never for a name.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
+from monitor.exceptions import DataError
 from monitor.machine import Chain
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.chain.identification import Identification, StepwiseCoefficient
+from monitor.methods.chain.gross import gross_readings
+from monitor.methods.chain.identification import Identification, StepwiseCoefficient, TakenUp
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem, Solver, solve_problem
 from monitor.methods.chain.results import AdviceOf, identification
@@ -165,6 +167,16 @@ class Method:
         return Model(self.name)
 
 
+def _suspected(problem: ChainProblem) -> str:
+    """Which readings are grossly off, as the end of a refusal; empty where none stands out."""
+    gross = gross_readings(problem)
+    rows = ", ".join(
+        f"run {reading.run}, sequence {reading.sequence} ({reading.target})" for reading in gross
+    )
+    one = "this reading" if len(gross) == 1 else "these readings"
+    return f". First look at {one}, which the others contradict: {rows}" if gross else ""
+
+
 class ProblemOf(Protocol):
     """Makes the least-squares problem of a campaign under a model.
 
@@ -184,6 +196,11 @@ def nothing_to_refuse(campaign: Campaign, problem: ChainProblem) -> None:
     """Accept every campaign that has a problem."""
 
 
+def nothing_taken_up(problem: ChainProblem) -> tuple[TakenUp, ...]:
+    """Name no error."""
+    return ()
+
+
 NO_REHEARSAL = Unable("there is no virtual machine for it")
 NO_STEPWISE = Unable("all unknowns are identified at once, so type identify without --stepwise")
 NO_TOUCH_PLAN = Unable(
@@ -199,7 +216,7 @@ class ChainMethod(Method):
     ``refuse`` raises DataError for a campaign that has too little to be identified. ``gross_times`` stated standard
     uncertainties in the residual are first of all a mistake of the file; of a run of more than ``trial_rows`` some
     poses suffice to try such a mistake (None: all rows are needed). ``taken_as_known`` counts as free of errors, so
-    that no reading speaks of them.
+    that no reading speaks of them; ``taken_up`` are the errors that no plan gives a number of their own.
     """
 
     problem_of: ProblemOf
@@ -209,6 +226,7 @@ class ChainMethod(Method):
     gross_times: float = 100.0
     trial_rows: int | None = None
     taken_as_known: tuple[str, ...] = ()
+    taken_up: Callable[[ChainProblem], tuple[TakenUp, ...]] = nothing_taken_up
     statistics: Able | Unable = Able()
     coordinates: Able | Unable = Able()
     uncertainty: Able | Unable = Able()
@@ -230,7 +248,13 @@ class ChainMethod(Method):
         model = model or self.own_model
         problem = self.problem_of(campaign, model)
         self.refuse(campaign, problem)
-        return identification(campaign, model, problem, solve(problem), self.advice)
+        try:
+            solution = solve(problem)
+        except DataError as error:
+            raise DataError(f"{error}{_suspected(problem)}") from error
+        return replace(
+            identification(campaign, model, problem, solution, self.advice), taken_up=self.taken_up(problem)
+        )
 
 
 NO_MACHINE = Unable(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
+from monitor.effects import ParsedEffect, parse_effect
 from monitor.exceptions import EffectError
 from monitor.machine import Chain, chain_of_axes, parse_topology
 from monitor.methods.chain.base_effects import base_effects
@@ -19,11 +19,11 @@ class Model:
     base: tuple[str, ...] = ()
     added: tuple[str, ...] = ()
 
-    def base_of(self, chain: Chain, outside: bool | None = None) -> tuple[ChainEffect | ArtefactEffect, ...]:
+    def base_of(self, chain: Chain, outside: bool | None = None) -> tuple[ParsedEffect, ...]:
         """The effects that are free in every run; ``outside`` as for ``base_effects``."""
         return tuple(parse_effect(text, chain) for text in (self.base or base_effects(chain, outside)))
 
-    def added_to(self, chain: Chain, outside: bool | None = None) -> tuple[ChainEffect | ArtefactEffect, ...]:
+    def added_to(self, chain: Chain, outside: bool | None = None) -> tuple[ParsedEffect, ...]:
         """The effects that all runs share; EffectError where one is in the base already or named twice."""
         effects = tuple(parse_effect(text, chain) for text in self.added)
         texts = [effect.text for effect in (*self.base_of(chain, outside), *effects)]

@@ -10,6 +10,7 @@ from monitor.readers.folder_names import names_in
 from monitor.readers.linear_axes import read_linear_axes
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, method_rules, read_campaign, readers
+from monitor.readers.sources_file import line_of_source, read_sources_file
 from monitor.readers.writer import write_campaign
 
 __all__ = [
@@ -17,10 +18,12 @@ __all__ = [
     "Plan",
     "Reader",
     "doubts",
+    "line_of_source",
     "method_rules",
     "names_in",
     "read_campaign",
     "read_linear_axes",
+    "read_sources_file",
     "readers",
     "write_campaign",
 ]

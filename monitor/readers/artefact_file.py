@@ -17,9 +17,9 @@ LARGEST_EXPANSION_PER_K = 1e-3
 LARGEST_REFERENCE_DEGC = 200.0
 
 
-def read_probe(top: Table) -> Probe | None:
+def read_probe(top: Table, *, required: bool = True) -> Probe | None:
     """Read the ``[probe]`` table."""
-    table = top.table("probe", required=True)
+    table = top.table("probe", required=required)
     if table is None:
         return None
     identity = table.text("id", required=True, example='"probe-1"')

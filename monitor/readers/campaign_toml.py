@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from monitor.readers.axes import axes_of_machine
 from monitor.readers.decimals import decimal_in
+from monitor.readers.setups_file import FORMATS, probe_of
 from monitor.records import (
     Artefact,
     Campaign,
@@ -16,7 +17,9 @@ from monitor.records import (
     Probe,
     ScaleBar,
     SelfCalibration,
+    Setup,
 )
+from monitor.sources import HALF_WIDTHS, QUANTITIES, Law, Sharing, Source
 from monitor.units import MICROMETRE, MICRORADIAN
 
 
@@ -27,8 +30,10 @@ def campaign_toml(campaign: Campaign) -> str:
         f"campaign = {_text(campaign.name)}",
         f"method = {_text(campaign.method)}",
         *_machine(campaign.machine),
-        *_probe(campaign.probe),
+        *(() if _is_derived(campaign) else _probe(campaign.probe)),
         *_artefact(campaign.artefact),
+        *_sources(campaign.sources),
+        *(line for setup in campaign.artefact.setups for line in _setup(setup)),
     ]
     return "\n".join(lines) + "\n"
 
@@ -101,6 +106,37 @@ def _artefact(artefact: Artefact) -> Iterator[str]:
     yield from _self_calibration(artefact.self_calibration)
 
 
+def _is_derived(campaign: Campaign) -> bool:
+    """Whether the probe is what the setups make of it."""
+    setups = campaign.artefact.setups
+    return bool(setups) and campaign.probe == probe_of(setups, campaign.probings)
+
+
+def _setup(setup: Setup) -> Iterator[str]:
+    form = FORMATS[setup.reading]
+    yield from ("", "[[setups]]", f"id = {_text(setup.id)}", f"reading = {_text(setup.reading)}")
+    if setup.instrument is not None:
+        yield f"instrument = {_text(setup.instrument)}"
+    if setup.standard_uncertainty is not None:
+        unit, name = (MICRORADIAN, "urad") if form.angular else (MICROMETRE, "um")
+        yield f"standard_uncertainty_{name} = {decimal_in(unit)(setup.standard_uncertainty)}"
+    yield f"tool_point_mm = {_numbers(setup.tool_point)}"
+    yield f"work_point_mm = {_numbers(setup.work_point)}"
+    if setup.direction is not None:
+        yield f"direction = {_numbers(setup.direction)}"
+    if setup.tool_direction is not None:
+        yield f"tool_direction = {_numbers(setup.tool_direction)}"
+    if setup.length is not None:
+        yield f"length_mm = {float(setup.length)!r}"
+    if setup.length_uncertainty is not None:
+        yield f"length_standard_uncertainty_um = {decimal_in(MICROMETRE)(setup.length_uncertainty)}"
+    if setup.along is not None:
+        yield f"along = {_text(setup.along)}"
+    yield from (f"{key} = {_text(getattr(setup, key))}" for key in ("side", "frame") if key in form.allows)
+    if setup.known:
+        yield f"known = [{', '.join(map(_text, setup.known))}]"
+
+
 def _scale_bar(bar: ScaleBar | None) -> Iterator[str]:
     if bar is None:
         return
@@ -144,6 +180,35 @@ def _l_shape(piece: LShape | None) -> Iterator[str]:
     for placement in piece.placements:
         yield from ("", "[[artefact.l_shape.placements]]", f"plane = {_text(placement.plane)}")
         yield f"corner_mm = {_numbers(placement.corner)}"
+
+
+def _sources(sources: tuple[Source, ...]) -> Iterator[str]:
+    for source in sources:
+        yield from (
+            "",
+            "[[sources]]",
+            f"name = {_text(source.name)}",
+            f'quantity = "{source.quantity.value}"',
+        )
+        suffixes = QUANTITIES[source.quantity].suffixes
+        suffix = next(key for key, unit in suffixes.items() if unit == source.unit)
+        stem = "half_width" if source.law in HALF_WIDTHS else "standard_uncertainty"
+        yield f"{stem}_{suffix} = {decimal_in(source.unit)(source.size)}"
+        if source.law is not Law.NORMAL:
+            yield f'distribution = "{source.law.value}"'
+        if source.degrees_of_freedom is not None:
+            yield f"degrees_of_freedom = {float(source.degrees_of_freedom)!r}"
+        if source.shared_by is not Sharing.ALL_RUNS:
+            yield f'shared_by = "{source.shared_by.value}"'
+        for key, text in (("axis", source.axis), ("along", source.along), ("effect", source.effect)):
+            if text is not None:
+                yield f"{key} = {_text(text)}"
+        if source.expansion_coefficient is not None:
+            yield f"expansion_coefficient_per_K = {float(source.expansion_coefficient)!r}"
+        if source.temperature_offset is not None:
+            yield f"temperature_offset_K = {float(source.temperature_offset)!r}"
+        if source.node_spacing is not None:
+            yield f"node_spacing_mm = {_numbers(source.node_spacing)}"
 
 
 def _numbers(values: tuple[float, ...]) -> str:

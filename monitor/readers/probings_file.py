@@ -20,6 +20,8 @@ from monitor.records import Probings
 
 FILE = "probings.csv"
 FIRST = ("run", "sequence", "time_s", "target")
+#: The column that names a row's setup, and the channel that holds its number, from 1 in the order of campaign.toml.
+SETUP = "setup"
 # A column of readings: the axis' name in small letters, and mm or degrees.
 READING = re.compile(r"[a-z][0-9]*_(mm|deg)")
 
@@ -37,7 +39,8 @@ class ProbingsPart:
 class Expected:
     """What the other files of the folder ask of the probings; None where it could not be read, or is free.
 
-    ``strokes`` are in the units of the file; ``runs`` has the line of every run that is listed.
+    ``strokes`` are in the units of the file; ``runs`` has the line of every run that is listed; ``setups`` names those
+    of a method whose rows belong to setups: a row then need not name a target.
     """
 
     axes: Sequence[Axis] | None
@@ -45,11 +48,20 @@ class Expected:
     targets: Sequence[str] | None
     runs: Mapping[int, int] | None
     rules: MethodRules | None
+    setups: Sequence[str] | None = None
 
     @property
     def allowed(self) -> MethodRules:
         """The rules of the method, those that hold for all where it could not be read."""
         return MethodRules("") if self.rules is None else self.rules
+
+    @property
+    def first(self) -> tuple[str, ...]:
+        """The columns that every row needs before its readings; with one setup none has to name it."""
+        if not self.allowed.needs_setups:
+            return FIRST
+        several = self.setups is not None and len(self.setups) > 1
+        return (*FIRST[:-1], *((SETUP,) if several else ()))
 
     @property
     def columns(self) -> dict[str, Axis]:
@@ -62,36 +74,62 @@ def read_probings(table: CsvTable, expected: Expected, faults: Faults) -> Probin
 
     What does not depend on the missing column is checked all the same.
     """
-    required = (*FIRST, *expected.columns, *expected.allowed.measured_columns)
+    required = (*expected.first, *expected.columns, *expected.allowed.measured_columns)
     refuse_missing(table, required, faults)
-    readings, channels = _cells(table, required, expected, faults)
+    taken = (*required, "target", SETUP) if expected.allowed.needs_setups else required
+    readings, channels = _cells(table, taken, expected, faults)
     time = numbers(table, "time_s", faults) if "time_s" in table.columns else None
     sequence = wholes(table, "sequence", faults) if "sequence" in table.columns else None
     known_target = _known_targets(table, expected.targets, faults)
+    setup, target = _setups(table, expected, faults)
     if "run" not in table.columns:
         return None
     run = wholes(table, "run", faults)
     known_run = run.good & _known_runs(table, run, expected.runs, faults)
     in_order = run.good if time is None else refuse_disorder(table, run, sequence, time, faults)
-    complete = expected.axes is not None and all(name in table.columns for name in required)
+    read = not expected.allowed.needs_setups or expected.setups is not None
+    complete = read and expected.axes is not None and all(name in table.columns for name in required)
     if not complete or time is None or sequence is None:
         return None
     columns: list[Numbers | Wholes] = [*readings.values(), *channels.values(), time, sequence]
     good: Mask = np.logical_and.reduce(
-        [*(column.good for column in columns), known_target, known_run, in_order]
+        [*(column.good for column in columns), known_target, known_run, in_order, setup != 0.0]
     )
     probings = Probings(
         run.values,
         sequence.values,
         time.values,
-        np.array(table.columns["target"], dtype=np.str_),
+        np.array(target, dtype=np.str_),
         {axis.name: readings[name].values * axis.unit.factor for name, axis in expected.columns.items()},
-        {name: channel.values for name, channel in channels.items()},
+        {
+            **({SETUP: setup} if expected.allowed.needs_setups else {}),
+            **{name: channel.values for name, channel in channels.items()},
+        },
     )
     damaged = _damaged_runs(table, run.values, known_run, good)
     if not good.all():
         probings = probings.rows(good)
     return ProbingsPart(probings, np.array(table.lines, dtype=np.int64)[good], frozenset(damaged))
+
+
+def _setups(
+    table: CsvTable, expected: Expected, faults: Faults
+) -> tuple[npt.NDArray[np.float64], Sequence[str]]:
+    """Return the number of each row's setup (n,), 0 where there is none of its name, and the targets of the rows.
+
+    A row that names no target is a reading of its setup; methods without setups have one that nobody names.
+    """
+    targets = table.columns.get("target", ())
+    if not expected.allowed.needs_setups or expected.setups is None:
+        return np.ones(len(table)), targets
+    names = list(expected.setups)
+    cells = table.columns.get(SETUP, names[:1] * len(table))
+    number = np.array([names.index(cell) + 1.0 if cell in names else 0.0 for cell in cells])
+    for cell in dict.fromkeys(cell for cell in cells if cell not in names):
+        lines = [line for line, other in zip(table.lines, cells, strict=True) if other == cell]
+        message = f"there is no setup {quoted(cell)}; the setups are {one_of(names)}"
+        faults.add(FILE, lines[0], SETUP, message + _and_more(lines))
+    return number, targets or cells
 
 
 def _cells(

@@ -34,13 +34,16 @@ class RunsPart:
     lines: dict[int, int]
 
 
-def read_runs(table: CsvTable, faults: Faults) -> RunsPart | None:
-    """Read the runs; None where the column of their numbers is missing."""
+def read_runs(table: CsvTable, faults: Faults, *, ambient: bool = True) -> RunsPart | None:
+    """Read the runs; None where the column of their numbers is missing. ``ambient`` is whether each must have the
+    ambient temperature."""
     required = (*PLAN, AMBIENT)
     refuse_missing(table, required, faults)
     names = [AMBIENT] if AMBIENT in table.columns else []
     names += recorded_columns(table, required, faults)
-    conditions = {name: numbers(table, name, faults, may_be_empty=name != AMBIENT) for name in names}
+    conditions = {
+        name: numbers(table, name, faults, may_be_empty=name != AMBIENT or not ambient) for name in names
+    }
     day = wholes(table, "day", faults) if "day" in table.columns else None
     warm_up = _truths(table, faults) if "warm_up" in table.columns else None
     started = _moments(table, faults) if "started_at" in table.columns else None

@@ -15,6 +15,7 @@ from monitor.exceptions import CampaignError, InputError
 from monitor.readers.axes import axes_of, axes_of_machine
 from monitor.readers.campaign_toml import campaign_toml
 from monitor.readers.decimals import decimal_in
+from monitor.readers.probings_file import SETUP
 from monitor.readers.registry import read_campaign
 from monitor.records import Campaign
 
@@ -96,17 +97,21 @@ def _probings(campaign: Campaign) -> Iterable[list[str]]:
     if missing:
         raise InputError(f"the probings hold no readings of axis {', '.join(missing)}")
     in_order = sorted(axes, key=lambda axis: (("linear", "rotary", "spindle").index(axis.kind), axis.name))
-    yield [*FIRST_OF_PROBINGS, *(axis.column for axis in in_order), *probings.channels]
+    setups = campaign.artefact.setups
+    channels = {name: values for name, values in probings.channels.items() if not setups or name != SETUP}
+    first = (*FIRST_OF_PROBINGS[:3], SETUP, FIRST_OF_PROBINGS[3]) if setups else FIRST_OF_PROBINGS
+    yield [*first, *(axis.column for axis in in_order), *channels]
     columns = [
         map(str, probings.run.tolist()),
         map(str, probings.sequence.tolist()),
         map(_number, probings.time.tolist()),
+        *([[setups[int(number) - 1].id for number in probings.channels[SETUP]]] if setups else []),
         probings.target.tolist(),
     ]
     for axis in in_order:
         write = cache(decimal_in(axis.unit))
         columns.append(map(write, probings.readings[axis.name].tolist()))
-    columns += [map(_number, values.tolist()) for values in probings.channels.values()]
+    columns += [map(_number, values.tolist()) for values in channels.values()]
     yield from (list(row) for row in zip(*columns, strict=True))
 
 

@@ -12,6 +12,7 @@ from monitor.statistics.control import (
     ControlChart,
     CusumChart,
     Reference,
+    correlated_reference,
     cusum_chart,
     ewma_chart,
     individuals_chart,
@@ -31,12 +32,20 @@ from monitor.statistics.joint_forecast import (
     residual_correlation,
 )
 from monitor.statistics.longest_vector import ErrorVectors, longest, may_be_longest
-from monitor.statistics.means import AnalysisOfVariance, GroupTest, anova, kruskal_wallis, welch_anova
+from monitor.statistics.means import (
+    AnalysisOfVariance,
+    GroupTest,
+    anova,
+    brown_forsythe,
+    kruskal_wallis,
+    robust_p_value,
+    welch_anova,
+)
 from monitor.statistics.monotone import MonotoneTrend, mann_kendall
 from monitor.statistics.multivariate import VectorTest, box_m, manova
 from monitor.statistics.normality import Normality, normality
 from monitor.statistics.pooling import Covariance, Pooling, pool
-from monitor.statistics.trend import Trend, trend
+from monitor.statistics.trend import Resemblance, Trend, trend
 from monitor.statistics.variances import bartlett, levene
 from monitor.statistics.vector_control import VectorChart, mewma_chart, mewma_limit, t_squared_chart
 from monitor.statistics.warmup import WarmUp, warm_up
@@ -68,6 +77,7 @@ __all__ = [
     "Normality",
     "Pooling",
     "Reference",
+    "Resemblance",
     "Selection",
     "Trend",
     "VarianceComponents",
@@ -79,7 +89,9 @@ __all__ = [
     "backtest_longest",
     "bartlett",
     "box_m",
+    "brown_forsythe",
     "control_false_discoveries",
+    "correlated_reference",
     "cusum_chart",
     "dependence",
     "ewma_chart",
@@ -105,6 +117,7 @@ __all__ = [
     "predict",
     "reference_period",
     "residual_correlation",
+    "robust_p_value",
     "select_runs",
     "t_squared_chart",
     "trend",

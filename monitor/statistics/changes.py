@@ -19,7 +19,7 @@ from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
 from monitor.statistics.day_evidence import shows_wide_days
 from monitor.statistics.scan import Scan, Scanner
-from monitor.statistics.scan_candidates import EDGE, Base, Kind
+from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
 from monitor.statistics.sums import label_groups
 
 
@@ -63,6 +63,7 @@ class _Series:
     t: Array
     u: Array | None
     day: npt.NDArray[np.intp] | None
+    cycle: float | None = None
 
     @property
     def searched(self) -> bool:
@@ -72,7 +73,7 @@ class _Series:
     def part(self, start: int, stop: int) -> _Series:
         part_u = None if self.u is None else self.u[start:stop]
         day = None if self.day is None else np.unique(self.day[start:stop], return_inverse=True)[1]
-        return _Series(self.name, self.y[start:stop], self.t[start:stop], part_u, _repeated(day))
+        return _Series(self.name, self.y[start:stop], self.t[start:stop], part_u, _repeated(day), self.cycle)
 
 
 def _repeated(day: npt.NDArray[np.intp] | None) -> npt.NDArray[np.intp] | None:
@@ -99,6 +100,7 @@ def _size(series: _Series, best: Scan, base: Base) -> tuple[float, float]:
     """Generalised least squares: size of the change and its standard uncertainty, place and correlation as known."""
     t = series.t
     columns = [np.ones_like(t)] if base == "constant" else [np.ones_like(t), t - t.mean()]
+    columns += list(wave_columns(t, series.cycle).T)
     after = (np.arange(len(t)) >= best.at).astype(np.float64)
     if best.kind == "step":
         columns.append(after)
@@ -138,6 +140,14 @@ def _change(series: _Series, best: Scan, base: Base, offset: int) -> Change:
     )
 
 
+#: From so many days on days may differ by up to four times the scatter of a run, unless a series itself refutes that: a
+#: step of eight is then seen in every history. With fewer only where other parameters show such days
+#: (``day_evidence``):
+#: of five days a step of eight would else be seen in a third of histories, now in all; the price are false alarms of a
+#: parameter that alone has such days (docs/trials-statistics.md).
+DAYS_THAT_SHOW = 8
+
+
 class _Search:
     """One search that reuses its scanners: parameters with the same plan share the preparation."""
 
@@ -150,7 +160,7 @@ class _Search:
         plan = (series.t, series.u, series.day)
         key = (base, *(None if column is None else column.tobytes() for column in plan))
         if key not in self._kept:
-            self._kept[key] = Scanner(series.t, series.u, base, series.day)
+            self._kept[key] = Scanner(series.t, series.u, base, series.day, series.cycle)
         return self._kept[key]
 
     def look(self, every: Sequence[_Series]) -> None:
@@ -176,7 +186,8 @@ class _Search:
         return {name for name, shown in zip(support, wide, strict=True) if shown}
 
     def scan(self, series: _Series, base: Base, level: float) -> Scan:
-        wide = series.name in self.wide
+        many = series.day is not None and int(series.day.max()) + 1 >= DAYS_THAT_SHOW
+        wide = many or series.name in self.wide
         return self.scanner(series, base).scan(series.y, self.rng, self.trials, level, wide)
 
     def pieces(self, parts: Sequence[tuple[_Series, int]], level: float) -> tuple[list[Change], list[Change]]:
@@ -232,6 +243,7 @@ def find_changes(
     u: Mapping[str, npt.ArrayLike] | None = None,
     days: npt.ArrayLike | None = None,
     events: Sequence[float] = (),
+    cycle: float | None = None,
     false_alarm: float = 0.05,
     trials: int = 1999,
 ) -> History:
@@ -239,10 +251,12 @@ def find_changes(
 
     ``events`` are times of recorded changes (crash, repair, compensation): the history is split there, and the
     change at an event is no finding. ``u`` (name to (n,)) weighs the runs; ``days`` (n,) are labels whose runs
-    may share a component. ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
+    may share a component; ``cycle`` is the period of a wave (the year) that is no change where a piece covers it.
+    ``false_alarm`` is shared equally among parameters and pieces (Bonferroni), so it
     holds for whatever dependence among them; inside a piece every detected step splits it again at the
-    same level. It holds for runs whose neighbours correlate by up to 0.7 and for day components up to the
-    scatter of a run, up to four times of it where several parameters show such: whatever of these a series
+    same level. It holds for runs whose neighbours correlate by up to 0.8 and for day components up to four
+    times the scatter of a run; with fewer than eight days up to once, or where several parameters show such: whatever
+    of these a series
     does not refute is allowed for (see ``scan`` and ``day_evidence``), so for independent runs the rate is
     below it. Measured rates and power: docs/trials-statistics.md. Pieces of fewer than 6 runs are not
     searched. Raises ``DataError`` for times that fall, unknown names in ``u``, trials that cannot reach the
@@ -267,7 +281,7 @@ def find_changes(
     for name, recorded in values.items():
         y = as_vector(recorded, name, length=len(t))
         run_u = as_positive((u or {})[name], f"u of {name}", length=len(t)) if name in (u or {}) else None
-        series = _Series(name, y, t, run_u, _repeated(day))
+        series = _Series(name, y, t, run_u, _repeated(day), cycle)
         parts += [(series.part(start, stop), start) for start, stop in pieces]
     changes, trends = _Search(rng, trials).pieces(parts, level)
     order = {name: i for i, name in enumerate(values)}

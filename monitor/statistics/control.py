@@ -18,6 +18,7 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_vector
+from monitor.statistics.monotone import lag_one
 from monitor.statistics.run_length import cusum_run_length, ewma_run_length, limit_for, run_length
 
 #: Run length of the three-sigma chart with known parameters, 1 / (2 (1 - Phi(3))).
@@ -26,14 +27,69 @@ THREE_SIGMA = 370.398
 D2 = 2.0 / float(np.sqrt(np.pi))
 
 
+#: Added to the estimated correlation of neighbouring points, times the root of their number: a reference period of 8
+#: to 30
+#: points says little of it (measured rates: docs/trials-statistics.md). Beyond the highest one no level is claimed.
+MARGIN, HIGHEST = 0.6, 0.9
+#: Fewest points that a reference period of points that resemble each other counts for.
+FEWEST_EFFECTIVE = 5
+
+
 @dataclass(frozen=True)
 class Reference:
-    """Centre and scatter of a chart, in the unit of the values, from ``n`` runs (infinite: known)."""
+    """Centre and scatter of a chart, in the unit of the values, from ``n`` runs (infinite: known).
+
+    ``correlation`` of neighbouring points is allowed for: in ``n`` and ``dof``, which are those of as many independent
+    points, in ``sd``, and in the limits of the charts that sum over points.
+    """
 
     centre: float
     sd: float
     n: float
     dof: float
+    correlation: float = 0.0
+
+    def sd_of_weighted(self, lam: float) -> float:
+        """Scatter that gives an EWMA of weight ``lam`` the variance it has with this correlation.
+
+        Source: W. Schmid, Statistics & Probability Letters 31 (1997) 165, for the first-order process.
+        """
+        slow = self.correlation * (1.0 - lam)
+        return self.sd * float(np.sqrt((1.0 + slow) / (1.0 - slow)))
+
+    @property
+    def sd_of_sums(self) -> float:
+        """Scatter that gives sums over many points the variance they have with this correlation (R. A. Johnson and
+        M. Bagshaw, Technometrics 16 (1974) 103)."""
+        return self.sd * float(np.sqrt((1.0 + self.correlation) / (1.0 - self.correlation)))
+
+
+def allowed_correlation(values: Array) -> float:
+    """Correlation of neighbouring points of each column (n, p) or (n,), averaged, with a margin for what it may be
+    off."""
+    columns = values[:, np.newaxis] if values.ndim == 1 else values
+    estimates = [lag_one(column, fitted=1) for column in columns.T]
+    return float(np.clip(np.mean(estimates) + MARGIN / np.sqrt(len(columns)), 0.0, HIGHEST))
+
+
+def effective_points(n: int, correlation: float) -> float:
+    """Number of independent points whose mean is known as well as that of ``n`` with a correlation of neighbours."""
+    lags = np.arange(1, n)
+    return n / (1.0 + 2.0 * float(((1.0 - lags / n) * correlation**lags).sum()))
+
+
+def correlated_reference(values: npt.ArrayLike) -> Reference:
+    """Centre and scatter of a reference period (n,), at least 5 points, that may resemble their neighbours."""
+    plain = reference_period(values)
+    y = np.asarray(values, dtype=np.float64)
+    correlation, n = allowed_correlation(y), len(y)
+    effective = effective_points(n, correlation)
+    # The scatter about a mean that follows the points is too small.
+    sd = plain.sd / float(np.sqrt(max((1.0 - 1.0 / effective) * n / (n - 1.0), 0.25)))
+    square = correlation**2
+    dof = (n - 1.0) * (1.0 - square) / (1.0 + square)
+    points = float(np.clip(np.floor(min(effective, dof + 1.0)), FEWEST_EFFECTIVE, n))
+    return Reference(plain.centre, sd, points, points - 1.0, correlation)
 
 
 @dataclass(frozen=True)
@@ -152,7 +208,7 @@ def ewma_chart(
     for i, value in enumerate(y):
         last += lam * (value - last)
         path[i] = last
-    half = np.full(len(y), limit * reference.sd * np.sqrt(lam / (2.0 - lam)))
+    half = np.full(len(y), limit * reference.sd_of_weighted(lam) * np.sqrt(lam / (2.0 - lam)))
     alarms = np.flatnonzero(np.abs(path - reference.centre) > half)
     lower, upper = reference.centre - half, reference.centre + half
     return ControlChart("EWMA", reference, path, lower, upper, limit, arl, alarms)
@@ -183,11 +239,11 @@ def cusum_chart(
         arl = run_length(chart, h, reference.n, reference.dof)
     high, low = np.empty(len(y)), np.empty(len(y))
     up = down = 0.0
-    slack = k * reference.sd
+    slack = k * reference.sd_of_sums
     for i, deviation in enumerate(y - reference.centre):
         up, down = max(0.0, up + deviation - slack), max(0.0, down - deviation - slack)
         high[i], low[i] = up, down
-    limit = h * reference.sd
+    limit = h * reference.sd_of_sums
     alarms = np.flatnonzero((high > limit) | (low > limit))
     started = None
     if alarms.size:

@@ -1,6 +1,7 @@
 """Are the groups (days) of a campaign alike, quantity by quantity? Every test at once, for all columns.
 
-Equal variances: Bartlett and Brown-Forsythe. Equal means: one-way ANOVA, Welch's ANOVA, Kruskal-Wallis.
+Equal variances: Bartlett and Brown-Forsythe. Equal means: one-way ANOVA, Welch's ANOVA, Brown and Forsythe's F*,
+Kruskal-Wallis. What is called over all columns rests on the tests that hold their rate whatever the scatter.
 The histogram of p-values over all probed coordinates is flat where the days are alike and piles up at zero
 where they are not.
 """
@@ -21,7 +22,9 @@ from monitor.statistics.means import (
     AnalysisOfVariance,
     GroupTest,
     anova_from_sums,
+    brown_forsythe_from_sums,
     kruskal_wallis,
+    robust_p_value,
     welch_from_sums,
 )
 from monitor.statistics.sums import grouped_sums
@@ -30,8 +33,10 @@ from monitor.statistics.variances import bartlett_from_sums, levene
 
 @dataclass(frozen=True)
 class Homogeneity:
-    """Five tests of each of p columns; ``bartlett``, ``levene`` and ``welch`` need two runs in each group
-    and are None where a group has one. ``anova_discoveries`` holds the q-values over the columns."""
+    """Six tests of each of p columns; ``bartlett``, ``levene``, ``welch`` and ``brown_forsythe`` (of means) need two
+    runs
+    in each group and are None where a group has one. ``mean_discoveries`` holds the q-values of equal means over the
+    columns, from ``robust_p_value``."""
 
     names: tuple[str, ...]
     labels: tuple[str, ...]
@@ -41,7 +46,8 @@ class Homogeneity:
     bartlett: GroupTest | None
     levene: GroupTest | None
     welch: GroupTest | None
-    anova_discoveries: FalseDiscoveries
+    brown_forsythe: GroupTest | None
+    mean_discoveries: FalseDiscoveries
     bartlett_discoveries: FalseDiscoveries | None
 
 
@@ -76,7 +82,8 @@ def homogeneity(
         bartlett=of_variances,
         levene=levene(values, groups) if repeated else None,
         welch=welch_from_sums(sums) if repeated else None,
-        anova_discoveries=control_false_discoveries(analysis.p_value, rate=rate),
+        brown_forsythe=brown_forsythe_from_sums(sums) if repeated else None,
+        mean_discoveries=control_false_discoveries(robust_p_value(values, groups), rate=rate),
         bartlett_discoveries=control_false_discoveries(of_variances.p_value, rate=rate)
         if of_variances
         else None,

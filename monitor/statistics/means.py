@@ -1,7 +1,10 @@
 """Are the means of the groups equal? One-way ANOVA, Welch's ANOVA, Kruskal-Wallis; all columns at once.
 
-ANOVA is the sharpest when the groups scatter alike; Welch's does not ask for that (but needs two runs in
-each group); Kruskal-Wallis asks for no normal distribution, and loses little.
+ANOVA is the sharpest when the groups scatter alike; Welch's and Brown and Forsythe's do not ask for that (but need two
+runs in a group); Kruskal-Wallis asks for no normal distribution, and loses little. Of many groups of two to four runs
+Welch's alone raises false alarms (of ten days of three runs in 14 % instead of 5 %), of one group that scatters four
+times as much Brown and Forsythe's (in up to 8 %, and at 0.5 % in 2 %), never both at once: where a call must hold its
+rate whatever the scatter, take ``robust_p_value``, the larger of the two (docs/trials-statistics.md).
 """
 
 from __future__ import annotations
@@ -13,7 +16,8 @@ import numpy.typing as npt
 import scipy
 
 from monitor.records import Array
-from monitor.statistics.sums import GroupedSums, grouped_sums
+from monitor.statistics.checks import as_matrix
+from monitor.statistics.sums import GroupedSums, grouped_sums, label_groups
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,91 @@ def welch_from_sums(sums: GroupedSums) -> GroupTest:
         f = numerator / (1.0 + 2.0 * (k - 2) / (k**2 - 1) * spread)
         dof2 = divide(np.full_like(spread, k**2 - 1.0), 3.0 * spread)
     return GroupTest("Welch ANOVA", sums.labels, f, k - 1, dof2, np.asarray(scipy.stats.f.sf(f, k - 1, dof2)))
+
+
+@dataclass(frozen=True)
+class VarianceMoments:
+    """Sums over k groups of two runs and more for p columns: what Brown and Forsythe's test needs; all broadcast.
+
+    ``groups`` and ``runs`` count them, ``between`` is the sum of squares between. Of the variances s² of groups of n
+    runs: ``first`` = sum s², ``first_runs`` = sum n s², ``second`` = sum s⁴, ``second_runs`` = sum n s⁴, and
+    ``by_dof`` =
+    sum (1, n, n²) s⁴ / (n - 1).
+    """
+
+    groups: Array
+    runs: Array
+    between: Array
+    first: Array
+    first_runs: Array
+    second: Array
+    second_runs: Array
+    by_dof: tuple[Array, Array, Array]
+
+
+def brown_forsythe_from_moments(moments: VarianceMoments) -> tuple[Array, Array, Array, Array]:
+    """F* of Brown and Forsythe, its two degrees of freedom and p-value; NaN for fewer than two groups.
+
+    Source: M. B. Brown and A. B. Forsythe, Technometrics 16 (1974) 129; the degrees of freedom of the numerator by
+    D. V. Mehrotra, Commun. Stat. Simul. Comput. 26 (1997) 1139.
+    """
+    n = moments.runs
+    share, level = divide(moments.first_runs, n), moments.first
+    expected = level - share
+    with np.errstate(invalid="ignore"):
+        between = moments.second + share**2 - 2.0 * divide(moments.second_runs, n)
+        plain, once, twice = moments.by_dof
+        within = plain - 2.0 * divide(once, n) + divide(twice, n**2)
+        enough = (moments.groups >= 2.0) & (expected > 0.0)
+    dof1, dof2 = (np.where(enough, divide(expected**2, part), np.nan) for part in (between, within))
+    f = np.where(enough, divide(moments.between, expected), np.nan)
+    return f, dof1, dof2, np.asarray(scipy.stats.f.sf(f, dof1, dof2))
+
+
+def brown_forsythe_from_sums(sums: GroupedSums) -> GroupTest:
+    """Brown and Forsythe's test of sums that were made before (two runs in each group)."""
+    n = sums.counts[:, np.newaxis].astype(np.float64)
+    s2 = sums.ss_by_group / (n - 1.0)
+    s4 = s2 * s2
+    moments = VarianceMoments(
+        groups=np.array(float(sums.k)),
+        runs=np.array(float(sums.n)),
+        between=sums.ss_between,
+        first=s2.sum(axis=0),
+        first_runs=(n * s2).sum(axis=0),
+        second=s4.sum(axis=0),
+        second_runs=(n * s4).sum(axis=0),
+        by_dof=((s4 / (n - 1.0)).sum(axis=0), (n * s4 / (n - 1.0)).sum(axis=0), (n * n * s4 / (n - 1.0)).sum(axis=0)),
+    )  # fmt: skip
+    f, _, dof2, p_value = brown_forsythe_from_moments(moments)
+    return GroupTest("Brown-Forsythe F*", sums.labels, f, sums.k - 1, dof2, p_value)
+
+
+def brown_forsythe(values: npt.ArrayLike, groups: npt.ArrayLike) -> GroupTest:
+    """Brown and Forsythe's F* for equal means of ``values`` (n, p), any unit, by ``groups`` (n,) of whatever scatter.
+
+    At least two runs in each group or ``DataError``. Not their test of equal variances (``levene``). Measured false
+    alarms at 5 % with 3 to 20 groups of 2 to 12 runs: 0.5 to 4 % where all scatter alike, up to 8 % with one that
+    scatters four times as much (docs/trials-statistics.md).
+    """
+    return brown_forsythe_from_sums(grouped_sums(values, groups, least_runs=2))
+
+
+def robust_p_value(values: npt.ArrayLike, groups: npt.ArrayLike) -> Array:
+    """p-values (p,) of equal means that hold their level whatever the scatter of the groups: of two tests the larger.
+
+    Welch's and Brown and Forsythe's, of the groups with two runs or more; NaN where there are fewer than two. Measured
+    false alarms at 5 %: 0.3 to 4 %, at 0.5 %: below 0.8 %, with 3 to 20 groups of 2 to 12 runs, one of which or all of
+    which scatter differently, normal or with heavy tails (docs/trials-statistics.md).
+    """
+    matrix = as_matrix(values, "values")
+    labels, index = label_groups(groups, len(matrix))
+    repeated = np.bincount(index, minlength=len(labels)) > 1
+    if repeated.sum() < 2:
+        return np.full(matrix.shape[1], np.nan)
+    rows = repeated[index]
+    sums = grouped_sums(matrix[rows], index[rows])
+    return np.asarray(np.fmax(welch_from_sums(sums).p_value, brown_forsythe_from_sums(sums).p_value))
 
 
 def anova(values: npt.ArrayLike, groups: npt.ArrayLike) -> AnalysisOfVariance:

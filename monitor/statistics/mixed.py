@@ -28,7 +28,9 @@ class MixedFit:
     """Coefficients (q,), their covariance (q, q) and effective degrees of freedom (q,).
 
     ``within`` is the factor s on the uncertainties of the runs, ``between`` the standard deviation t of the
-    days in the unit of the values; ``residual`` (n,) is value less fitted line.
+    days in the unit of the values; ``repeated``: a day has several runs, so that the two are told apart. ``weight``
+    (d,)
+    are the weights of the days with it, in an arbitrary unit; ``residual`` (n,) is value less fitted line.
     """
 
     coefficients: Array
@@ -37,6 +39,8 @@ class MixedFit:
     within: float
     between: float
     truncated: bool
+    repeated: bool
+    weight: Array
     residual: Array
 
     @property
@@ -147,6 +151,8 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
         within=float(np.sqrt(unit if repeated else factor)),
         between=float(np.sqrt(variance * unit)),
         truncated=truncated,
+        repeated=repeated,
+        weight=np.asarray(total / (1.0 + variance * total)),
         residual=y - design @ coefficients,
     )
 

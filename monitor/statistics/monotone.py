@@ -72,13 +72,17 @@ def _places(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
 
 
 def theil_sen(
-    values: Array, times: Array, level: float, pair_slopes: tuple[Array, Array] | None = None
+    values: Array,
+    times: Array,
+    level: float,
+    pair_slopes: tuple[Array, Array] | None = None,
+    inflation: float = 1.0,
 ) -> tuple[float, tuple[float, float]]:
     """Median slope of all pairs of ``values`` (n,) over ``times`` (n,), which must not fall, and its interval.
 
     Source: P. K. Sen, J. Am. Stat. Assoc. 63 (1968) 1379, Eq. (2.6) with its variance for ties; the numbers are those
     of ``scipy.stats.theilslopes``, of which only the ranks that are asked for are sorted out. ``pair_slopes``: the
-    ``pairs``, where they were computed before.
+    ``pairs``, where they were computed before; ``inflation``: of the variance of Mann-Kendall's S by autocorrelation.
     """
     n = len(values)
     slopes = (pair_slopes or pairs(values, times))[1]
@@ -87,7 +91,7 @@ def theil_sen(
     for column in (values, times):
         k = np.unique(column, return_counts=True)[1].astype(np.float64)
         variance -= float((k * (k - 1) * (2 * k + 5)).sum()) / 18.0
-    half = float(scipy.special.ndtri(0.5 * (1.0 + level)) * np.sqrt(max(variance, 0.0)))
+    half = float(scipy.special.ndtri(0.5 * (1.0 + level)) * np.sqrt(max(variance * inflation, 0.0)))
     low, high = max(round((many - half) / 2.0) - 1, 0), min(round((many + half) / 2.0), many - 1)
     middle = ((many - 1) // 2, many // 2)
     slopes = np.partition(slopes, sorted({low, high, *middle}))

@@ -18,13 +18,13 @@ import numpy.typing as npt
 from scipy import special
 
 from monitor.records import Array
-from monitor.statistics.scan_candidates import EDGE, Base, Kind, candidates
+from monitor.statistics.scan_candidates import EDGE, Base, Kind, candidates, wave_columns
 from monitor.statistics.serial import DayComponent, FirstOrder, Shape
 
 #: Correlations of neighbours of which the likelihood is computed.
 GRID = np.arange(0.0, 0.91, 0.1)
 #: Beyond this correlation no level is claimed: some dozens of such runs have no constant mean to change from.
-HIGHEST = 0.7
+HIGHEST = 0.8
 #: Day components of which the likelihood is computed, in standard deviations of a run; and those that are allowed for
 #: where other parameters show such (``day_evidence``): four days of which the last differs would else say nothing,
 #: however much it differs.
@@ -88,18 +88,26 @@ class _Sums(NamedTuple):
 class Scanner:
     """Everything of the search that does not depend on the values: prepared once for one plan.
 
-    ``days`` (n,) are indices of the runs' days, None where no day has two runs.
+    ``days`` (n,) are indices of the runs' days, None where no day has two runs; ``cycle`` is the period of a wave that
+    is
+    no change, where the history covers it (``wave_columns``).
     """
 
     def __init__(
-        self, times: Array, u: Array | None, base: Base, days: npt.NDArray[np.intp] | None = None
+        self,
+        times: Array,
+        u: Array | None,
+        base: Base,
+        days: npt.NDArray[np.intp] | None = None,
+        cycle: float | None = None,
     ) -> None:
         self.columns, self.kinds, self.positions = candidates(times, base)
         n = len(times)
         root = np.ones(n) if u is None else 1.0 / u
         self.root = root / np.sqrt(np.mean(root**2))
         line = (times - times.mean()) / max(float(np.ptp(times)), 1e-300)
-        basis = np.column_stack([np.ones(n), line] if base == "line" else [np.ones(n)])
+        columns = [np.ones(n), line] if base == "line" else [np.ones(n)]
+        basis = np.column_stack([*columns, wave_columns(times, cycle)])
         self.plain = np.linalg.qr(self.root[:, np.newaxis] * basis)[0]
         self.free = n - basis.shape[1]
         self.at = np.arange(EDGE, n - EDGE + 1)

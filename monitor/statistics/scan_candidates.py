@@ -18,6 +18,18 @@ DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
 EDGE = 2
 
 
+#: A wave is no change where the history covers this share of its period, with so many runs.
+COVERED, FEWEST_OF_WAVE = 0.82, 12
+
+
+def wave_columns(times: Array, cycle: float | None) -> Array:
+    """Cosine and sine (n, 2) of a wave of the period ``cycle``; none (n, 0) where the history does not cover it."""
+    if cycle is None or len(times) < FEWEST_OF_WAVE or float(np.ptp(times)) < COVERED * cycle:
+        return np.empty((len(times), 0))
+    phase = 2.0 * np.pi / cycle * (times - times.mean())
+    return np.column_stack([np.cos(phase), np.sin(phase)])
+
+
 def candidates(times: Array, base: Base) -> tuple[Array, tuple[Kind, ...], npt.NDArray[np.int64]]:
     """Columns (n, c) of all candidates: on a constant the line, decays from the start
     and steps; on a line steps and bends."""

@@ -13,6 +13,7 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.statistics.block_lines import Blocks, block_lines
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,15 @@ class CellTests:
 
 @dataclass(frozen=True)
 class CellDrift:
-    """Straight line of the group means over time, unweighted: ``slope`` per unit of t, ``u``, ``p_value`` (c,)."""
+    """Straight line of the group means over time, unweighted: ``slope`` per unit of t, ``u``, ``p_value`` (c,).
+
+    ``widening`` (c,) is how much wider ``u`` is than with independent groups; NaN where they were taken as such.
+    """
 
     slope: Array
     u: Array
     p_value: Array
+    widening: Array
 
 
 def _quotient(numerator: Array, denominator: Array) -> Array:
@@ -140,4 +145,18 @@ def drift_from_sums(
     slope = _quotient(stm, np.where(enough, stt, np.nan))
     dof = np.where(enough, k - 2.0, 1.0)
     u = np.sqrt(_quotient(np.maximum(smm - slope * stm, 0.0) / dof, np.where(enough, stt, np.nan)))
-    return CellDrift(slope, u, np.asarray(2.0 * scipy.stats.t.sf(np.abs(_quotient(slope, u)), dof)))
+    p_value = np.asarray(2.0 * scipy.stats.t.sf(np.abs(_quotient(slope, u)), dof))
+    return CellDrift(slope, u, p_value, np.full(count, np.nan))
+
+
+def drift_in_blocks(drift: CellDrift, blocks: Blocks, *, cycle: float | None = None) -> CellDrift:
+    """The drift of every cell with the resemblance of its groups allowed for, as ``trend`` does.
+
+    The slope is that of all groups, or, where a ``cycle`` is fitted beside it, that of the blocks; its uncertainty is
+    that of the blocks. NaN where they are too few.
+    """
+    lines = block_lines(blocks, cycle=cycle)
+    slope = np.where(lines.cyclic, lines.slope, np.where(np.isfinite(lines.slope), drift.slope, np.nan))
+    u = lines.u_slope
+    p_value = 2.0 * scipy.special.stdtr(lines.dof, -np.abs(_quotient(slope, u)))
+    return CellDrift(slope, u, np.asarray(p_value), lines.widening)

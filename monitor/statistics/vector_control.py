@@ -17,7 +17,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.chart_limits import tabulated_vector_limit
 from monitor.statistics.checks import as_matrix
-from monitor.statistics.control import THREE_SIGMA
+from monitor.statistics.control import THREE_SIGMA, allowed_correlation, effective_points
 
 #: Steps of the simulated charts that are held at a time: 2000 trials of 20 parameters take 16 MB.
 _STEPS = 50
@@ -39,8 +39,11 @@ class VectorChart:
     shares: Array
 
 
-def _reference(values: npt.ArrayLike, reference: npt.ArrayLike) -> tuple[Array, Array, int]:
-    """Values standardised by the reference (n, p), and the inverse covariance of what is standardised."""
+def _reference(
+    values: npt.ArrayLike, reference: npt.ArrayLike, correlated: bool
+) -> tuple[Array, Array, int, float]:
+    """Values standardised by the reference (n, p), the inverse covariance of what is standardised, and its points; and
+    the correlation of neighbouring points that is allowed for, of which the covariance is freed."""
     x, reference_runs = as_matrix(values, "values", least=1), as_matrix(reference, "reference")
     m, p = reference_runs.shape
     if x.shape[1] != p:
@@ -53,7 +56,12 @@ def _reference(values: npt.ArrayLike, reference: npt.ArrayLike) -> tuple[Array, 
     correlation = np.cov(reference_runs / scale, rowvar=False).reshape(p, p)
     if np.linalg.eigvalsh(correlation)[0] < 1e-10:
         raise DataError("the reference period has columns that are exactly dependent; leave one out.")
-    return (x - reference_runs.mean(axis=0)) / scale, np.linalg.inv(correlation), m
+    neighbours = allowed_correlation(reference_runs) if correlated else 0.0
+    effective = effective_points(m, neighbours)
+    # The scatter about means that follow the points is too small, and the means are less well known.
+    swell = (1.0 + 1.0 / effective) / (1.0 + 1.0 / m) / max((1.0 - 1.0 / effective) * m / (m - 1.0), 0.25)
+    inverse = np.linalg.inv(correlation) / swell
+    return (x - reference_runs.mean(axis=0)) / scale, inverse, m, neighbours
 
 
 def _quadratic(z: Array, inverse: Array) -> tuple[Array, Array]:
@@ -63,14 +71,15 @@ def _quadratic(z: Array, inverse: Array) -> tuple[Array, Array]:
 
 
 def t_squared_chart(
-    values: npt.ArrayLike, reference: npt.ArrayLike, *, arl: float = THREE_SIGMA
+    values: npt.ArrayLike, reference: npt.ArrayLike, *, arl: float = THREE_SIGMA, correlated: bool = False
 ) -> VectorChart:
     """T² of ``values`` (n, p) about a ``reference`` period (m, p), in any units; 1 / arl alarms a run.
 
     The limit is exact for new runs: p (m + 1) (m - 1) / (m (m - p)) F. Raises ``DataError`` unless
-    m >= p + 2. Source: N. D. Tracy, J. C. Young and R. L. Mason, J. Qual. Technol. 24 (1992) 88.
+    m >= p + 2. ``correlated``: neighbouring points may resemble each other. Source: N. D. Tracy, J. C. Young and R. L.
+    Mason, J. Qual. Technol. 24 (1992) 88.
     """
-    z, inverse, m = _reference(values, reference)
+    z, inverse, m, _ = _reference(values, reference, correlated)
     p = z.shape[1]
     _wanted(arl)
     statistic, shares = _quadratic(z, inverse)
@@ -87,16 +96,18 @@ def mewma_chart(
     lam: float = 0.2,
     arl: float = 200.0,
     trials: int = 2000,
+    correlated: bool = False,
 ) -> VectorChart:
     """MEWMA of ``values`` (n, p) about a ``reference`` period (m, p), in any units, started at its mean.
 
     The limit is simulated with reference periods of the same size: a chance of 1 - 1/e of a false alarm
-    within ``arl`` runs, as for an exponential run length; with 2000 trials the run length is good to 4 %.
+    within ``arl`` runs (``correlated``: with what neighbours may resemble each other allowed for), as for an
+    exponential run length; with 2000 trials the run length is good to 4 %.
     Where ``chart_limits`` holds the limit, from 20 000 trials, that one is taken and ``rng`` and ``trials`` are not
     used.
     Source: C. A. Lowry et al., Technometrics 34 (1992) 46.
     """
-    z, inverse, m = _reference(values, reference)
+    z, inverse, m, neighbours = _reference(values, reference, correlated)
     _wanted(arl)
     if not 0.0 < lam <= 1.0:
         raise DataError(f"lam is {lam}; the weight lies above 0 and up to 1.")
@@ -109,7 +120,8 @@ def mewma_chart(
     for i, row in enumerate(z):
         last = last + lam * (row - last)
         path[i] = last
-    statistic, shares = _quadratic(path, inverse * (2.0 - lam) / lam)
+    slow = neighbours * (1.0 - lam)
+    statistic, shares = _quadratic(path, inverse * (2.0 - lam) / lam * (1.0 - slow) / (1.0 + slow))
     return VectorChart("MEWMA", m, statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
 
 

@@ -41,7 +41,7 @@ from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
-from monitor.store.fleet import FleetSums, fleet_sums
+from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
 from monitor.store.identifications import (
     identification_by_number,
@@ -51,6 +51,15 @@ from monitor.store.identifications import (
     save_identification,
 )
 from monitor.store.import_notes import campaign_notes, run_fingerprints
+from monitor.store.machine_models import (
+    MachineModel,
+    followed_by,
+    machine_model,
+    machine_models,
+    machines_of_method,
+    not_identified,
+    save_machine_model,
+)
 from monitor.store.machine_runs import (
     MachineDescription,
     RecordedRun,
@@ -81,6 +90,7 @@ __all__ = [
     "NOTE",
     "AuditEntry",
     "Backup",
+    "BlockCut",
     "CampaignRow",
     "Database",
     "FleetSums",
@@ -88,6 +98,7 @@ __all__ = [
     "MachineDescription",
     "MachineEvent",
     "MachineHistory",
+    "MachineModel",
     "QueryResult",
     "RecordedRun",
     "RunRow",
@@ -118,6 +129,7 @@ __all__ = [
     "find_certificate",
     "find_selection",
     "fleet_sums",
+    "followed_by",
     "identification_by_number",
     "identified_runs",
     "import_campaign",
@@ -149,9 +161,13 @@ __all__ = [
     "machine_descriptions",
     "machine_events",
     "machine_history",
+    "machine_model",
+    "machine_models",
     "machine_runs",
+    "machines_of_method",
     "mark_certificate",
     "model_history",
+    "not_identified",
     "probing_counts",
     "record_event",
     "record_refusal",
@@ -162,6 +178,7 @@ __all__ = [
     "save_analysis",
     "save_certificate",
     "save_identification",
+    "save_machine_model",
     "save_model",
     "save_selection",
     "snapshot",

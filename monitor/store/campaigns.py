@@ -77,7 +77,7 @@ def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ())
                 campaign.method,
                 record_json.machine_json(campaign.machine),
                 record_json.probe_json(campaign.probe),
-                record_json.artefact_json(campaign.artefact),
+                record_json.artefact_json(campaign.artefact, campaign.sources),
                 content,
                 __version__,
                 utc_now(),
@@ -146,7 +146,7 @@ def _content(campaign: Campaign, rows: probings.PrintedProbings) -> str:
         campaign.method,
         record_json.machine_json(campaign.machine),
         record_json.probe_json(campaign.probe),
-        record_json.artefact_json(campaign.artefact),
+        record_json.artefact_json(campaign.artefact, campaign.sources),
         [
             [
                 r.run,
@@ -271,6 +271,7 @@ def _load(db: Database, campaign_id: int) -> tuple[Campaign, probings.PrintedPro
         ),
         probings=probings.as_record(rows, described),
         files=tuple(SourceFile(file, content) for file, content in files),
+        sources=record_json.sources_record(artefact),
     )
     return campaign, rows
 

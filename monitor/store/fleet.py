@@ -30,7 +30,9 @@ SELECT machine, row_number() OVER (ORDER BY machine) - 1 AS machine_no FROM mach
 _HEADINGS = """
 CREATE OR REPLACE TEMP TABLE fleet_heading AS
 WITH heading AS (
-    SELECT parameters, list(identification_id) AS identifications FROM identification GROUP BY parameters
+    -- As one text: lists of texts are compared at twice the cost.
+    SELECT any_value(parameters) AS parameters, list(identification_id) AS identifications
+    FROM identification GROUP BY array_to_string(parameters, chr(31))
 ), every AS (
     SELECT list_sort(list_distinct(flatten(list(parameters)))) AS names FROM heading
 )
@@ -39,13 +41,31 @@ SELECT row_number() OVER () AS heading, parameters, identifications,
 FROM heading, every
 """
 
+# Models of single machines, by campaign, and the latest version of each method's own: few rows both.
+_MODELS = """
+CREATE OR REPLACE TEMP TABLE fleet_model AS
+SELECT c.campaign_id, m.method, m.model, m.model_version FROM v_machine_models AS m JOIN campaign AS c USING (machine)
+"""
+
+_OWN = """
+CREATE OR REPLACE TEMP TABLE fleet_own AS
+SELECT model, max(version) AS version FROM model
+WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model
+"""
+
 _CHOSEN = """
 CREATE OR REPLACE TEMP TABLE fleet_chosen AS
 WITH latest AS (
     -- Of each campaign the identification with the most runs, the later of two: what load_identification takes.
     SELECT campaign_id, max((CAST(run_count AS BIGINT) << 32) | identification_id) & 4294967295 AS identification_id
     FROM identification
-    WHERE ($model IS NULL AND model = method OR model = $model) AND ($version IS NULL OR model_version = $version)
+    LEFT JOIN fleet_model AS f USING (campaign_id, method)
+    LEFT JOIN fleet_own AS o ON o.model = identification.method
+    WHERE CASE WHEN $model IS NULL
+          -- That which the machine is followed by, else the latest version of the method's own.
+          THEN identification.model = coalesce(f.model, identification.method)
+               AND identification.model_version = coalesce(f.model_version, o.version, identification.model_version)
+          ELSE identification.model = $model AND ($version IS NULL OR identification.model_version = $version) END
     GROUP BY campaign_id
 ), span AS (
     SELECT campaign_id, min(day) <> max(day) AS several_days, epoch(min(started_at)) / 86400.0 AS began_d
@@ -95,16 +115,35 @@ DELETE FROM fleet_group USING fleet_since
 WHERE fleet_group.machine_no = fleet_since.machine_no AND fleet_group.began_d < fleet_since.since_d
 """
 
+# The history of a machine is cut into blocks of equal time, as that of a parameter in `monitor trend`: from the number
+# of
+# groups to their number, and from the time of a group to its block.
+_BLOCKS = """
+CREATE OR REPLACE TEMP TABLE fleet_blocked AS
+WITH span AS (
+    SELECT machine_no, min(began_d) AS first_d, max(began_d) AS last_d, count(*) AS k
+    FROM fleet_group GROUP BY machine_no
+), cut AS (
+    SELECT machine_no, first_d, greatest(last_d - first_d, 1e-300) AS span_d,
+           CASE WHEN k <= $whole THEN k ELSE least(greatest(k // $each, $whole), $most) END AS blocks
+    FROM span
+)
+SELECT g.*, CAST(least(floor((began_d - first_d) / span_d * blocks), blocks - 1) AS UTINYINT) AS block
+FROM fleet_group AS g JOIN cut USING (machine_no)
+"""
+
 # A cell is a machine and a parameter: its number is made of both.
 _PARAMETER_BITS = 20
+# And of a cell and a block.
+_BLOCK_BITS = 6
 
 # The values of every cell in some groups, a list each. The outer join keeps the values on the side that is only read:
 # a hash table of them would be most of the time and memory.
 _LISTS = f"""
-SELECT (machine_no << {_PARAMETER_BITS}) | k AS cell, began_d,
+SELECT (machine_no << {_PARAMETER_BITS}) | k AS cell, (cell << {_BLOCK_BITS}) | block AS cb, began_d,
        CASE WHEN places IS NULL THEN x ELSE list_select(x, places) END AS x
 FROM (
-    SELECT g.machine_no, g.began_d, g.places, unnest(h.numbers) AS k, unnest(v.value) AS x
+    SELECT g.machine_no, g.began_d, g.places, g.block, unnest(h.numbers) AS k, unnest(v.value) AS x
     FROM identified_values AS v JOIN {{groups}} AS g USING (identification_id)
     LEFT JOIN fleet_heading AS h USING (heading)
 )
@@ -114,7 +153,7 @@ FROM (
 _LATEST = f"""
 CREATE OR REPLACE TEMP TABLE fleet_latest AS
 WITH last AS (
-    SELECT * FROM fleet_group
+    SELECT *, 0 AS block FROM fleet_group
     SEMI JOIN (SELECT machine_no, max(began_d) AS began_d FROM fleet_group GROUP BY machine_no)
     USING (machine_no, began_d)
     QUALIFY row_number() OVER (PARTITION BY machine_no ORDER BY identification_id DESC) = 1
@@ -126,7 +165,7 @@ WITH last AS (
 _ORIGINS = f"""
 CREATE OR REPLACE TEMP TABLE fleet_origin AS
 WITH earliest AS (
-    SELECT *, NULL AS places FROM fleet_chosen
+    SELECT *, NULL AS places, 0 AS block FROM fleet_chosen
     WHERE identification_id IN (SELECT min(identification_id) FROM fleet_chosen GROUP BY machine_no)
 ), first AS ({_LISTS.format(groups="earliest")})
 SELECT cell, coalesce(list_any_value(f.x), list_any_value(l.x), 0.0) AS origin
@@ -138,19 +177,20 @@ LEFT JOIN first AS f USING (cell)
 LEFT JOIN fleet_latest AS l USING (cell)
 """
 
-# A row for each cell and number of runs in a group: what depends on that number alone is worked out afterwards.
+# A row for each cell, block and number of runs in a group: what depends on that number alone is worked out afterwards.
 _PARTS = f"""
 CREATE OR REPLACE TEMP TABLE fleet_part AS
-SELECT cell, n, count(*) AS k, sum(v) AS v, min(v) AS least, sum(ln(CASE WHEN v > 0.0 THEN v END)) AS logs,
-       sum(t) AS t, sum(t * t) AS tt, sum(m) AS m, sum(m * m) AS mm, sum(m * t) AS tm
+SELECT cb, n, count(*) AS k, sum(v) AS v, min(v) AS least, sum(ln(CASE WHEN v > 0.0 THEN v END)) AS logs,
+       sum(t) AS t, sum(t * t) AS tt, sum(m) AS m, sum(m * m) AS mm, sum(m * t) AS tm,
+       sum(v * v) AS vv
 FROM (
-    SELECT cell, t, list_count(d) AS n, list_avg(d) AS m, list_var_pop(d) AS v
+    SELECT cb, t, list_count(d) AS n, list_avg(d) AS m, list_var_pop(d) AS v
     FROM (
-        SELECT cell, began_d - $epoch_d AS t, list_transform(x, lambda value: value - origin) AS d
-        FROM ({_LISTS.format(groups="fleet_group")}) JOIN fleet_origin USING (cell)
+        SELECT cb, began_d - $epoch_d AS t, list_transform(x, lambda value: value - origin) AS d
+        FROM ({_LISTS.format(groups="fleet_blocked")}) JOIN fleet_origin USING (cell)
     )
 )
-GROUP BY cell, n
+GROUP BY cb, n
 """
 
 _TOGETHER = f"""
@@ -166,17 +206,32 @@ WITH shown AS (
     SELECT cell, began_d AS last_d, list_count(x) AS latest_n,
            list_avg(list_transform(x, lambda value: value - origin)) AS latest
     FROM fleet_latest JOIN fleet_origin USING (cell)
+), part AS (
+    SELECT cb >> {_BLOCK_BITS} AS cell, n, sum(k) AS k, sum(v) AS v, min(least) AS least, sum(logs) AS logs, sum(t) AS
+    t,
+           sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm, sum(vv) AS vv
+    -- Groups in which a parameter was refused in every run have no part in it.
+    FROM fleet_part WHERE n > 0 GROUP BY cell, n
 ), summed AS (
     SELECT cell, sum(k) AS k, sum(k * n) AS n, sum(n * m) AS s, sum(n * mm) AS q, sum(n * v) AS ss,
            coalesce(sum(k) FILTER (n > 1), 0) AS repeated,
            coalesce(min(least * n / (n - 1)) FILTER (n > 1), 0.0) AS least,
            coalesce(sum((n - 1) * (logs + k * ln(n / (n - 1)))) FILTER (n > 1), 0.0) AS logs,
            coalesce(sum(k / (n - 1)) FILTER (n > 1), 0.0) AS inverse,
-           sum(t) AS t, sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm
-    -- Groups in which a parameter was refused in every run have no part in it.
-    FROM fleet_part WHERE n > 0 GROUP BY cell
+           sum(t) AS t, sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm,
+           -- Of the groups with several runs, whose variances are v n / (n - 1).
+           coalesce(sum(k * n) FILTER (n > 1), 0) AS runs_rep, coalesce(sum(n * m) FILTER (n > 1), 0.0) AS offset_rep,
+           coalesce(sum(n * mm) FILTER (n > 1), 0.0) AS squares_rep,
+           coalesce(sum(v * n / (n - 1)) FILTER (n > 1), 0.0) AS s2,
+           coalesce(sum(v * n * n / (n - 1)) FILTER (n > 1), 0.0) AS s2_runs,
+           coalesce(sum(vv * n * n / ((n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4,
+           coalesce(sum(vv * n * n * n / ((n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4_runs,
+           coalesce(sum(vv * n * n / ((n - 1) * (n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4_dof,
+           coalesce(sum(vv * n * n * n / ((n - 1) * (n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4_dof_runs,
+           coalesce(sum(vv * n * n * n * n / ((n - 1) * (n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4_dof_runs_squared
+    FROM part GROUP BY cell
 )
-SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.* EXCLUDE (cell),
+SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.*,
        CASE WHEN l.latest_n > 0 THEN l.last_d ELSE 'nan' END AS last_d, coalesce(l.latest, 'nan') AS latest,
        coalesce(l.latest_n, 0) AS latest_n, coalesce(e.since_d, 'nan') AS since_d
 FROM summed AS p
@@ -188,7 +243,65 @@ JOIN shown AS s ON s.k = p.cell & ((1 << {_PARAMETER_BITS}) - 1)
 ORDER BY m.machine, s.parameter
 """
 
-_TABLES = ("machine", "heading", "chosen", "group", "since", "latest", "origin", "part")
+# The blocks of every cell: how many groups, and their mean times and values about the origin.
+_OF_BLOCKS = f"""
+SELECT cb >> {_BLOCK_BITS} AS cell, cb & ((1 << {_BLOCK_BITS}) - 1) AS block, CAST(sum(k) AS DOUBLE) AS k, sum(t) /
+sum(k) AS t, sum(m) / sum(k) AS m
+FROM fleet_part WHERE n > 0 GROUP BY cb
+"""
+
+_TABLES = (
+    "machine",
+    "heading",
+    "model",
+    "own",
+    "chosen",
+    "group",
+    "blocked",
+    "since",
+    "latest",
+    "origin",
+    "part",
+)
+
+
+@dataclass(frozen=True)
+class BlockCut:
+    """How histories are cut into blocks of equal time: a group each up to ``whole`` groups, then so many blocks, or one
+    for ``each`` so many groups, ``most`` at most."""
+
+    whole: int
+    each: int
+    most: int
+
+
+@dataclass(frozen=True)
+class RepeatedSums:
+    """Sums over the groups of two runs and more of c cells, all (c,): runs, values and squares as in ``FleetSums``.
+
+    Of the variances s² of groups of n runs: ``s2`` and ``s2_runs`` are sums of s² and n s², ``s4`` and ``s4_runs``
+    those
+    of s⁴ and n s⁴, and ``s4_dof`` those of s⁴, n s⁴ and n² s⁴ by n - 1.
+    """
+
+    runs: Array
+    offset: Array
+    squares: Array
+    s2: Array
+    s2_runs: Array
+    s4: Array
+    s4_runs: Array
+    s4_dof: tuple[Array, Array, Array]
+
+
+@dataclass(frozen=True)
+class FleetBlocks:
+    """Blocks of the history of c cells, all (c, b): groups (0: none), mean days since ``epoch_d``, mean value less
+    origin."""
+
+    groups: Array
+    t: Array
+    m: Array
 
 
 @dataclass(frozen=True)
@@ -229,17 +342,22 @@ class FleetSums:
     latest: Array
     latest_runs: Array
     since_d: Array
+    repeated_sums: RepeatedSums
+    blocks: FleetBlocks
 
 
-def fleet_sums(db: Database, model: str | None = None, version: int | None = None) -> FleetSums:
+def fleet_sums(
+    db: Database, model: str | None = None, version: int | None = None, *, cut: BlockCut
+) -> FleetSums:
     """Sums of all machines and parameters, of the latest identification of every campaign under one model.
 
     Of each machine since its last recorded event, where runs followed it (a day counts whole, by its first run).
-    Without ``model`` the method's own. A parameter that a machine refused both in its first campaign and on its last
-    day has zero for its origin and loses 2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the
-    last bits from one time to the next. Raises NotFoundError where nothing was identified.
+    Without ``model`` that which each machine is followed by, the method's own where none was chosen. A parameter that
+    a machine refused both in its first campaign and on its last day has zero for its origin and loses
+    2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the last bits from one time to the next.
+    ``cut`` says how the history of a machine is cut into blocks. Raises NotFoundError where nothing was identified.
     """
-    for statement in (_MACHINES, _HEADINGS):
+    for statement in (_MACHINES, _HEADINGS, _MODELS, _OWN):
         db.execute(statement)
     db.execute(_CHOSEN, {"model": model, "version": version})
     ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")
@@ -248,14 +366,31 @@ def fleet_sums(db: Database, model: str | None = None, version: int | None = Non
         raise NotFoundError(f"no campaign was identified{under} yet; type `monitor identify`")
     for statement in (_GROUPS, _SINCE, _ENDED, _LATEST, _ORIGINS):
         db.execute(statement)
+    db.execute(_BLOCKS, {"whole": cut.whole, "each": cut.each, "most": cut.most})
     db.execute(_PARTS, {"epoch_d": epoch_d})
-    columns = {name: np.ma.getdata(column) for name, column in db.arrays(_TOGETHER).items()}
+    columns, of_blocks = (
+        {name: np.ma.getdata(column) for name, column in db.arrays(query).items()}
+        for query in (_TOGETHER, _OF_BLOCKS)
+    )
     for name in _TABLES:
         db.execute(f"DROP TABLE IF EXISTS fleet_{name}")
-    return _sums(columns, epoch_d)
+    return _sums(columns, _blocks(of_blocks, columns), epoch_d)
 
 
-def _sums(columns: Mapping[str, npt.NDArray[np.generic]], epoch_d: float) -> FleetSums:
+def _blocks(
+    columns: Mapping[str, npt.NDArray[np.generic]], cells: Mapping[str, npt.NDArray[np.generic]]
+) -> FleetBlocks:
+    """A row of blocks for each cell, in the order of ``cells``, in display units."""
+    order = np.argsort(cells["cell"])
+    rows = order[np.searchsorted(cells["cell"], columns["cell"], sorter=order)]
+    block = columns["block"].astype(np.intp)
+    shape = (len(order), int(block.max()) + 1)
+    groups, t, m = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    groups[rows, block], t[rows, block], m[rows, block] = columns["k"], columns["t"], columns["m"]
+    return FleetBlocks(groups, t, m / np.asarray(cells["factor"], dtype=np.float64)[:, np.newaxis])
+
+
+def _sums(columns: Mapping[str, npt.NDArray[np.generic]], blocks: FleetBlocks, epoch_d: float) -> FleetSums:
     number = {
         name: np.asarray(column, dtype=np.float64)
         for name, column in columns.items()
@@ -288,4 +423,17 @@ def _sums(columns: Mapping[str, npt.NDArray[np.generic]], epoch_d: float) -> Fle
         latest=number["latest"] / f,
         latest_runs=number["latest_n"],
         since_d=number["since_d"],
-    )
+        repeated_sums=RepeatedSums(
+            runs=number["runs_rep"],
+            offset=number["offset_rep"] / f,
+            squares=number["squares_rep"] / f**2,
+            s2=number["s2"] / f**2,
+            s2_runs=number["s2_runs"] / f**2,
+            s4=number["s4"] / f**4,
+            s4_runs=number["s4_runs"] / f**4,
+            s4_dof=(
+                number["s4_dof"] / f**4, number["s4_dof_runs"] / f**4, number["s4_dof_runs_squared"] / f**4
+            ),
+        ),
+        blocks=blocks,
+    )  # fmt: skip

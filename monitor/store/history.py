@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -125,13 +126,15 @@ def machine_history(
     version: int | None = None,
     parameter: str | None = None,
     since: datetime | None = None,
+    followed_by: Mapping[str, tuple[str, int]] = MappingProxyType({}),
 ) -> MachineHistory:
-    """All identified runs of a machine under one model (by default the method's own), from ``since`` on.
+    """All identified runs of a machine under one model, from ``since`` on.
 
-    May hold no run. Raises NotFoundError for a machine that is not there.
+    Without ``model`` that of the run's method in ``followed_by`` (name and version), else any version of the method's
+    own. May hold no run. Raises NotFoundError for a machine that is not there.
     """
     campaigns = campaigns_of_machine(db, machine)
-    identified = _identified(db, list(campaigns), model, version)
+    identified = _identified(db, list(campaigns), None if model is None else (model, version), followed_by)
     recorded = runs_of_campaigns(db, campaigns)
     runs = [
         run
@@ -175,7 +178,10 @@ def _unidentified(
 
 
 def _identified(
-    db: Database, campaigns: list[int], model: str | None, version: int | None
+    db: Database,
+    campaigns: list[int],
+    model: tuple[str, int | None] | None,
+    followed_by: Mapping[str, tuple[str, int]],
 ) -> dict[int, _Identified]:
     """Of each campaign the identification with the most runs, the later of two: what load_identification takes."""
     if not campaigns:
@@ -183,7 +189,8 @@ def _identified(
     numbers = [number for (number,) in db.rows(_IDENTIFICATIONS, [campaigns])]
     identified: dict[int, _Identified] = {}
     for of_model, of_version, method, campaign, *head in _with_marks(db, _HEADS, numbers):
-        if of_model != (method if model is None else model) or version not in (None, of_version):
+        name, version = model or followed_by.get(method) or (method, None)
+        if of_model != name or version not in (None, of_version):
             continue
         run_count, number, *lists = head
         current = identified.get(campaign)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from monitor.documents import from_document, to_document
 from monitor.records import (
     Artefact,
     AxisSettings,
@@ -20,7 +22,9 @@ from monitor.records import (
     Reflector,
     ScaleBar,
     SelfCalibration,
+    Setup,
 )
+from monitor.sources import Source
 
 
 def machine_json(machine: Machine) -> str:
@@ -75,8 +79,11 @@ def probe_record(text: str) -> Probe:
     return Probe(**{**data, "tip": _tuple(data["tip"])})
 
 
-def artefact_json(artefact: Artefact) -> str:
-    """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C."""
+def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
+    """An artefact as text; lengths in mm, expansion in 1/K, temperature in °C.
+
+    The stated ``sources`` of uncertainty stand beside it, where there are any.
+    """
     data = asdict(artefact)
     # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
     if artefact.self_calibration is None:
@@ -85,7 +92,16 @@ def artefact_json(artefact: Artefact) -> str:
         del data["reflectors"]
     if artefact.l_shape is None:
         del data["l_shape"]
+    if sources:
+        data["sources"] = [to_document(source) for source in sources]
+    if not artefact.setups:
+        del data["setups"]
     return _text(data)
+
+
+def sources_record(text: str) -> tuple[Source, ...]:
+    """The sources of ``artefact_json``."""
+    return tuple(from_document(Source, source) for source in json.loads(text).get("sources", ()))
 
 
 def artefact_record(text: str) -> Artefact:
@@ -100,7 +116,13 @@ def artefact_record(text: str) -> Artefact:
         tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
         l_shape=_l_shape(data.get("l_shape")),
         self_calibration=_self_calibration(data.get("self_calibration")),
+        setups=tuple(map(_setup, data.get("setups", ()))),
     )
+
+
+def _setup(data: dict[str, Any]) -> Setup:
+    vectors = ("tool_point", "work_point", "direction", "tool_direction", "known")
+    return Setup(**{**data, **{name: _tuple(data[name]) for name in vectors}})
 
 
 def _self_calibration(data: dict[str, Any] | None) -> SelfCalibration | None:

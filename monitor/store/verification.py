@@ -23,6 +23,7 @@ from monitor.store.events import event_content
 from monitor.store.identifications import stored_identification_content
 from monitor.store.import_notes import notes_content
 from monitor.store.indexes import index_faults
+from monitor.store.machine_models import machine_model_content
 from monitor.store.models import all_models, model_content, model_key
 from monitor.store.refusals import cleared_content, refusal_content
 from monitor.store.selections import selection_content
@@ -98,6 +99,8 @@ def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
         yield ("event", str(number)), event_content(db, number)
     for (number,) in db.rows("SELECT selection_id FROM selection ORDER BY ALL"):
         yield ("selection", str(number)), selection_content(db, number)
+    for (number,) in db.rows("SELECT choice_id FROM machine_model ORDER BY ALL"):
+        yield ("machine model", str(number)), machine_model_content(db, number)
     for (number,) in db.rows("SELECT refusal_id FROM refused_import ORDER BY ALL"):
         yield ("refused import", str(number)), refusal_content(db, number)
     for (number,) in db.rows("SELECT refusal_id FROM refusal_cleared ORDER BY ALL"):

@@ -26,7 +26,7 @@ from monitor.uncertainty.coverage import (
     single_factor,
 )
 from monitor.uncertainty.degrees_of_freedom import effective_dof
-from monitor.uncertainty.framework import BudgetLine, FrameworkResult, OutputContribution, gum_framework
+from monitor.uncertainty.framework import FrameworkResult, gum_framework
 from monitor.uncertainty.intervals import coverage_interval
 from monitor.uncertainty.marginals import (
     Arcsine,
@@ -39,8 +39,10 @@ from monitor.uncertainty.marginals import (
 )
 from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.montecarlo import RunEstimator, run_estimator
+from monitor.uncertainty.parts import BudgetLine, Estimated, OutputContribution
 from monitor.uncertainty.projection import Projection, nearest_correlation
 from monitor.uncertainty.propagation import Model, Summary
+from monitor.uncertainty.regions import RegionFactors, region_factors
 from monitor.uncertainty.row_run import RowRun, measured_run, repeated_readings
 from monitor.uncertainty.sampling import (
     BlockSampler,
@@ -61,6 +63,7 @@ __all__ = [
     "BudgetLine",
     "Comparison",
     "Empirical",
+    "Estimated",
     "FrameworkResult",
     "Inputs",
     "JointDistribution",
@@ -73,6 +76,7 @@ __all__ = [
     "OutputContribution",
     "Projection",
     "Rectangular",
+    "RegionFactors",
     "RowRun",
     "RunEstimator",
     "Sampled",
@@ -102,6 +106,7 @@ __all__ = [
     "overall",
     "pooled_by_day",
     "rectangle_factor",
+    "region_factors",
     "repeated_readings",
     "run_estimator",
     "sample_ellipsoid_factor",

@@ -42,16 +42,16 @@ def conformity(
     lower: npt.ArrayLike,
     upper: npt.ArrayLike,
     *,
-    dof: float = math.inf,
+    dof: npt.ArrayLike = math.inf,
     rng: np.random.Generator | None = None,
 ) -> Conformity:
     """Probabilities that outputs (m,) with ``covariance`` (m, m) lie between ``lower`` and ``upper`` (m,).
 
-    All in one consistent set of units; an open side is an infinite limit. ``dof`` of the covariance: the t
-    distribution instead of the normal. ``single`` is JCGM 106:2012 7.2 and 7.3, ``joint`` its integral over all
-    limits, by Genz's separation of variables (J. Comput. Graph. Statist. 1 (1992) 141; for t Genz and Bretz 2002)
-    on scrambled Sobol points. Raises DataError for shapes that differ, limits that do not rise, variances that
-    are not positive.
+    All in one consistent set of units; an open side is an infinite limit. ``dof`` of each variance (m,), or one for
+    all: the t distribution instead of the normal, for the joint probability that of the fewest. ``single`` is JCGM
+    106:2012 7.2 and 7.3, ``joint`` its integral over all limits, by Genz's separation of variables (J. Comput. Graph.
+    Statist. 1 (1992) 141; for t Genz and Bretz 2002) on scrambled Sobol points. Raises DataError for shapes that
+    differ, limits that do not rise, variances that are not positive.
     """
     y = np.asarray(estimate, dtype=np.float64)
     u_y = np.asarray(covariance, dtype=np.float64)
@@ -67,24 +67,37 @@ def conformity(
     variance = np.diag(u_y)
     if not (np.isfinite(y).all() and np.isfinite(u_y).all() and (variance > 0.0).all()):
         raise DataError("estimates must be finite and variances positive")
-    if not dof > 0.0:
-        raise DataError(f"degrees of freedom must be positive, but are {dof}")
+    freedoms = np.broadcast_to(np.asarray(dof, dtype=np.float64), y.shape)
+    if not (freedoms > 0.0).all():
+        raise DataError(f"degrees of freedom must be positive, but the fewest are {freedoms.min():g}")
     u = np.sqrt(variance)
     a, b = (low - y) / u, (high - y) / u
-    law = scipy.stats.norm() if math.isinf(dof) else scipy.stats.t(dof)
-    single = np.asarray(law.cdf(b) - law.cdf(a))
+    single = _below(b, freedoms) - _below(a, freedoms)
     bounded = np.isfinite(a) | np.isfinite(b)
     if not bounded.any():
         return Conformity(single, 1.0, 0.0)
     if bounded.sum() == 1:
         return Conformity(single, float(single[bounded][0]), 0.0)
     correlation = (u_y / np.outer(u, u))[np.ix_(bounded, bounded)]
-    probability = _box(correlation, a[bounded], b[bounded], dof, rng or np.random.default_rng(_SEED))
+    probability = _box(
+        correlation,
+        a[bounded],
+        b[bounded],
+        float(freedoms[bounded].min()),
+        rng or np.random.default_rng(_SEED),
+    )
     # The least probable limit bounds the joint probability whatever the sampling left open.
     joint = min(float(np.mean(probability)), float(single.min()))
     return Conformity(
         single, max(joint, 0.0), float(np.std(probability, ddof=1) / math.sqrt(len(probability)))
     )
+
+
+def _below(values: Array, freedoms: Array) -> Array:
+    """Probabilities (m,) that Student's t, or a normal number, is below ``values`` (m,)."""
+    known = np.isinf(freedoms)
+    student = scipy.special.stdtr(np.where(known, 1.0, freedoms), values)
+    return np.asarray(np.where(known, scipy.special.ndtr(values), student))
 
 
 def _box(correlation: Array, a: Array, b: Array, dof: float, rng: np.random.Generator) -> list[float]:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.uncertainty.parts import Estimated
 from monitor.uncertainty.roots import checked_covariance, correlation_of, covariance_root
 
 
@@ -25,7 +26,8 @@ class Inputs:
     """The input quantities X of a model, their estimates (n,) and covariance (n, n), in internal units.
 
     ``sources`` names for every input where its uncertainty comes from; ``dof`` gives the degrees of freedom
-    of each source's covariance (infinite where it is known, not estimated).
+    of each source's covariance (infinite where it is known, not estimated), ``estimated`` what they are of
+    (``Estimated.MATRIX`` where nothing is said).
     """
 
     names: tuple[str, ...]
@@ -34,6 +36,7 @@ class Inputs:
     covariance: Array
     sources: tuple[str, ...]
     dof: Mapping[str, float] = field(default_factory=dict)
+    estimated: Mapping[str, Estimated] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -85,6 +88,10 @@ class Inputs:
     def degrees_of_freedom(self, source: str) -> float:
         """The degrees of freedom of one source, infinite where none are given."""
         return float(self.dof.get(source, math.inf))
+
+    def estimated_of(self, source: str) -> Estimated:
+        """Return what the degrees of freedom of one source are of."""
+        return self.estimated.get(source, Estimated.MATRIX)
 
 
 def overall(
@@ -175,6 +182,7 @@ def uncorrelated(
         np.diag(uncertainties**2),
         (source,) * len(names),
         {source: dof},
+        {source: Estimated.SCALE},
     )
 
 
@@ -185,6 +193,7 @@ def joined(*parts: Inputs) -> Inputs:
     count = sum(len(part.names) for part in parts)
     covariance = np.zeros((count, count))
     dof: dict[str, float] = {}
+    estimated: dict[str, Estimated] = {}
     start = 0
     for part in parts:
         stop = start + len(part.names)
@@ -194,6 +203,7 @@ def joined(*parts: Inputs) -> Inputs:
             if source in dof:
                 raise DataError(f"two groups of inputs both name the source '{source}'; name them apart")
             dof[source] = part.degrees_of_freedom(source)
+            estimated[source] = part.estimated_of(source)
     return Inputs(
         tuple(name for part in parts for name in part.names),
         tuple(unit for part in parts for unit in part.units),
@@ -201,6 +211,7 @@ def joined(*parts: Inputs) -> Inputs:
         covariance,
         tuple(source for part in parts for source in part.sources),
         dof,
+        estimated,
     )
 
 

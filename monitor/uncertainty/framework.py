@@ -6,7 +6,6 @@ model that is not. The budget splits U_y by source. It is never trimmed: its lin
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,27 +14,10 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.uncertainty.covariance import Inputs
-from monitor.uncertainty.coverage import ellipsoid_factor, rectangle_factor
 from monitor.uncertainty.degrees_of_freedom import effective_dof
+from monitor.uncertainty.parts import BudgetLine, OutputContribution, known
+from monitor.uncertainty.regions import RegionFactors, region_factors
 from monitor.uncertainty.roots import checked_covariance, correlation_of, covariance_root
-
-
-@dataclass(frozen=True)
-class BudgetLine:
-    """What one source adds to the output covariance (m, m), and its degrees of freedom.
-
-    A line named ``a × b`` is the covariance between two sources, which may be negative. A source whose
-    degrees of freedom do not apply (a covariance between sources) has None.
-    """
-
-    source: str
-    covariance: Array
-    dof: float | None
-
-    @property
-    def variance(self) -> Array:
-        """What the source adds to each output's variance (m,)."""
-        return np.asarray(np.diag(self.covariance))
 
 
 @dataclass(frozen=True)
@@ -43,8 +25,9 @@ class FrameworkResult:
     """Estimates, covariance and coverage factors of the outputs after JCGM 102 clause 6.
 
     ``sensitivity`` is C (m, n) over the inputs ``input_names``. ``dof`` are the effective degrees of freedom
-    of U_y as a whole, ``dof_by_output`` (m,) of every variance. ``rank`` is that of U_y: k_p is for so many
-    dimensions, k_q for all m outputs by Bonferroni. With ``finite_dof`` false both are the normal ones.
+    of U_y as a whole, a summary that no factor is taken from; ``dof_by_output`` (m,) of every variance. ``rank`` is
+    that of U_y. ``factors`` are k_p for so many dimensions and k_q for all m outputs, for the sum of the budget's lines
+    with what is known of each; with ``finite_dof`` false those of a known covariance.
     """
 
     names: tuple[str, ...]
@@ -57,10 +40,23 @@ class FrameworkResult:
     dof: float
     dof_by_output: Array
     rank: int
-    p: float
     finite_dof: bool
-    k_p: float
-    k_q: float
+    factors: RegionFactors
+
+    @property
+    def p(self) -> float:
+        """Coverage probability."""
+        return self.factors.p
+
+    @property
+    def k_p(self) -> float:
+        """Coverage factor of the hyper-ellipsoid, infinite where the budget bounds none."""
+        return self.factors.k_p
+
+    @property
+    def k_q(self) -> float:
+        """Coverage factor of the hyper-rectangle."""
+        return self.factors.k_q
 
     @property
     def u(self) -> Array:
@@ -88,15 +84,6 @@ class FrameworkResult:
         return np.array([line.variance / np.where(total > 0.0, total, 1.0) for line in self.budget])
 
 
-@dataclass(frozen=True)
-class OutputContribution:
-    """A covariance (m, m) that acts on the outputs directly, such as what lack of fit leaves."""
-
-    source: str
-    covariance: Array
-    dof: float = math.inf
-
-
 def gum_framework(
     inputs: Inputs,
     sensitivity: Array,
@@ -111,8 +98,8 @@ def gum_framework(
     """First-order propagation of ``inputs`` (n of them) through ``sensitivity`` (m, n).
 
     ``estimate`` (m,) are the outputs at the inputs' estimates. ``contributions`` act on the outputs without
-    passing through the inputs. With ``finite_dof`` k_p is Hotelling's and k_q a t quantile at the smallest
-    of the outputs' effective degrees of freedom. Neglected: everything of second order; see ``validation``.
+    passing through the inputs. With ``finite_dof`` k_p and k_q are those of the sum of lines known to different
+    degrees (``regions``), else of a known covariance. Neglected: everything of second order; see ``validation``.
     Raises DataError where shapes do not match or two sources have the same name.
     """
     sensitivity = np.atleast_2d(np.asarray(sensitivity, dtype=np.float64))
@@ -150,10 +137,8 @@ def gum_framework(
         dof=joint,
         dof_by_output=single,
         rank=rank,
-        p=p,
         finite_dof=finite_dof,
-        k_p=ellipsoid_factor(max(rank, 1), p, joint if finite_dof else math.inf),
-        k_q=rectangle_factor(outputs, p, float(np.min(single)) if finite_dof else math.inf),
+        factors=region_factors(budget if finite_dof else known(budget), p),
     )
 
 
@@ -165,6 +150,7 @@ def _input_lines(inputs: Inputs, sensitivity: Array) -> tuple[BudgetLine, ...]:
             source,
             sensitivity[:, at] @ inputs.covariance[np.ix_(at, at)] @ sensitivity[:, at].T,
             inputs.degrees_of_freedom(source),
+            inputs.estimated_of(source),
         )
         for source, at in places.items()
     ]
@@ -189,5 +175,5 @@ def _output_lines(
         covariance = checked_covariance(part.covariance)
         if covariance.shape != (outputs, outputs):
             raise DataError(f"'{part.source}' must have shape ({outputs}, {outputs}), not {covariance.shape}")
-        lines.append(BudgetLine(part.source, covariance, part.dof))
+        lines.append(BudgetLine(part.source, covariance, part.dof, part.estimated))
     return tuple(lines)

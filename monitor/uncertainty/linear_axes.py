@@ -49,7 +49,7 @@ def row_covariances(run: MeasuredRun, unknowns: Array, axes: LinearAxes) -> dict
         for component in range(3):
             size = errors.positioning if component == along else errors.straightness
             if size:
-                root = _interpolated(per_row, axes.node_spacing)
+                root = interpolated(per_row, axes.node_spacing)
                 add(f"E{COMPONENTS[component]}{name}", size * rows[:, component, None] * root)
         for other, size in errors.squareness.items():
             across = int(np.abs(_linear(chain, other).direction).argmax())
@@ -68,7 +68,7 @@ def _linear(chain: Chain, name: str) -> Joint:
     )
 
 
-def _interpolated(position: Array, spacing: tuple[float, float]) -> Array:
+def interpolated(position: Array, spacing: tuple[float, float]) -> Array:
     """Root (n, m) of the covariance of a unit random function at positions (n,), over the spacings of its nodes."""
     parts = []
     for pitch in np.linspace(*spacing, _SPACINGS):

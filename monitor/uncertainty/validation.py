@@ -1,30 +1,22 @@
 """Validation of the GUM framework by Monte Carlo, quantity by quantity (JCGM 102:2011 clause 8).
 
-The absolute differences of estimates, standard uncertainties, largest eigenvalue of the correlation matrix,
-k_p and k_q must be no larger than their numerical tolerances. The Monte Carlo result has to be stable to a
-fifth of these (8.2): where it is not, the verdict is neither yes nor no.
+The absolute differences of estimates, standard uncertainties, largest eigenvalue of the correlation matrix, k_p and k_q
+must be no larger than their numerical tolerances. A Monte Carlo samples a known covariance, so that the framework's
+factors are those of one, and its k_q is no bound but the factor that the correlations ask for. The Monte Carlo result
+has to be stable to a fifth of the tolerances (8.2): where it is not, the verdict is neither yes nor no.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from monitor.exceptions import DataError
+from monitor.records import ValidationVerdict
 from monitor.uncertainty.adaptive import MonteCarloResult
 from monitor.uncertainty.framework import FrameworkResult
 from monitor.uncertainty.tolerance import numerical_tolerance
-
-
-class Verdict(StrEnum):
-    """Whether Monte Carlo confirms the framework; the value is how documents store it."""
-
-    VALIDATED = "validated"
-    NOT_VALIDATED = "not validated"
-    UNDECIDED = "undecided"
-
 
 #: JCGM 102 8.2: the Monte Carlo tolerance is to be no more than a fifth of that of the comparison.
 STABILITY_FACTOR = 5.0
@@ -52,15 +44,19 @@ class Comparison:
         return abs(self.framework - self.monte_carlo)
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ValidationVerdict:
         """Undecided where the Monte Carlo error could change the answer."""
         if self.stability <= self.tolerance / STABILITY_FACTOR:
-            return Verdict.VALIDATED if self.difference <= self.tolerance else Verdict.NOT_VALIDATED
+            return (
+                ValidationVerdict.VALIDATED
+                if self.difference <= self.tolerance
+                else ValidationVerdict.NOT_VALIDATED
+            )
         if self.difference - self.stability > self.tolerance:
-            return Verdict.NOT_VALIDATED
+            return ValidationVerdict.NOT_VALIDATED
         if self.difference + self.stability <= self.tolerance:
-            return Verdict.VALIDATED
-        return Verdict.UNDECIDED
+            return ValidationVerdict.VALIDATED
+        return ValidationVerdict.UNDECIDED
 
 
 @dataclass(frozen=True)
@@ -72,22 +68,28 @@ class Validation:
     trials: int
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ValidationVerdict:
         """``validated`` only if every quantity is; ``not validated`` as soon as one is not."""
         verdicts = {comparison.verdict for comparison in self.comparisons}
-        if Verdict.NOT_VALIDATED in verdicts:
-            return Verdict.NOT_VALIDATED
-        return Verdict.UNDECIDED if Verdict.UNDECIDED in verdicts else Verdict.VALIDATED
+        if ValidationVerdict.NOT_VALIDATED in verdicts:
+            return ValidationVerdict.NOT_VALIDATED
+        return (
+            ValidationVerdict.UNDECIDED
+            if ValidationVerdict.UNDECIDED in verdicts
+            else ValidationVerdict.VALIDATED
+        )
 
     @property
     def passed(self) -> bool:
         """Whether the GUM framework may be used for this measurement."""
-        return self.verdict is Verdict.VALIDATED
+        return self.verdict is ValidationVerdict.VALIDATED
 
     def failed(self) -> tuple[Comparison, ...]:
         """The quantities that are not validated."""
         return tuple(
-            comparison for comparison in self.comparisons if comparison.verdict is not Verdict.VALIDATED
+            comparison
+            for comparison in self.comparisons
+            if comparison.verdict is not ValidationVerdict.VALIDATED
         )
 
 

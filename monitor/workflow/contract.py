@@ -48,6 +48,7 @@ QUESTIONS = {
     name: Question(name, function)
     for name, function in {
         "add effect": "model.change:add_effect",
+        "affected by effect": "model.change:affected",
         "amend certificate": "certificate.issue:amend",
         "audit": "keeping:audit",
         "backup": "keeping:backup",
@@ -88,6 +89,7 @@ QUESTIONS = {
         "statistics": "run_statistics.statistics:stats",
         "trend": "trend.trends:trend",
         "uncertainty": "uncertainty.evaluation:uncertainty",
+        "use model": "model.use:use_model",
         "verify": "keeping:verify",
         "verify certificate": "certificate.verification:verify_file",
         "withdraw campaign": "intake.withdrawals:withdraw",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from monitor.discovery.curve.catalogue import catalogue as curve_catalogue
 from monitor.documents import INLINED, OMITTED
-from monitor.effects import ArtefactEffect, ChainEffect
+from monitor.effects import ParsedEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
 from monitor.effects.curve import SEARCHED, CurveEffect
 from monitor.effects.curve.words import describe_curve
@@ -133,7 +133,7 @@ def _of_campaign(campaign: Campaign | CurveCampaign) -> EffectsAnswer:
     )
 
 
-def _described(effects: Iterable[ChainEffect | ArtefactEffect]) -> tuple[CatalogueEffect, ...]:
+def _described(effects: Iterable[ParsedEffect]) -> tuple[CatalogueEffect, ...]:
     return tuple(CatalogueEffect(effect.text, effect.unit.name, describe(effect)) for effect in effects)
 
 

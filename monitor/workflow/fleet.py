@@ -11,14 +11,33 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
-from monitor.statistics.sufficient import CellDrift, CellTests, GroupSums, cells_from_sums, drift_from_sums
-from monitor.store import Database, FleetSums, fleet_sums, latest_maps, latest_tolerances
+from monitor.statistics.block_lines import DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS, Blocks
+from monitor.statistics.means import VarianceMoments, brown_forsythe_from_moments
+from monitor.statistics.sufficient import (
+    CellDrift,
+    CellTests,
+    GroupSums,
+    cells_from_sums,
+    drift_from_sums,
+    drift_in_blocks,
+)
+from monitor.store import (
+    BlockCut,
+    Database,
+    FleetSums,
+    fleet_sums,
+    latest_maps,
+    latest_tolerances,
+    not_identified,
+)
 from monitor.units import MICROMETRE
 from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.drift import SHORTEST_DAYS
 from monitor.workflow.models import resolve
 from monitor.workflow.trend.volumetric import VOLUMETRIC
 
+#: How histories are cut into blocks: as those of `monitor trend`.
+CUT = BlockCut(DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS)
 #: A drift that reaches the limit within so many years needs attention now.
 SOON_YEARS = 1.0
 #: False discovery rate over all machines and parameters.
@@ -33,7 +52,10 @@ STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
 
 @dataclass(frozen=True)
 class FleetRequest:
-    """Every machine and parameter under a model (the method's own by default); ``top`` rows are listed (0: all)."""
+    """Every machine and parameter under a model (by default that which each machine is followed by).
+
+    ``top`` rows are listed (0: all).
+    """
 
     model: str | None = None
     top: int = 20
@@ -66,6 +88,7 @@ class FleetTableRow:
     anova_q: float | None
     slope_per_year: float | None
     u_slope: float | None
+    slope_widening: float | None
     drift_p: float | None
     drift_q: float | None
     latest: float | None
@@ -77,13 +100,18 @@ class FleetTableRow:
 
 @dataclass(frozen=True)
 class FleetAnswer:
-    """The most urgent rows of ``rows``, and how many of all need attention, by kind."""
+    """The most urgent rows of ``rows``, and how many of all need attention, by kind.
+
+    ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
+    part in it.
+    """
 
     machines: int
     rows: int
     values: int
     false_discovery_rate: float
     attention: Mapping[str, int]
+    not_identified: tuple[str, ...]
     table: tuple[FleetTableRow, ...]
 
 
@@ -95,7 +123,21 @@ def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
             sums.log_variances, sums.inverse_dof,
         )
     )  # fmt: skip
-    return cells, drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
+    drift = drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
+    blocks = Blocks(sums.blocks.groups, sums.blocks.t, sums.blocks.m, sums.groups)
+    return cells, drift_in_blocks(drift, blocks, cycle=DAYS_PER_YEAR)
+
+
+def means_p(sums: FleetSums) -> Array:
+    """p-values (c,) of equal means of the days, whatever their scatter: Brown and Forsythe's test."""
+    repeated = sums.repeated_sums
+    with np.errstate(divide="ignore", invalid="ignore"):
+        between = np.maximum(repeated.squares - repeated.offset**2 / repeated.runs, 0.0)
+    moments = VarianceMoments(
+        groups=sums.repeated, runs=repeated.runs, between=between, first=repeated.s2,
+        first_runs=repeated.s2_runs, second=repeated.s4, second_runs=repeated.s4_runs, by_dof=repeated.s4_dof,
+    )  # fmt: skip
+    return brown_forsythe_from_moments(moments)[3]
 
 
 def _limits(db: Database, sums: FleetSums) -> Array:
@@ -167,7 +209,8 @@ def _without_short_histories(sums: FleetSums, drift: CellDrift) -> CellDrift:
     mean = sums.sum_t / sums.groups
     spread = np.sqrt(np.maximum(sums.sum_tt / sums.groups - mean**2, 0.0))
     short = spread < SHORTEST_DAYS / np.sqrt(12.0)
-    return CellDrift(*(np.where(short, np.nan, values) for values in (drift.slope, drift.u, drift.p_value)))
+    columns = (drift.slope, drift.u, drift.p_value, drift.widening)
+    return CellDrift(*(np.where(short, np.nan, values) for values in columns))
 
 
 def _number(value: float) -> float | None:
@@ -183,14 +226,14 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
     if request.model is not None:
         stored = resolve(db, request.model)
         name, version = stored.name, stored.version
-    sums = fleet_sums(db, name, version)
+    sums = fleet_sums(db, name, version, cut=CUT)
     cells, drift = cell_tests(sums)
     drift = _without_short_histories(sums, drift)
     limit = _limits(db, sums)
     q_values = {
         test: control_false_discoveries(p_values, rate=RATE).q_value
         for test, p_values in (
-            ("anova", cells.anova_p), ("bartlett", cells.bartlett_p), ("drift", drift.p_value)
+            ("anova", means_p(sums)), ("bartlett", cells.bartlett_p), ("drift", drift.p_value)
         )
     }  # fmt: skip
     kind, measure, years = _rank(sums, cells, drift, q_values["drift"], limit)
@@ -216,6 +259,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
             anova_q=_number(q_values["anova"][i]),
             slope_per_year=_number(drift.slope[i] * DAYS_PER_YEAR),
             u_slope=_number(drift.u[i] * DAYS_PER_YEAR),
+            slope_widening=_number(drift.widening[i]),
             drift_p=_number(drift.p_value[i]),
             drift_q=_number(q_values["drift"][i]),
             latest=_number(sums.origin[i] + sums.latest[i]),
@@ -242,6 +286,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
             label: int((kind == number).sum()) + sum(row.attention == label for row in volumetric)
             for number, label in enumerate(ATTENTION)
         },
+        not_identified=not_identified(db) if request.model is None else (),
         table=tuple(
             replace(row, rank=rank) for rank, row in enumerate(ranked[: request.top or None], start=1)
         ),
@@ -275,7 +320,7 @@ def _volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
                 n=0 if latest is None else 1, days=0 if latest is None else 1, mean=latest, sd_all=None, sd_pooled=None,
                 between_days=None, bartlett=None, bartlett_p=None, bartlett_q=None, anova_f=None, anova_p=None,
                 anova_q=None, slope_per_year=None, u_slope=None, drift_p=None, drift_q=None, latest=latest,
-                latest_at=None, since=None, limit=limit, years_to_limit=None,
+                slope_widening=None, latest_at=None, since=None, limit=limit, years_to_limit=None,
             )
         )  # fmt: skip
     return rows

@@ -9,7 +9,8 @@ from __future__ import annotations
 from monitor.exceptions import InputError, NotFoundError
 from monitor.methods import methods
 from monitor.methods.model import Model
-from monitor.store import Database, StoredModel, list_models, load_model, save_model
+from monitor.records import Campaign, CurveCampaign
+from monitor.store import Database, StoredModel, list_models, load_model, machine_model, save_model
 
 
 def resolve(db: Database, name: str | None, method: str = "") -> StoredModel:
@@ -28,6 +29,20 @@ def resolve(db: Database, name: str | None, method: str = "") -> StoredModel:
                 raise NotFoundError(f"model '{model}' has no version {version}; it has 1") from error
             raise NotFoundError(f"there is no model '{model}'; there are {', '.join(methods())}") from error
         raise
+
+
+def resolve_for(db: Database, name: str | None, method: str, machine: str | None) -> StoredModel:
+    """The stored model of a name; without one that which the machine is followed by, else the method's own.
+
+    Raises as ``resolve``.
+    """
+    choice = None if name is not None or machine is None else machine_model(db, machine, method)
+    return resolve(db, name, method) if choice is None else load_model(db, choice.model, choice.version)
+
+
+def subject_of(measured: Campaign | CurveCampaign) -> str | None:
+    """The machine that a campaign was measured on; None for a curve."""
+    return measured.machine.id if isinstance(measured, Campaign) else None
 
 
 def label(model: StoredModel) -> str:

@@ -22,7 +22,7 @@ from scipy import stats
 from monitor.store import Database, fleet_sums
 from monitor.store.campaign_runs import gather_runs
 from monitor.store.identified_values import gather_values
-from monitor.workflow.fleet import cell_tests
+from monitor.workflow.fleet import CUT, cell_tests
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
 
@@ -93,7 +93,7 @@ def generate(db: Database, machines: int, weeks: int = WEEKS) -> None:
 def test_a_small_copy_gives_the_numbers_of_the_bare_query(tmp_path: Path) -> None:
     with Database(tmp_path / "fleet.duckdb") as db:
         generate(db, 5, 12)
-        sums = fleet_sums(db)
+        sums = fleet_sums(db, cut=CUT)
         assert sums.runs.tolist() == [12.0 * RUNS] * 5 * len(NAMES)
         cells = cell_tests(sums)[0]
         rows = db.rows(
@@ -107,7 +107,7 @@ def test_a_small_copy_gives_the_numbers_of_the_bare_query(tmp_path: Path) -> Non
 def test_p_values_of_a_small_copy_are_those_of_scipy(tmp_path: Path) -> None:
     with Database(tmp_path / "fleet.duckdb") as db:
         generate(db, 3, 10)
-        sums = fleet_sums(db)
+        sums = fleet_sums(db, cut=CUT)
         cells = cell_tests(sums)[0]
         for i, (machine, parameter) in enumerate(zip(sums.machine, sums.parameter, strict=True)):
             values = db.rows(
@@ -132,7 +132,7 @@ def _cost(work: Callable[[Database], object], db: Database) -> tuple[float, floa
 
 
 def _fleet_table(db: Database) -> None:
-    cell_tests(fleet_sums(db))
+    cell_tests(fleet_sums(db, cut=CUT))
 
 
 def _kept(db: Database) -> None:

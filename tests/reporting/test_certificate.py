@@ -43,6 +43,7 @@ def test_17025_every_letter_of_both_clauses_has_a_field() -> None:
     assert {f"7.8.2.1 {letter}" for letter in "abcdefghijklmnop"} <= set(clauses)
     assert {f"7.8.4.1 {letter}" for letter in "abcdef"} <= set(clauses)
     assert set(ITEMS) == {place.name for place in dataclasses.fields(CertificateRecord)} - {
+        "accepted",
         "accreditation",
         "country",
         "replaces",

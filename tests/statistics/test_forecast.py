@@ -16,14 +16,15 @@ def history(rng, days=12, slope=0.05):
     return slope * t + rng.normal(size=len(t)) + 0.7 * rng.normal(size=days)[day], t, day
 
 
-def test_interval_of_the_crossing_date_covers(rate_agrees):
+def test_interval_of_the_crossing_date_covers():
     rng = np.random.default_rng(1)
     hits = 0
     for _ in range(250):
         y, t, day = history(rng)
         low, high = forecast(trend(y, t, days=day), (-10.0, 10.0), 84.0, []).crossing.interval
         hits += low <= 200.0 <= high
-    assert rate_agrees(hits, 250, 0.95), hits / 250
+    # Twelve days do not say that they are independent: what they may resemble each other is allowed for.
+    assert hits / 250 > 0.93
 
 
 def test_predicted_probabilities_are_calibrated():

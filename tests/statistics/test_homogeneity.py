@@ -31,7 +31,7 @@ def test_homogeneity_holds_what_the_single_tests_say():
         (result.levene, levene),
     ):
         np.testing.assert_array_equal(field.p_value, test(values, days).p_value)
-    assert result.anova_discoveries.called.sum() == 0
+    assert result.mean_discoveries.called.sum() == 0
 
 
 def test_a_group_with_a_single_run_leaves_only_the_tests_that_it_allows():
@@ -45,7 +45,7 @@ def test_a_step_of_one_day_in_one_parameter_alone_is_called():
     days = np.repeat(np.arange(1, 6), 4)
     values = rng.normal(size=(20, 13))
     values[days >= 4, 5] += 6.0
-    called = homogeneity(values, days).anova_discoveries.called
+    called = homogeneity(values, days).mean_discoveries.called
     np.testing.assert_array_equal(np.flatnonzero(called), [5])
 
 
@@ -90,11 +90,11 @@ def test_false_discovery_rate_is_at_most_as_stated():
     for _ in range(300):
         values = rng.normal(size=(20, 40))
         values[days == 4, :10] += 3.0
-        called = homogeneity(values, days, rate=0.1).anova_discoveries.called
+        called = homogeneity(values, days, rate=0.1).mean_discoveries.called
         shares.append(called[10:].sum() / max(called.sum(), 1))
-    # With 30 of 40 true nulls the rate of Benjamini-Hochberg is 0.75 times 0.1.
+    # With 30 of 40 true nulls the rate of Benjamini-Hochberg is 0.75 times 0.1; two tests must agree, so it is below.
     standard_error = np.std(shares) / np.sqrt(len(shares))
-    assert abs(np.mean(shares) - 0.075) < 3.3 * standard_error
+    assert 0.01 < np.mean(shares) < 0.075 + 3.3 * standard_error
 
 
 def test_refusals_say_what_is_needed():

@@ -22,6 +22,7 @@ from monitor.store import Database, FleetSums, fleet_sums, machine_history
 from monitor.store.campaign_runs import gather_runs
 from monitor.store.events import record_event
 from monitor.store.identified_values import gather_values
+from monitor.workflow.fleet import CUT
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd"
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -113,7 +114,7 @@ def digits(computed: float, certified: str | float) -> float:
 def test_nist_strd_anova_through_sql(db: Database, name: str, least: float) -> None:
     certified = json.loads((STRD / "certified_anova.json").read_text(encoding="utf-8"))
     keep(db, "M", strd(name), name)
-    found = cells(fleet_sums(db))
+    found = cells(fleet_sums(db, cut=CUT))
     reached = digits(found.anova_f[0], certified[name]["certified"]["F"])
     assert reached >= least, (name, reached)
 
@@ -129,7 +130,7 @@ def test_the_same_as_from_the_values_themselves_for_days_and_campaigns_of_any_si
             ]
             keep(db, machine, days, f"{machine}{campaign}", factor=1e-3)
             values.setdefault(machine, []).extend(days)
-    sums = fleet_sums(db)
+    sums = fleet_sums(db, cut=CUT)
     assert sums.machine.tolist() == ["A", "B"]
     found = cells(sums)
     for i, machine in enumerate(("A", "B")):
@@ -152,9 +153,9 @@ def test_drift_from_sums_is_the_straight_line_through_the_days(db: Database) -> 
     means = 3.0 + rng.normal(size=8)
     for campaign, mean in enumerate(means):
         keep(db, "A", [[mean - 0.1, mean + 0.1]], f"c{campaign}")
-    sums = fleet_sums(db)
+    sums = fleet_sums(db, cut=CUT)
     found = drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
-    line = trend(means, np.arange(8) * 7.0)
+    line = trend(means, np.arange(8) * 7.0, independent=True)
     assert found.slope[0] == pytest.approx(line.slope, rel=1e-9)
     assert found.u[0] == pytest.approx(line.u_slope, rel=1e-6)
     assert found.p_value[0] == pytest.approx(line.p_value, rel=1e-6)
@@ -168,7 +169,7 @@ def test_only_the_latest_identification_of_a_campaign_counts_and_refused_values_
     db.execute("UPDATE parameter_value SET value = NULL WHERE identification_id = ? AND run = 4", [own])
     db.execute("DELETE FROM identified_values WHERE identification_id = ?", [own])
     keep(db, "A", [[14.0, 15.0]], "b")
-    sums = fleet_sums(db)
+    sums = fleet_sums(db, cut=CUT)
     assert sums.runs.tolist() == [5.0]
     assert sums.groups.tolist() == [3.0]
     assert sums.origin[0] + sums.offset[0] / 5.0 == pytest.approx(13.0)
@@ -181,7 +182,7 @@ def test_machines_may_have_parameters_of_their_own_and_identify_some_of_their_ru
     db.execute("DELETE FROM parameter_value WHERE identification_id = 2 AND run IN (3, 5, 6)")
     db.execute("DELETE FROM identified_values WHERE identification_id = 2")
     keep(db, "B", [[3.0, 6.0]], "c", parameter="EYY")
-    sums = fleet_sums(db)
+    sums = fleet_sums(db, cut=CUT)
     assert list(zip(sums.machine, sums.parameter, sums.groups, sums.runs, strict=True)) == [
         ("A", "EXX", 2.0, 3.0), ("A", "EZZ", 1.0, 2.0), ("B", "EYY", 1.0, 2.0),
     ]  # fmt: skip
@@ -194,7 +195,7 @@ def test_machines_may_have_parameters_of_their_own_and_identify_some_of_their_ru
 def test_groups_that_never_vary_or_stand_alone_say_nothing(db: Database) -> None:
     keep(db, "still", [[1.0, 1.0], [1.0, 2.0]], "a")
     keep(db, "single", [[1.0], [2.0]], "b")
-    found = cells(fleet_sums(db))
+    found = cells(fleet_sums(db, cut=CUT))
     assert np.isnan(found.anova_f[0])
     assert np.isnan(found.bartlett_p).all()
     assert found.anova_f[1] == pytest.approx(1.0)
@@ -208,7 +209,7 @@ def test_of_each_machine_the_days_since_its_last_event_count(db: Database) -> No
     for name, values in days.items():
         for number, day in enumerate(values):
             keep(db, name, [day], f"{name}-{number}")
-    everything = fleet_sums(db)
+    everything = fleet_sums(db, cut=CUT)
     assert np.isnan(everything.since_d).all()
     (began,) = zip(
         *db.rows(
@@ -225,7 +226,7 @@ def test_of_each_machine_the_days_since_its_last_event_count(db: Database) -> No
     record_event(db, "quiet", began[3].replace(tzinfo=UTC), "note", "looked at")
     # Nothing was measured since: nothing is split yet.
     record_event(db, "crashed", began[5].replace(tzinfo=UTC) + timedelta(days=99), "crash", "into the table")
-    sums = fleet_sums(db)
+    sums = fleet_sums(db, cut=CUT)
     assert sums.machine.tolist() == ["crashed", "quiet", "repaired"]
     assert sums.groups.tolist() == [6.0, 6.0, 2.0]
     assert np.isnan(sums.since_d[:2]).all()
@@ -242,9 +243,9 @@ def test_of_each_machine_the_days_since_its_last_event_count(db: Database) -> No
 
 def test_nothing_identified_is_said(db: Database) -> None:
     with pytest.raises(NotFoundError, match="no campaign was identified yet"):
-        fleet_sums(db)
+        fleet_sums(db, cut=CUT)
     with pytest.raises(NotFoundError, match="no campaign was identified with model warm yet"):
-        fleet_sums(db, "warm")
+        fleet_sums(db, "warm", cut=CUT)
 
 
 def test_history_of_one_machine_is_in_the_order_of_time(

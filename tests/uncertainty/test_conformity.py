@@ -47,6 +47,14 @@ def test_joint_of_a_singular_covariance_agrees_with_draws() -> None:
     assert found.joint == pytest.approx(float(plain), abs=5 * math.sqrt(plain * (1 - plain) / 400_000) + 1e-3)
 
 
+def test_every_parameter_is_judged_with_its_own_degrees_of_freedom() -> None:
+    found = conformity([0.0, 0.0], np.eye(2), [-2.0, -2.0], [2.0, 2.0], dof=[5.0, math.inf])
+    assert found.single[0] == pytest.approx(float(stats.t(5).cdf(2.0) - stats.t(5).cdf(-2.0)), abs=1e-12)
+    assert found.single[1] == pytest.approx(0.9544997, abs=1e-7)
+    both = conformity([0.0, 0.0], np.eye(2), [-2.0, -2.0], [2.0, 2.0], dof=5.0)
+    assert found.joint == pytest.approx(both.joint, abs=1e-12)
+
+
 def test_few_degrees_of_freedom_give_the_multivariate_t() -> None:
     rng = np.random.default_rng(4)
     covariance = np.array([[1.0, 0.6], [0.6, 1.0]])

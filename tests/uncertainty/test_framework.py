@@ -50,7 +50,8 @@ def test_gum_h2_output_covariance_has_rank_2_and_k_p_is_for_2(gum, references):
     result = h2_result(references, finite_dof=False)
     assert result.rank == gum("gum_H2")["recomputed_approach_1"]["rank_of_Uy"] == 2
     assert result.k_p == ellipsoid_factor(2)
-    assert result.k_q == rectangle_factor(3)
+    # Three intervals in a plane: less than any bound for three, more than one interval needs.
+    assert 1.96 < result.k_q < rectangle_factor(3)
     finite = h2_result(references)
     assert finite.dof == pytest.approx(4.0)
     assert finite.k_p == pytest.approx(ellipsoid_factor(2, dof=4.0))

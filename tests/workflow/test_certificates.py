@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import re
 import shutil
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pypdf
 import pytest
+from scipy import stats
 
 from monitor.cli import main
 from monitor.documents import from_document, to_document
@@ -204,11 +206,12 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: RunUncertainty) -> No
     result, english = results_of(as_stated(found), texts_of()), texts_of()
 
     def stated(rule: str) -> ConformityStatement:
-        return statement_of(result, rule, english, campaign="limited", dof=guf.dof)
+        freedoms = dict(zip(guf.names, map(float, guf.dof_by_output), strict=True))
+        return statement_of(result, rule, english, campaign="limited", freedoms=freedoms)
 
     verdicts = {
         rule: {one.name: one.verdict for one in stated(rule).verdicts}
-        for rule in ("simple", "guard", "probability")
+        for rule in ("simple", "guard", "probability", "iso14253", "ilac")
     }
     for name, value, width in zip(LIMITS, y, expanded, strict=True):
         limit = LIMITS[name]
@@ -221,6 +224,18 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: RunUncertainty) -> No
     assert verdicts["guard"]["EXX"] == "conditional pass"
     assert verdicts["guard"]["EA0B"] == "pass"
     assert verdicts["probability"]["EX0C"] == "fail"
+    assert verdicts["iso14253"] == verdicts["probability"]
+    u = {name: width / guf.k_q for name, width in zip(LIMITS, expanded, strict=True)}
+    freedoms = dict(zip(guf.names, map(float, guf.dof_by_output), strict=True))
+    # ILAC-G8 4.2.3 with U at 95.45 %, ISO 14253-1 with the one-sided 95 %: Student's t of each parameter.
+    for rule, quantile in (("ilac", 0.97725), ("iso14253", 0.95)):
+        for judged in stated(rule).verdicts:
+            w = float(stats.t(freedoms[judged.name]).ppf(quantile)) * u[judged.name]
+            assert judged.guard_band == pytest.approx(w, rel=1e-6)
+            if rule == "ilac":
+                value = dict(zip(LIMITS, y, strict=True))[judged.name]
+                assert (judged.verdict == "pass") == (value <= LIMITS[judged.name] - w)
+                assert judged.verdict != "pass" or judged.probability >= 0.977
     for one in stated("probability").verdicts:
         assert (one.verdict == "pass") == (one.probability >= 0.95)
     joint = stated("simple").joint_probability
@@ -229,11 +244,32 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: RunUncertainty) -> No
 
 def test_17025_7_8_6_the_rule_the_risk_and_the_joint_probability_are_printed(guarded: Path) -> None:
     text = " ".join(" ".join(page.extract_text().split()) for page in pypdf.PdfReader(guarded).pages)
-    assert "Guard band w = U (ILAC-G8:09/2019, 4.2.3; ISO 14253-1:2017)" in text
+    assert "Simultaneous guard band of all 13 parameters together, w = U = k_q u" in text
     assert "Risk: all statements 'pass' hold at once with at least the coverage probability 95 %" in text
     assert "Joint probability that all 3 parameters lie within their tolerances" in text
-    assert "EXX ± 60.0 µm/m" in text
+    assert re.search(r"EXX ± 60\.0 \d+ µm/m", text)
     assert "conditional pass" in text
+
+
+def test_jcgm106_9_5_the_global_risks_of_a_rule_are_those_of_drawn_machines(found: RunUncertainty) -> None:
+    result = results_of(as_stated(found), texts_of())
+    freedoms = dict.fromkeys(result.names, math.inf)
+    u, limit, spread = float(result.u[result.names.index("EXX")]), LIMITS["EXX"], 40.0
+    rng = np.random.default_rng(106)
+    true = rng.normal(0.0, spread, 2_000_000)
+    seen = np.abs(rng.normal(true, u))
+    outside = np.abs(true) > limit
+    for rule, w in (("simple", 0.0), ("ilac", 2.0 * u), ("guard", result.k_q * u), ("iso14253", 1.6449 * u)):
+        statement = statement_of(
+            result, rule, texts_of(), campaign="limited", freedoms=freedoms, process={"EXX": spread}
+        )
+        judged = next(verdict for verdict in statement.verdicts if verdict.name == "EXX")
+        passed = seen <= limit - w
+        assert judged.consumers_risk == pytest.approx(float(np.mean(passed & outside)), abs=4e-4)
+        assert judged.producers_risk == pytest.approx(float(np.mean(~passed & ~outside)), abs=8e-4)
+        assert "EXX 40" in str(statement.process)
+    with pytest.raises(InputError, match="--process EYY: only EA0B, EX0C, EXX have a result and a tolerance"):
+        statement_of(result, "ilac", texts_of(), campaign="limited", freedoms=freedoms, process={"EYY": 3.0})
 
 
 def test_no_tolerance_no_statement(db: Database, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
 from monitor.workflow.models import resolve
 from monitor.workflow.uncertainty.evaluation import evaluate, uncertainty
-from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.request import Asked, UncertaintyRequest
 from monitor.workflow.uncertainty.result import RunUncertainty
 from monitor.workflow.uncertainty.stored import StatedUncertainty, restored, stored_uncertainty
 
@@ -130,7 +130,7 @@ def test_a_result_that_was_asked_for_something_else_is_not_taken(db: Database, t
     axes = read_linear_axes(EXAMPLES / "linear-axes.toml")
     uncertainty(db, UncertaintyRequest("tilting-table", 4, method="guf", linear_axes=axes))
     assert stored_uncertainty(db, turned, 4, rotary) is None
-    assert stored_uncertainty(db, turned, 4, rotary, axes) is not None
+    assert stored_uncertainty(db, turned, 4, rotary, Asked(linear_axes=axes)) is not None
 
 
 def test_a_result_of_another_version_or_an_altered_one_is_no_source(db: Database, tmp_path: Path) -> None:

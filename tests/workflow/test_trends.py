@@ -277,7 +277,9 @@ def test_a_selection_is_a_group_and_feeds_the_uncertainty(campaigns: Database) -
     assert within.vector.manova.why == "the runs form 1 group (1); at least 2 are needed"
     apart = stats(campaigns, StatisticsRequest("hot-cold", by="hot-cold-star"))
     assert apart.groups == {"hot-cold-star": 33, "not hot-cold-star": 11}
-    assert apart.parameters["EYY"].anova_q < 1e-4
+    # Eleven runs of a machine that warms up scatter more: the classical p-value does not hold, the larger of two does.
+    assert apart.parameters["EYY"].anova_p < 1e-4
+    assert apart.parameters["EYY"].anova_q < 0.01
     assert "has 11 runs for 11 parameters" in apart.vector.box_m.why
     own = uncertainty(
         campaigns,

@@ -15,6 +15,9 @@ from monitor.workflow.fleet import FleetRequest, FleetTableRow, fleet
 
 EXAMPLE = "monitor fleet --top 50"
 
+#: Campaigns that are named where they lack numbers.
+MOST_NAMED = 10
+
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
@@ -45,6 +48,14 @@ def run(options: Namespace) -> int:
     for attention, count in answer.attention.items():
         if count:
             output.say(f"{count} of {answer.rows}: {attention}")
+    if answer.not_identified:
+        names = ", ".join(answer.not_identified[:MOST_NAMED]) + ", ..." * (
+            len(answer.not_identified) > MOST_NAMED
+        )
+        output.say(
+            f"not identified by the model that their machine is followed by, and left out: {names}; "
+            f"type `monitor identify {answer.not_identified[0]}`"
+        )
     return 0
 
 

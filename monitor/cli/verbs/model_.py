@@ -13,16 +13,22 @@ from monitor.cli.residual_output import files, four_digits
 from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 from monitor.workflow.explain.versions import history
-from monitor.workflow.model.answer import ChangeModelAnswer
-from monitor.workflow.model.change import add_effect, remove_effect
-from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest, ShowModelRequest
+from monitor.workflow.model.answer import AffectedAnswer, ChangeModelAnswer
+from monitor.workflow.model.change import add_effect, affected, remove_effect
+from monitor.workflow.model.request import (
+    AddEffectRequest,
+    RemoveEffectRequest,
+    ShowModelRequest,
+    UseModelRequest,
+)
 from monitor.workflow.model.show import list_all_models, show_model
+from monitor.workflow.model.use import use_model
 
 EXAMPLE = 'monitor model add "EXX:reversal" --to samba --as with-reversal --campaign hidden-reversal-x'
 
 
 def options(parser: ArgumentParser) -> None:
-    verbs = parser.add_subparsers(dest="what", metavar="list|show|add|remove|history", required=True)
+    verbs = parser.add_subparsers(dest="what", metavar="list|show|add|remove|use|history", required=True)
     listed = verbs.add_parser("list", **described("all models and versions", "monitor model list"))
     listed.set_defaults(run=_list)
     shown = verbs.add_parser("show", **described("what a model contains", "monitor model show with-reversal"))
@@ -34,6 +40,9 @@ def options(parser: ArgumentParser) -> None:
     added.add_argument("--as", dest="as_", metavar="NEW", help="another name for the new version")
     added.add_argument("--note", default="", help="why")
     added.add_argument("--campaign", metavar="CAMPAIGN", help="where the error is shown before and after")
+    added.add_argument(
+        "--dry-run", action="store_true", help="only say for whom the model would change; nothing is written"
+    )
     added.set_defaults(run=_add)
     removed = verbs.add_parser(
         "remove",
@@ -47,6 +56,17 @@ def options(parser: ArgumentParser) -> None:
     )
     removed.add_argument("--as", dest="as_", metavar="NEW", help="another name for the new version")
     removed.set_defaults(run=_remove)
+    used = verbs.add_parser(
+        "use",
+        **described(
+            "follow a machine by this model from now on: trend, report, certificate, fleet",
+            "monitor model use with-reversal --machine HU40-T --reason 'backlash of X since May'",
+        ),
+    )
+    used.add_argument("name", metavar="NAME", help="the model, or a version of it: NAME@2")
+    used.add_argument("--machine", required=True, metavar="ID", help="the machine")
+    used.add_argument("--reason", required=True, metavar="TEXT", help="why; it is stored")
+    used.set_defaults(run=_use)
     past = verbs.add_parser(
         "history",
         **described(
@@ -57,7 +77,7 @@ def options(parser: ArgumentParser) -> None:
     past.add_argument("--campaign", metavar="CAMPAIGN", help="default: where it was last compared")
     past.add_argument("--figures", type=Path, metavar="DIR", help="draw how the error falls")
     past.set_defaults(run=_history)
-    for verb in (listed, shown, added, removed, past):
+    for verb in (listed, shown, added, removed, used, past):
         common(verb)
 
 
@@ -98,10 +118,54 @@ def _show(options: Namespace) -> int:
 
 def _add(options: Namespace) -> int:
     request = AddEffectRequest(options.effect, options.to, options.as_, options.note, options.campaign)
-    # One transaction: a campaign that is not there leaves no model behind.
-    with opened(options) as db, output.working("fitting"), db.transaction():
-        answer = add_effect(db, request)
+    with opened(options) as db:
+        changed = affected(db, request)
+        if not options.json and (changed.in_use or options.dry_run):
+            _will_change(changed)
+        if options.dry_run:
+            if options.json:
+                output.document(changed)
+            return 0
+        # One transaction: a campaign that is not there leaves no model behind.
+        with output.working("fitting"), db.transaction():
+            answer = add_effect(db, request)
     return _changed(answer, options.json)
+
+
+def _will_change(changed: AffectedAnswer) -> None:
+    """Say before anything is written for whom the model changes."""
+    if not changed.in_use:
+        output.say("a new model: nothing changes for any machine until `monitor model use` gives it one")
+        return
+    name = changed.name
+    output.say(
+        f"this makes {name}@{changed.next_version}, which '{name}' means from then on, for everybody (--as NEW leaves "
+        f"{name} alone)"
+    )
+    if changed.changed:
+        output.say(
+            f"followed by it from then on, and identified anew: {', '.join(changed.changed)} "
+            f"(`monitor model use NEW --machine ID` gives a model to one machine)"
+        )
+    if changed.keep:
+        output.say(f"these keep the model that was chosen for them: {', '.join(changed.keep)}")
+
+
+def _use(options: Namespace) -> int:
+    request = UseModelRequest(options.name, options.machine, options.reason)
+    with opened(options) as db, output.working("identifying"):
+        answer = use_model(db, request)
+    if options.json:
+        output.document(answer)
+        return 0
+    output.say(
+        f"{answer.machine} is followed by {answer.model} ({answer.method}) from now on, before by {answer.before}"
+    )
+    if answer.identified:
+        output.say(f"identified by it: {', '.join(answer.identified)}")
+    for campaign, why in answer.failed.items():
+        output.say(f"left out of its history, as it cannot be identified: {campaign}: {why}")
+    return 0
 
 
 def _remove(options: Namespace) -> int:

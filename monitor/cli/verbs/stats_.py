@@ -58,7 +58,8 @@ def run(options: Namespace) -> int:
     _parameters(answer)
     if answer.moved:
         output.say(
-            f"the groups differ in {', '.join(answer.moved)} (ANOVA, false discovery rate q below {DIFFERENT:g})"
+            f"the groups differ in {', '.join(answer.moved)} (means, whatever the scatter of each; false "
+            f"discovery rate q below {DIFFERENT:g})"
         )
     _vector("equal covariances", answer.vector.box_m)
     _vector("equal means", answer.vector.manova)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
+from monitor.cli.behind import add_behind, further_sources
+from monitor.cli.budget_output import behind
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.readers import read_linear_axes
+from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.frames import frame_words, sum_words
+from monitor.reporting.numbers import written_factor
 from monitor.workflow.uncertainty.answer import MonteCarloAnswer, UncertaintyAnswer, ValidationAnswer
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
@@ -49,6 +54,7 @@ def options(parser: ArgumentParser) -> None:
         "--linear-axes", type=Path, metavar="FILE",
         help="errors of the linear axes as standard uncertainties (TOML), for methods that take these axes as known",
     )  # fmt: skip
+    add_behind(parser)
     parser.add_argument("--workers", type=int, metavar="N", help="spread the trials over N processes")
     parser.add_argument(
         "--cluster", metavar="ADDRESS", help="spread them over a Dask cluster, such as tcp://host:8786"
@@ -69,6 +75,8 @@ def run(options: Namespace) -> int:
         workers=options.workers,
         cluster=options.cluster,
         linear_axes=None if options.linear_axes is None else read_linear_axes(options.linear_axes),
+        sources=further_sources(options.sources),
+        holds_for=options.holds_for,
     )
     with opened(options) as db, output.working("propagating"):
         answer = uncertainty(db, request)
@@ -78,10 +86,11 @@ def run(options: Namespace) -> int:
     _parameters(answer)
     _machine_frame(answer)
     _coverage(answer)
+    behind(answer)
     if answer.mcm is not None:
         _monte_carlo(answer.mcm)
     if answer.validation is not None:
-        _validation(answer, answer.validation)
+        _validation(answer.validation)
     if answer.lack_of_fit_causes is not None:
         causes = ", ".join(cause.effect for cause in answer.lack_of_fit_causes[:3])
         output.say(
@@ -145,9 +154,18 @@ def _coverage(answer: UncertaintyAnswer) -> None:
     """Where the readings' covariance is from, and the factors for all parameters together."""
     framework, count = answer.guf, len(answer.parameters)
     output.say(f"readings: {answer.input_covariance}")
+    sampling = framework.coverage_sampling or FactorSampling(0, 0, 0.0, 0.0)
+    k_q = written_factor(
+        framework.k_q_with_degrees_of_freedom or math.inf, standard_error=sampling.k_q_standard_error
+    )
+    k_p = framework.k_p_with_degrees_of_freedom
+    ellipsoid = (
+        "no ellipsoid, whose covariance would need more degrees of freedom than parameters"
+        if k_p is None
+        else f"ellipsoid k_p = {written_factor(k_p, standard_error=sampling.k_p_standard_error)}"
+    )
     output.say(
-        f"all {count} together with p = {answer.p:g}: intervals U = {framework.k_q_with_degrees_of_freedom:.2f} u "
-        f"(k_q), ellipsoid k_p = {framework.k_p_with_degrees_of_freedom or float('inf'):.2f}; for a known covariance "
+        f"all {count} together with p = {answer.p:g}: intervals U = {k_q} u (k_q), {ellipsoid}; for a known covariance "
         f"(JCGM 102) k_q = {framework.k_q:.2f}, k_p = {framework.k_p:.2f}"
     )
     if framework.joint_coverage_of_k_2_each is not None:
@@ -163,13 +181,15 @@ def _monte_carlo(sampled: MonteCarloAnswer) -> None:
     )
 
 
-def _validation(answer: UncertaintyAnswer, validation: ValidationAnswer) -> None:
-    failed = ", ".join(validation.failed) or "undecided"
-    verdict = "passed" if validation.passed else f"not passed: {failed}"
-    output.say(f"validation of the framework by Monte Carlo (JCGM 102, 8): {verdict}")
-    framework, sampled = answer.guf, answer.mcm
-    if validation.failed == ("k_q",) and sampled is not None and framework.k_q > sampled.k_q:
+def _validation(validation: ValidationAnswer) -> None:
+    if validation.passed:
         output.say(
-            f"   the framework's k_q = {framework.k_q:.2f} holds whatever the correlations (Bonferroni); these would "
-            f"allow {sampled.k_q:.2f}, so its intervals are on the safe side"
+            "validation of the framework by Monte Carlo (JCGM 102, 8): passed; "
+            f"{', '.join(validation.confirmed)} of a known covariance agree, so that the linearisation is confirmed"
         )
+        return
+    failed = ", ".join(validation.failed) or "undecided within the scatter of the Monte Carlo"
+    output.say(
+        f"validation of the framework by Monte Carlo (JCGM 102, 8): not passed: {failed}; confirmed: "
+        f"{', '.join(validation.confirmed) or 'nothing'}"
+    )

@@ -15,7 +15,7 @@ import scipy
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.plan_cells import plan_cells
-from monitor.machine import MOTION
+from monitor.methods.chain.gross import off_reading
 from monitor.methods.chain.least_squares import eliminate
 from monitor.records import Array
 
@@ -114,22 +114,6 @@ def _statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], 
     )
 
 
-def _as_reading(fit: Fit, row: int, vector: Array) -> tuple[str, float]:
-    """The reading that explains most of a residual (d,), and by how much it is off, in mm."""
-    chain = fit.problem.context.chain
-    linear = fit.problem.measured_joints
-    if not linear:
-        most = int(np.abs(vector).argmax())
-        return fit.problem.components[most], float(vector[most])
-    directions = np.array(
-        [np.array(chain.joints[joint].direction) * chain.joints[joint].sign for joint in linear]
-    )
-    shifts = np.einsum("nrac,ac->nra", fit.by_error[:, :, linear, MOTION, :3], directions)
-    off = np.linalg.pinv(fit.problem.observe(shifts)[row]) @ vector
-    most = int(np.abs(off).argmax())
-    return chain.joints[linear[most]].name.lower(), float(off[most])
-
-
 def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     """The worst point of every run that is too far off, at a false-alarm probability ``alpha`` a campaign."""
     deviations = _deviations(fit)
@@ -151,7 +135,7 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
         p = float(scipy.special.chdtrc(rank[worst], chi_square[worst]))
         row, size = int(rows[worst]), sizes[worst]
         if p * tests <= alpha:
-            axis, off = _as_reading(fit, row, size * fit.problem.sigma[row])
+            axis, off = off_reading(fit.problem, fit.by_error, row, size * fit.problem.sigma[row])
             points.append(
                 BadPoint(
                     row=row,

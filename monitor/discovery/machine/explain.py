@@ -26,7 +26,12 @@ from monitor.discovery.machine.steps import Step, find_steps
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.machine.suspects import Suspects, find_suspects, with_effects
 from monitor.discovery.machine.tables import ChainScan
-from monitor.discovery.machine.variants import cycles_of_unknown_pitch, resolvable, variants_of
+from monitor.discovery.machine.variants import (
+    cycles_of_unknown_pitch,
+    resolvable,
+    variants_of,
+    without_part_periods,
+)
 from monitor.discovery.machine.varying import varying_effects
 from monitor.discovery.search.comparison import Verdict
 from monitor.effects.catalogue import catalogue
@@ -83,7 +88,10 @@ def _variants(campaign: Campaign, problem: ChainProblem, drivers: Sequence[str])
     texts = [effect.text for effect in (*problem.base, *problem.added)]
     chain = problem.context.chain
     effects = catalogue(chain, texts, drivers, pitches, problem.method_effects(drivers))
-    variants = [variant for effect in effects for variant in variants_of(effect)]
+    shown = filter(problem.can_show, effects)
+    variants = [variant for effect in shown for variant in variants_of(effect)]
+    if problem.needs_whole_periods:
+        variants = without_part_periods(variants, problem.context)
     return [*variants, *resolvable(cycles_of_unknown_pitch(chain), problem.context)]
 
 
@@ -95,18 +103,21 @@ def explain(
     rate: float = 0.01,
     rng: np.random.Generator,
     first: Fit | None = None,
+    gross: Sequence[BadPoint] = (),
 ) -> Explanation:
     """Explain what a model lacks. ``rate`` is the false discovery rate of each scan; ``rng`` serves the step search;
-    ``first`` is the fit of ``problem`` where it is known.
+    ``first`` is the fit of ``problem`` where it is known, with the ``gross`` readings left out.
 
     Raises DataError where the model cannot be fitted.
     """
     foreseen = problem.for_search()
     # The fit of the problem as it is serves only where nothing else is foreseen.
-    first = fit(foreseen) if first is None or foreseen is not problem else first
+    certain = Suspects({point.row: point for point in gross})
+    if first is None or foreseen is not problem:
+        first = fit(foreseen, certain.left_out(foreseen) if gross else None)
     surroundings = surroundings_of(campaign, foreseen)
     variants = _variants(campaign, foreseen, surroundings.drivers)
-    search = _search(first, foreseen, variants, surroundings.drivers, rate)
+    search = _search(first, foreseen, variants, surroundings.drivers, rate, certain)
     suspects = search.suspects
     missing = missing_effects(search.scene, search.result, search.refined, surroundings)
     if suspects.varying:
@@ -133,15 +144,21 @@ def explain(
 
 
 def _search(
-    first: Fit, problem: ChainProblem, variants: Sequence[ChainVariant], drivers: Sequence[str], rate: float
+    first: Fit,
+    problem: ChainProblem,
+    variants: Sequence[ChainVariant],
+    drivers: Sequence[str],
+    rate: float,
+    suspects: Suspects,
 ) -> _Search:
-    """Search effects and suspects in turn, each under the others, until nothing changes."""
-    suspects = Suspects()
+    """Search effects and suspects in turn, each under the others and the ``suspects`` that ``first`` leaves out, until
+    nothing changes."""
+    gross = suspects
     correlation: Correlation | None = None
     unfitted: list[str] = []
     for _ in range(MOST_ROUNDS):
         out, single = suspects.left_out(problem), suspects.effects(problem)
-        current = fit(with_effects(problem, single), out, first) if suspects.any else first
+        current = first if suspects.same_as(gross) else fit(with_effects(problem, single), out, first)
         current = current.with_correlation(correlation)
         able = [variant for variant in variants if variant.family not in unfitted]
         scene, result = search_chain(scene_of(current, able), drivers, rate)
@@ -161,9 +178,9 @@ def _search(
             continue
         # Readings are judged under the present effects, again from the start: what looked bad without them may be good.
         begin = under
-        if suspects.any:
-            begin = fit(with_effects(problem, effects), None, current)
-        more = find_suspects(begin, problem, effects, Suspects(), able, scene if begin is current else None)
+        if not suspects.same_as(gross):
+            begin = fit(with_effects(problem, effects), gross.left_out(problem), current)
+        more = find_suspects(begin, problem, effects, gross, able, scene if begin is current else None)
         if more.same_as(suspects):
             break
         suspects = more

@@ -70,7 +70,12 @@ class Fit:
     @property
     def readings(self) -> int:
         """The count of numbers that have weight, calibrated quantities aside."""
-        return int(self.vectors.shape[1]) * int((~self.left_out).sum())
+        return int(self.has_weight.sum())
+
+    @cached_property
+    def has_weight(self) -> npt.NDArray[np.bool_]:
+        """The numbers (n, d) that have weight: those of rows left out and those that were not read have none."""
+        return np.isfinite(self.problem.sigma) & ~self.left_out[:, None]
 
     @cached_property
     def nuisance(self) -> Nuisance:
@@ -143,12 +148,12 @@ class Fit:
     @property
     def rms(self) -> float:
         """Root mean square in mm of the residuals that have weight."""
-        return float(np.sqrt(np.mean(self.vectors[~self.left_out] ** 2)))
+        return float(np.sqrt(np.mean(self.vectors[self.has_weight] ** 2)))
 
     @property
     def sigma(self) -> float:
         """Root mean square in mm of the stated standard uncertainty of a coordinate."""
-        return float(np.sqrt(np.mean(self.problem.sigma[~self.left_out] ** 2)))
+        return float(np.sqrt(np.mean(self.problem.sigma[self.has_weight] ** 2)))
 
     @property
     def scale(self) -> float:

@@ -69,6 +69,8 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
         # The two columns are all but orthogonal and of the same length over many positions.
         square = (cosine @ turn) ** 2 + (sine @ turn) ** 2
         power = 2.0 * square / max(float(weight.sum()), 1e-300) / variance
+        # Less than one period over the travel is a bend, not a gear.
+        power = np.where(orders * float(np.ptp(positions[:, index])) < 2.0 * np.pi, 0.0, power)
         peaks = np.flatnonzero((power > limit) & (power >= np.roll(power, 1)) & (power >= np.roll(power, -1)))
         term = f"E{COMPONENTS[3 + joint.main]}{joint.name}"
         for peak in peaks[np.argsort(-power[peaks])][:MOST_PEAKS]:

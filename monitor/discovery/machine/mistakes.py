@@ -14,6 +14,7 @@ import numpy as np
 from monitor.discovery.machine.column_mistakes import column_mistakes
 from monitor.discovery.machine.cures import Maker, Mistake, cured_rms
 from monitor.discovery.machine.fit import Fit
+from monitor.discovery.machine.robust import RobustFit
 from monitor.discovery.machine.target_mistakes import relabelled
 from monitor.methods import campaign_method
 from monitor.records import Campaign
@@ -51,6 +52,17 @@ def find_mistakes(campaign: Campaign, problem_of: Maker, fit: Fit | None) -> tup
         if rms <= 2.0 * best and (after := cured_rms(undo(campaign), problem_of, before)) is not None
     ]
     return tuple(sorted(mistakes, key=lambda mistake: mistake.rms_undone))
+
+
+def find_other_names(campaign: Campaign, problem_of: Maker, first: RobustFit) -> tuple[Mistake, ...]:
+    """The mistake that the gross readings of a first fit stand under the name of another target; empty where not."""
+    if not first.gross:
+        return ()
+    fit = first.fit
+    # With the weight that the rows had as recorded: what is tried is that they are right, but for their names.
+    as_recorded = Fit(problem_of(campaign), fit.solution, np.zeros_like(fit.left_out))
+    other_names = relabelled(campaign, problem_of, as_recorded)
+    return () if other_names is None else (other_names,)
 
 
 def _worst_run(campaign: Campaign, fit: Fit | None) -> Campaign:

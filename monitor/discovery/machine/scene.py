@@ -18,7 +18,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.held_out import PoseFold, held_out_by_poses, pose_folds, pose_parts
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
 from monitor.discovery.search.held_out import held_out_rms, held_out_sum
-from monitor.effects import ArtefactEffect, ChainEffect
+from monitor.effects import ParsedEffect
 from monitor.exceptions import EffectError
 from monitor.methods.chain.shared_effects import largest_coefficient
 from monitor.records import Array
@@ -29,7 +29,7 @@ ROUNDING = 1e-9
 # over some 300 candidates lies at 4.2.
 DETECTABLE = 5.0
 
-MachineEffect: TypeAlias = ChainEffect | ArtefactEffect
+MachineEffect: TypeAlias = ParsedEffect
 ChainVariant: TypeAlias = Variant[MachineEffect]
 
 

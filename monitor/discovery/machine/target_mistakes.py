@@ -66,7 +66,7 @@ def _better_names(
     as_recorded = squares[np.searchsorted(names, problem.context.target), rows]
     best = np.argmin(squares, axis=0)
     better = squares[best, rows] < BETTER_SHARE**2 * as_recorded
-    better &= np.sqrt(as_recorded) > CURED_TIMES * problem.sigma.max()
+    better &= np.sqrt(as_recorded) > CURED_TIMES * problem.sigma[np.isfinite(problem.sigma)].max()
     return np.where(better, names[best], recorded) if better.any() else None
 
 

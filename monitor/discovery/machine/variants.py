@@ -10,10 +10,11 @@ import numpy as np
 
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
-from monitor.effects import ChainEffect, Context, parse_effect, with_time_constant
+from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, WarmUp, parse_driver
-from monitor.effects.shapes import Compliance, Cyclic
-from monitor.effects.weight import Load
+from monitor.effects.drivers.gravity import Gravity
+from monitor.effects.shapes import Compliance, Cyclic, Harmonic
+from monitor.effects.weight import LinkWeights, Load
 from monitor.machine import COMPONENTS, Chain
 from monitor.records import Array
 
@@ -30,6 +31,33 @@ GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.05, 6
 # A driver that hardly varies makes nearly the same columns as none; where the data cannot decide, the plain effect
 # leads and the driven one is reported as its rival. 2 log 400 = 12 is what counts as decided.
 ODDS_OF_A_DRIVER = 400.0
+
+
+# Odds against what is named beside a finding and never found itself; any evidence of a campaign is smaller.
+NEVER_FOUND = 1e300
+# A period counts as travelled a little before its end.
+WHOLE_PERIOD = 0.95
+
+
+def without_part_periods(variants: Iterable[ChainVariant], context: Context) -> list[ChainVariant]:
+    """The variants, with what an axis did not travel one period of never found, only named as rivals.
+
+    Over a part of a period a cosine and a sine are a bend of any cause, and so are the components of gravity in the
+    frame of an axis, each with a coefficient of its own.
+    """
+    travel = np.ptp(context.positions, axis=0)
+    checked = []
+    for variant in variants:
+        effect, periods = variant.effect, 0.0
+        if isinstance(effect, ChainEffect):
+            if isinstance(effect.shape, Harmonic):
+                periods = effect.shape.order
+            elif isinstance(effect.driver, Gravity | LinkWeights):
+                periods = 1.0
+            part = 0.0 < periods * travel[effect.term.joint] < WHOLE_PERIOD * 2.0 * np.pi
+            variant = replace(variant, odds=NEVER_FOUND) if part else variant
+        checked.append(variant)
+    return checked
 
 
 def variants_of(effect: MachineEffect) -> list[ChainVariant]:
@@ -118,7 +146,7 @@ def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVar
 
 def each_run(effect: MachineEffect) -> ChainVariant | None:
     """The effect with another size in every run; None where it has a driver already."""
-    if not isinstance(effect, ChainEffect) or not isinstance(effect.driver, Always):
+    if not isinstance(effect, ChainEffect | TurnEffect) or not isinstance(effect.driver, Always):
         return None
     varying = replace(effect, driver=EachRun(), driver_text="each_run")
     return Variant(varying.text, varying)

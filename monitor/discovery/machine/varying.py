@@ -13,7 +13,7 @@ from monitor.discovery.machine.refine import refine_all
 from monitor.discovery.machine.run_evidence import weigh_in_each_run
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.surroundings import Surroundings
-from monitor.discovery.machine.variants import each_run, with_drivers
+from monitor.discovery.machine.variants import NEVER_FOUND, each_run, with_drivers
 from monitor.discovery.search.evidence import Evidence
 from monitor.discovery.search.scan import scan
 
@@ -61,6 +61,7 @@ def most_varying(
         variant
         for variant in variants
         if variant.tries == 1
+        and variant.odds < NEVER_FOUND
         and (varying := each_run(variant.effect)) is not None
         and varying.effect.text not in added
     ]
@@ -88,7 +89,11 @@ def varying_effects(
     Where a recorded column follows the sizes, the effect with that driver explains as much with one coefficient,
     and is the finding.
     """
-    bare = [variant for variant in others if variant.tries == 1 and each_run(variant.effect) is not None]
+    bare = [
+        variant
+        for variant in others
+        if variant.tries == 1 and variant.odds < NEVER_FOUND and each_run(variant.effect) is not None
+    ]
     weighed = _weigh(scene_of(steady, bare), bare)
     close = [evidence for evidence in weighed if evidence.score > weighed[0].score - CLOSE][:MOST_RIVALS]
     names = {effect.text for effect in effects}

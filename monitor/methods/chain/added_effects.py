@@ -12,7 +12,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from monitor.effects import ArtefactEffect, Basis, ChainEffect, Context, Effect, with_time_constant
+from monitor.effects import Basis, Context, Effect, ParsedEffect, with_time_constant
 from monitor.effects.drivers import WarmUp
 from monitor.records import Array
 
@@ -26,7 +26,7 @@ STEP = 1e-4
 
 def is_searched(effect: Effect) -> bool:
     """Whether the effect's time constant has to be estimated."""
-    driver = effect.driver if isinstance(effect, (ChainEffect, ArtefactEffect)) else None
+    driver = effect.driver if isinstance(effect, ParsedEffect) else None
     return isinstance(driver, WarmUp) and driver.time_constant_s is None
 
 
@@ -56,7 +56,7 @@ class Added:
 
     def _at(self, logarithm: float) -> Basis:
         tau = float(np.exp(np.clip(logarithm, np.log(SHORTEST_S), np.log(LONGEST_S))))
-        assert isinstance(self.effect, (ChainEffect, ArtefactEffect))
+        assert isinstance(self.effect, ParsedEffect)
         return with_time_constant(self.effect, tau).basis(self.context)
 
     def displacement(self, unknowns: Array, by_error: Array) -> Array:
@@ -94,7 +94,7 @@ def resolved(added: Sequence[Added], common: Array) -> tuple[tuple[Effect, ...],
         unknowns = common[columns]
         coefficients.append(unknowns[: term.size])
         if term.searched:
-            assert isinstance(term.effect, (ChainEffect, ArtefactEffect))
+            assert isinstance(term.effect, ParsedEffect)
             effects.append(with_time_constant(term.effect, float(np.exp(unknowns[-1]))))
         else:
             effects.append(term.effect)

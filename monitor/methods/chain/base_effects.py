@@ -125,6 +125,14 @@ def _generic_jacobian_outside(chain: Chain) -> tuple[Array, Array]:
     return by_error.reshape(3 * count, len(chain.joints), 2, 6), explained.reshape(3 * count, -1)
 
 
+def location_candidates(chain: Chain, outside: bool | None = None) -> list[tuple[Joint, int]]:
+    """Location errors that can be free, joint and component, in the order of preference; ``outside`` as for
+    ``base_effects``."""
+    if outside is None:
+        outside = len(chain.of_kind("linear")) < 3
+    return (_candidates_outside if outside else _candidates)(chain)
+
+
 @cache
 def base_effects(chain: Chain, outside: bool | None = None) -> tuple[str, ...]:
     """The effects of a complete and minimal model of a chain, location errors in chain order, then gains.
@@ -136,7 +144,7 @@ def base_effects(chain: Chain, outside: bool | None = None) -> tuple[str, ...]:
     by_error, explained = (_generic_jacobian_outside if outside else _generic_jacobian)(chain)
     basis = np.linalg.qr(explained / np.linalg.norm(explained, axis=0))[0]
     selected: set[tuple[str, int]] = set()
-    for joint, component in (_candidates_outside if outside else _candidates)(chain):
+    for joint, component in location_candidates(chain, outside):
         column = by_error[:, chain.index(joint.name), 0, component]
         remainder = column - basis @ (basis.T @ column)
         remainder -= basis @ (basis.T @ remainder)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from monitor.methods.chain.gross import GrossReading
+from monitor.methods.chain.shared_effects import FollowedEffects
 from monitor.records import Array
 from monitor.refusal import Refusal
 from monitor.units import Unit
@@ -33,11 +35,23 @@ class RunIdentification:
 
 
 @dataclass(frozen=True)
+class TakenUp:
+    """An error that has no number of its own, whatever the plan: the free ones, or unknown frames and places, ``by``
+    which it is taken up; none where the readings see nothing of it."""
+
+    parameter: str
+    by: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Identification:
     """All runs of a campaign under one model.
 
     ``parameters`` names the k base parameters, ``units`` their display units. ``added`` names the parameters
-    common to all runs, with ``added_estimate`` (c,) and ``added_covariance`` (c, c) in internal units.
+    common to all runs, with ``added_estimate`` (c,) and ``added_covariance`` (c, c) in internal units. ``gross``
+    readings are wrong beyond doubt, and so are the numbers of their runs: they have weight here like all others.
+    ``followed`` are the added effects as every run alone determines them. ``taken_up`` are errors without a number of
+    their own, where the method says them.
     """
 
     campaign: str
@@ -52,6 +66,9 @@ class Identification:
     added_covariance: Array
     added_refused: tuple[Refusal, ...]
     iterations: int
+    gross: tuple[GrossReading, ...]
+    followed: FollowedEffects
+    taken_up: tuple[TakenUp, ...] = ()
 
 
 @dataclass(frozen=True)

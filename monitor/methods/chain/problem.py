@@ -116,9 +116,41 @@ class ChainProblem(ABC):
         return np.zeros((len(self.runs), 0)), np.zeros((len(self.runs), 0, nuisance.shape[1]))
 
     @property
+    def standard_lengths(self) -> Array:
+        """Change (e,) of each calibrated quantity with a strain of the measurement standard of 1, in the unit that its
+        deviation has as an input of the uncertainty: 0 where no standard expands."""
+        return np.zeros(len(self.extra_names))
+
+    @property
+    def touches_centres(self) -> bool:
+        """Whether a row is the centre of a ball, from touches all around it."""
+        return False
+
+    @property
+    def touch_normals(self) -> Array | None:
+        """Outward normals (n, 3) of the touched surface in the frame of the last work axis; None where a row is no
+        single touch."""
+        return None
+
+    @property
+    def touched_balls(self) -> npt.NDArray[np.bool_]:
+        """Whether (n,) a row is a touch of a ball."""
+        return np.full(len(self.context), self.touches_centres)
+
+    @property
     def movable(self) -> tuple[str, ...]:
         """The targets that may come loose and stand elsewhere, each with three coordinates of its own."""
         return ()
+
+    @property
+    def moved_together(self) -> Array | None:
+        """The moves (q, s) of the own unknowns that placing all targets anew allows; None where they have no places."""
+        return None
+
+    @property
+    def far_off(self) -> npt.NDArray[np.bool_]:
+        """Rows (n,) that stand too far from the others of their target to be the same one; they have no say."""
+        return np.zeros(len(self.context), dtype=bool)
 
     @property
     def target_word(self) -> str:
@@ -129,6 +161,20 @@ class ChainProblem(ABC):
     def largest_effect(self) -> tuple[float, float]:
         """Displacement (mm at the tool) and angle (rad) of the largest effect that such a machine is likely to hide."""
         return LARGEST_DISPLACEMENT, LARGEST_ANGLE
+
+    @property
+    def observes_numbers(self) -> bool:
+        """Whether ``evaluated`` gives the numbers of a row themselves, not vectors of which they are a part."""
+        return False
+
+    def can_show(self, effect: Effect) -> bool:
+        """Whether readings of this kind could show an effect at all, whatever the plan."""
+        return True
+
+    @property
+    def needs_whole_periods(self) -> bool:
+        """Whether a harmonic has to repeat within the travel of its axis to be told apart from what bends once."""
+        return False
 
     def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
         """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
@@ -142,6 +188,17 @@ class ChainProblem(ABC):
     def known_errors(self) -> tuple[tuple[ChainEffect, str], ...]:
         """Errors of the machine that are own unknowns, because they were measured by other means: effect and name."""
         return ()
+
+    @cached_property
+    def is_limited(self) -> npt.NDArray[np.bool_]:
+        """Which base coefficients (k,) are location angles or gains, that cannot exceed ``largest_error``."""
+        limited = np.zeros(len(self.base_names), dtype=bool)
+        for effect, columns in zip(self.base, self.base_columns, strict=True):
+            if isinstance(effect, ChainEffect) and (
+                effect.is_gain or (effect.term.is_rotation and effect.text == effect.term.symbol)
+            ):
+                limited[columns.start] = True
+        return limited
 
     @property
     def largest_error(self) -> float:
@@ -372,19 +429,18 @@ def _from_several_starts(problem: ChainProblem, begin: Array) -> Solution:
 def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
     """DataError where a location angle or a gain comes out too large to be an error, or too much is left."""
     for effect, columns in zip(problem.base, problem.base_columns, strict=True):
-        if isinstance(effect, ChainEffect) and (
-            effect.is_gain or (effect.term.is_rotation and effect.text == effect.term.symbol)
-        ):
-            free, values = solution.local_free[:, columns.start], solution.local[:, columns.start]
-            errors = np.where(free, values, 0.0)
-            worst = int(np.abs(errors).argmax())
-            if abs(errors[worst]) > problem.largest_error:
-                unit = "mm/mm" if effect.is_gain else "rad"
-                raise DataError(
-                    f"run {problem.runs[worst]}: {problem.base_names[columns.start]} comes out at {errors[worst]:.3g} "
-                    f"{unit}, which is no error of a machine: the readings contradict the machine file; check the axis "
-                    "signs, the topology, the units, the columns and the order of the targets"
-                )
+        if not problem.is_limited[columns.start]:
+            continue
+        free, values = solution.local_free[:, columns.start], solution.local[:, columns.start]
+        errors = np.where(free, values, 0.0)
+        worst = int(np.abs(errors).argmax())
+        if abs(errors[worst]) > problem.largest_error:
+            unit = "mm/mm" if isinstance(effect, ChainEffect) and effect.is_gain else "rad"
+            raise DataError(
+                f"run {problem.runs[worst]}: {problem.base_names[columns.start]} comes out at {errors[worst]:.3g} "
+                f"{unit}, which is no error of a machine: the readings contradict the machine file; check the axis "
+                "signs, the topology, the units, the columns and the order of the targets"
+            )
     wrong = problem.contradiction(solution)
     if wrong is not None:
         raise DataError(f"the readings contradict the machine file: {wrong}")

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from monitor.methods.chain.gross import gross_readings
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.chain.least_squares import MEMBER_SHARE, Solution
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.chain.shared_effects import shared_parameters
+from monitor.methods.chain.shared_effects import followed_effects, shared_parameters
 from monitor.methods.model import Model
 from monitor.records import Array, Campaign
 from monitor.refusal import Advice, Reason, ReasonKind, Refusal
@@ -64,7 +65,8 @@ def identification(
     runs = []
     for index, run in enumerate(problem.runs):
         rows = problem.context.run == run
-        residuals = vectors[rows]
+        # A number that was not read has no weight and counts for nothing.
+        residuals = vectors[rows][np.isfinite(problem.sigma[rows])]
         free = solution.local_free[index, :count]
         both = free[:, None] & free
         weighted = solution.last.residual[index]
@@ -97,4 +99,6 @@ def identification(
         added_covariance=shared.covariance,
         added_refused=shared.refused,
         iterations=solution.iterations,
+        gross=gross_readings(problem, solution),
+        followed=followed_effects(problem, solution),
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from monitor.effects import Basis, ChainEffect, Effect
 from monitor.effects.effect import ChainBasis
-from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.least_squares import COMMON_RANK_TOLERANCE, MEMBER_SHARE, Solution, eliminate
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 from monitor.refusal import Reason, ReasonKind, Refusal
@@ -26,6 +26,21 @@ class SharedParameters:
     refused: tuple[Refusal, ...]
 
 
+@dataclass(frozen=True)
+class FollowedEffects:
+    """The a coefficients of added effects that every run determines by itself: what a history of them is made of.
+
+    ``estimate`` (R, a) and ``covariance`` (R, a, a) in internal units, NaN where a run alone says nothing of it. The
+    runs' estimates, weighted by their covariances, have the campaign's for their mean. Time constants are held at the
+    campaign's, and coefficients of a single run are left out.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[Unit, ...]
+    estimate: Array
+    covariance: Array
+
+
 def largest_coefficient(effect: Effect, basis: Basis, peak: float, largest: tuple[float, float]) -> float:
     """The size of the coefficients that a machine in use is likely to have at most, in internal units.
 
@@ -38,6 +53,45 @@ def largest_coefficient(effect: Effect, basis: Basis, peak: float, largest: tupl
     if isinstance(effect, ChainEffect) and isinstance(basis, ChainBasis) and effect.term.is_rotation:
         limit = min(limit, largest[1] / float(np.abs(basis.columns).max()))
     return limit
+
+
+def followed_effects(problem: ChainProblem, solution: Solution) -> FollowedEffects:
+    """The added effects' coefficients as each run alone determines them, to first order about the common solution."""
+    at, runs = solution.last, len(problem.runs)
+    acts = np.any(at.common != 0.0, axis=1).sum(axis=0)
+    columns, units, limits = [], [], []
+    by_error = (
+        problem.evaluated(solution.local, solution.common, jacobian=True).by_error if problem.shared else None
+    )
+    for added, part in zip(problem.shared, problem.common_columns, strict=True):
+        assert by_error is not None
+        basis = added.basis(solution.common[part])
+        peak = float(np.linalg.norm(problem.observe(basis.displacement(by_error)), axis=1).max(initial=0.0))
+        for column in range(part.start, part.start + added.size):
+            if runs == 1 or acts[column] > 1:
+                columns.append(column)
+                units.append(added.effect.unit)
+                limits.append(largest_coefficient(added.effect, basis, peak, problem.largest_effect))
+    estimate = np.full((runs, len(columns)), np.nan)
+    covariance = np.full((runs, len(columns), len(columns)), np.nan)
+    own_unknowns = eliminate(at.local).basis
+    for run in range(runs if columns else 0):
+        whole = at.common[run][:, columns]
+        scale = np.linalg.norm(whole, axis=0)
+        scale[scale == 0.0] = 1.0
+        basis_of_run = own_unknowns[run]
+        remainder = whole / scale - basis_of_run @ (basis_of_run.T @ (whole / scale))
+        residual = at.residual[run] - basis_of_run @ (basis_of_run.T @ at.residual[run])
+        u, s, vt = np.linalg.svd(remainder, full_matrices=False)
+        determined = s > COMMON_RANK_TOLERANCE
+        inverse = (vt.T * np.where(determined, 1.0 / np.where(determined, s, 1.0), 0.0)) / scale[:, None]
+        matrix = inverse @ inverse.T
+        free = np.abs(vt[~determined]).max(axis=0, initial=0.0) < MEMBER_SHARE
+        free &= np.sqrt(np.diag(matrix)) <= np.array(limits)
+        estimate[run] = np.where(free, solution.common[columns] - inverse @ (u.T @ residual), np.nan)
+        covariance[run] = np.where(free[:, None] & free, matrix, np.nan)
+    names = tuple(problem.added_names[column] for column in columns)
+    return FollowedEffects(names, tuple(units), estimate, covariance)
 
 
 def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParameters:

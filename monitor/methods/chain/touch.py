@@ -53,9 +53,30 @@ class TouchProblem(ChainProblem):
         return np.tile(np.concatenate([nominal, self.tip]), (len(self.runs), 1))
 
     @property
+    def standard_lengths(self) -> Array:
+        """The calibrated distances, in mm."""
+        return np.array([distance.length[0] for distance in self.distances])
+
+    @property
+    def touches_centres(self) -> bool:
+        """Always."""
+        return True
+
+    @property
     def movable(self) -> tuple[str, ...]:
         """The balls."""
         return self.targets
+
+    @property
+    def moved_together(self) -> Array:
+        """Three shifts and three turns of all balls together, and the tip."""
+        places = self.own_start[0][:-3].reshape(-1, 3)
+        arms = places - places.mean(axis=0)
+        turns = np.stack([np.cross(axis, arms).reshape(-1) for axis in np.eye(3)], axis=1)
+        balls = np.concatenate([np.tile(np.eye(3), (len(places), 1)), turns], axis=1)
+        moves = np.zeros((len(balls) + 3, 9))
+        moves[:-3, :6], moves[-3:, 6:] = balls, np.eye(3)
+        return moves
 
     @property
     def measured_joints(self) -> tuple[int, ...]:

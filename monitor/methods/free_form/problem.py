@@ -66,6 +66,21 @@ class FreeFormProblem(ChainProblem):
         return basis.term, basis.columns[:, 0]
 
     @property
+    def touch_normals(self) -> Array:
+        """The normals."""
+        return self.normals
+
+    @property
+    def standard_lengths(self) -> Array:
+        """From the node where the known error is zero to its own, in its standard uncertainties; nothing else grows."""
+        symbol, _, node = self.length.parameter.rstrip(")").partition("(")
+        zeros = [
+            float(name.rstrip(")").partition("(")[2]) for name in self.held if name.startswith(f"{symbol}(")
+        ]
+        from_zero = float(node) - (min(zeros, key=abs) if zeros else 0.0)
+        return np.array([from_zero / self.length.standard_uncertainty, *(0.0 for _ in self.on_shape)])
+
+    @property
     def components(self) -> tuple[str, ...]:
         """One number a probing."""
         return ("normal",)

@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.effects import ArtefactEffect, ChainEffect, parse_effect
+from monitor.effects import ParsedEffect, parse_effect
 from monitor.machine import ChainPose, evaluate
 from monitor.methods.chain.least_squares import Linearisation
 from monitor.methods.chain.problem import ChainProblem
@@ -83,7 +83,7 @@ class LShapeProblem(ChainProblem):
         modules = [self.piece.modules[index].id for index in self.calibrated]
         return (*setup, *(f"module {module} {part}" for module in modules for part in _CALIBRATION))
 
-    def all_orders(self) -> tuple[ChainEffect | ArtefactEffect, ...]:
+    def all_orders(self) -> tuple[ParsedEffect, ...]:
         """The base effects and the first orders of the straightness, which the stepwise way has besides."""
         chain = self.context.chain
         texts = [
@@ -92,7 +92,7 @@ class LShapeProblem(ChainProblem):
             for component in "XYZ"
             if joint.direction["XYZ".index(component)] != 1.0
         ]
-        base = tuple(effect for effect in self.base if isinstance(effect, (ChainEffect, ArtefactEffect)))
+        base = tuple(effect for effect in self.base if isinstance(effect, ParsedEffect))
         return (*base, *(parse_effect(text, chain) for text in texts))
 
     @cached_property
@@ -106,6 +106,14 @@ class LShapeProblem(ChainProblem):
     @property
     def extra_names(self) -> tuple[str, ...]:
         return tuple(name for name in self.own_names if name.startswith("module "))
+
+    @property
+    def standard_lengths(self) -> Array:
+        """Places of the modules from the reference, in their standard uncertainties; tilts do not change."""
+        centres = np.array([self.piece.modules[index].centre for index in self.calibrated])
+        strained = np.zeros((len(self.calibrated), len(_CALIBRATION)))
+        strained[:, :2] = centres - np.array(self.piece.modules[self.piece.reference].centre)
+        return strained.ravel() / self.piece.place_uncertainty
 
     def _parts(self, nuisance: Array) -> tuple[Array, Array]:
         """Setup (n, 5) of every row's placement and deviations (n, 4) of its module, in mm and rad."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.method import ChainMethod, Nouns
 from monitor.methods.rotary_probing.base import rotary_base
-from monitor.methods.rotary_probing.problem import NAME, problem_of
+from monitor.methods.rotary_probing.problem import FARTHEST_APART, NAME, problem_of
+from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
 
 
@@ -16,12 +20,29 @@ def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advi
     return Advice(AdviceKind.AXIS_STILL, still) if still else Advice(AdviceKind.MORE_FACES)
 
 
+def refuse(campaign: Campaign, problem: ChainProblem) -> None:
+    """DataError where a touch stands apart from the others of its point: no number of its run would hold."""
+    apart = np.flatnonzero(problem.far_off)
+    if not len(apart):
+        return
+    context = problem.context
+    touches = ", ".join(
+        f"run {context.run[row]}, sequence {context.sequence[row]} (point {context.target[row]})"
+        for row in apart
+    )
+    raise DataError(
+        f"touches stand more than {FARTHEST_APART:g} mm apart from the others of their point: {touches}; correct the "
+        "rows, or leave them out of probings.csv"
+    )
+
+
 METHOD = ChainMethod(
     name=NAME,
     title="rotary probing",
     description="a block, a part or spheres, touched at indexed angles of two rotary axes",
     nouns=Nouns(target="target", row="touch"),
     problem_of=problem_of,
+    refuse=refuse,
     advice=advice,
     base_effects=rotary_base,
     taken_as_known=("the linear axes", "the stylus tip"),

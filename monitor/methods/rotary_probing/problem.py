@@ -34,6 +34,8 @@ NORMAL = ("normal_x", "normal_y", "normal_z")
 # One point of the piece comes back to the same place of the table's frame to within set-up and location errors. More
 # than this apart (mm) and the machine file is wrong, or two points share a name.
 FARTHEST_APART = 2.0
+# A third of the touches of a point may be single mistakes; of more nobody can say which are right.
+MOST_APART = 1.0 / 3.0
 # A stated normal and the direction from a sphere's centre to the tip agree to this (rad), or one of them is wrong.
 LARGEST_TILT = 0.2
 # The direction from a sphere's centre is taken from the solution before: each time the rest falls by the ratio of
@@ -45,11 +47,13 @@ DIRECTIONS = 3
 class RotaryProblem(ChainProblem):
     """Touches of faces and spheres. ``normal`` (n, 3) is the direction that a touch measures, outwards, in the frame of
     the last work axis; ``reference`` (n, 3) mm where the touched point lies in it, a sphere's centre for its touches;
-    ``ball`` (n,) whether the target is a sphere; ``tip`` (3,) mm the tip's centre in the spindle frame."""
+    ``ball`` (n,) whether the target is a sphere; ``apart`` (n,) whether a touch stands apart from the others of its
+    point; ``tip`` (3,) mm the tip's centre in the spindle frame."""
 
     normal: Array
     reference: Array
     ball: npt.NDArray[np.bool_]
+    apart: npt.NDArray[np.bool_]
     tip: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @cached_property
@@ -79,6 +83,11 @@ class RotaryProblem(ChainProblem):
         return np.zeros((len(self.runs), len(self.own_names)))
 
     @property
+    def far_off(self) -> npt.NDArray[np.bool_]:
+        """Touches that stand apart from the others of their point."""
+        return self.apart
+
+    @property
     def components(self) -> tuple[str, ...]:
         """The one number of a touch."""
         return ("normal",)
@@ -87,6 +96,16 @@ class RotaryProblem(ChainProblem):
     def measured_joints(self) -> tuple[int, ...]:
         """The linear axes: they stop where the tip meets the surface."""
         return tuple(index for index, joint in enumerate(self.context.chain.joints) if not joint.turns)
+
+    @property
+    def touch_normals(self) -> Array:
+        """The normals."""
+        return self.normal
+
+    @property
+    def touched_balls(self) -> npt.NDArray[np.bool_]:
+        """The touches of spheres."""
+        return self.ball
 
     def ends(self, nuisance: Array) -> tuple[Array, Array]:
         """Points of the surface (of the surface that the tip's centre meets) and the tip."""
@@ -131,21 +150,38 @@ def _normals(campaign: Campaign) -> Array:
     return np.asarray(normal / length[:, None])
 
 
-def _references(context: Context, tips: Array, ball: npt.NDArray[np.bool_]) -> Array:
-    """Where each touched point lies (n, 3): the mean over its run and target, a sphere's nominal centre."""
+def _references(
+    context: Context, tips: Array, ball: npt.NDArray[np.bool_]
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Where each touched point lies (n, 3), the mean over its run and target, a sphere's nominal centre; and the
+    touches (n,) that stand apart from the others of their point, which have no part in the mean.
+
+    Raises DataError where more than single touches stand apart.
+    """
     references = np.where(ball[:, None], context.nominal, 0.0)
+    far_off = np.zeros(len(context), dtype=bool)
     for run in np.unique(context.run):
         for target in np.unique(context.target[(context.run == run) & ~ball]):
-            rows = (context.run == run) & (context.target == target)
-            references[rows] = tips[rows].mean(axis=0)
-            apart = float(np.linalg.norm(tips[rows] - references[rows], axis=1).max())
-            if apart > FARTHEST_APART:
+            rows = np.flatnonzero((context.run == run) & (context.target == target))
+            near, apart = _near(tips[rows])
+            if len(rows) - near.sum() > MOST_APART * len(rows):
                 raise DataError(
-                    f"run {run}: the touches of point {target} lie up to {2.0 * apart:.3g} mm apart in the table's "
+                    f"run {run}: the touches of point {target} lie up to {apart:.3g} mm apart in the table's "
                     "frame: the readings contradict the machine file; check the axis signs, the topology, the tip and "
                     "that every point has its own name"
                 )
-    return references
+            references[rows] = tips[rows[near]].mean(axis=0)
+            far_off[rows[~near]] = True
+    return references, far_off
+
+
+def _near(tips: Array) -> tuple[npt.NDArray[np.bool_], float]:
+    """Which tips (m, 3) of one point come back to the same place, and how far (mm) they lie apart."""
+    apart = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=1).max())
+    if apart <= 2.0 * FARTHEST_APART:
+        return np.ones(len(tips), dtype=bool), apart
+    # Some of few: the mean is pulled by what stands apart, the median is not.
+    return np.linalg.norm(tips - np.median(tips, axis=0), axis=1) <= FARTHEST_APART, apart
 
 
 def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProblem:
@@ -162,7 +198,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProble
     tip = campaign.probe.tip or (0.0, 0.0, 0.0)
     none = np.zeros((len(context), len(chain.joints), 2, 6))
     tips = evaluate(chain, context.positions, none, np.zeros((len(context), 3)), np.array(tip)).residual
-    reference = _references(context, tips, ball)
+    reference, apart = _references(context, tips, ball)
     problem = RotaryProblem(
         context=replace(context, nominal=reference),
         base=whole.base_of(chain),
@@ -171,6 +207,7 @@ def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> RotaryProble
         normal=normal,
         reference=reference,
         ball=ball,
+        apart=apart,
         tip=tip,
     )
     if ball.any():

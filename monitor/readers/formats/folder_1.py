@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from monitor.exceptions import CampaignError
@@ -14,8 +14,11 @@ from monitor.readers.files import LARGEST_CSV, LARGEST_TOML, decode, read_bytes
 from monitor.readers.machine_file import MachinePart, read_machine
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, method_rules
+from monitor.readers.setups_file import probe_of, read_setups
+from monitor.readers.sources_file import read_sources
 from monitor.readers.toml_table import Table, parse_toml
 from monitor.records import Artefact, Campaign, Probe, SourceFile
+from monitor.sources import Source
 
 TOML = "campaign.toml"
 FILES = (TOML, runs_file.FILE, probings_file.FILE)
@@ -38,6 +41,7 @@ class _Head:
     probe: Probe | None
     artefact: Artefact | None
     balls: list[str] | None
+    sources: tuple[Source, ...] = ()
 
 
 _EMPTY = _Head(None, None, None, MachinePart(None, None, {}), None, None, None)
@@ -54,13 +58,14 @@ def read(folder: Path) -> Campaign:
     texts = {file.name: decode(file.name, file.content, faults) for file in files}
     head = _head(texts.get(TOML), faults)
     runs_table = _table(runs_file.FILE, texts, faults)
-    runs = None if runs_table is None else runs_file.read_runs(runs_table, faults)
+    ambient = head.rules is None or not head.rules.needs_setups
+    runs = None if runs_table is None else runs_file.read_runs(runs_table, faults, ambient=ambient)
     table = _table(probings_file.FILE, texts, faults)
     part = None
     if table is not None:
         listed = None if runs is None or _has_lost_a_run(runs_table, runs) else runs.lines
         expected = probings_file.Expected(
-            head.machine.axes, head.machine.strokes, _targets(head), listed, head.rules
+            head.machine.axes, head.machine.strokes, _targets(head), listed, head.rules, _setups(head)
         )
         part = probings_file.read_probings(table, expected, faults)
     if part is not None:
@@ -80,13 +85,13 @@ def _campaign(
     assert head.name is not None
     assert head.method is not None
     assert head.machine.machine is not None
-    assert head.probe is not None
     assert head.artefact is not None
     assert runs is not None
     assert part is not None
+    probe = head.probe or probe_of(head.artefact.setups, part.probings)
     return Campaign(
-        head.name, head.method, head.machine.machine, head.probe, head.artefact, runs.runs, part.probings,
-        files,
+        head.name, head.method, head.machine.machine, probe, head.artefact, runs.runs, part.probings,
+        files, head.sources,
     )  # fmt: skip
 
 
@@ -99,11 +104,15 @@ def _head(text: str | None, faults: Faults) -> _Head:
     method = top.text("method", required=True, example='"samba"')
     rules = _rules(top, method)
     machine = read_machine(top)
-    probe = read_probe(top)
+    has_setups = rules is not None and rules.needs_setups
+    probe = read_probe(top, required=not has_setups)
     artefact, balls = read_artefact(top)
     fits = _artefact_fits(top, artefact, rules)
+    sources = read_sources(top, machine.axes)
+    setups = read_setups(top) if has_setups else ()
+    artefact = None if artefact is None or setups is None else replace(artefact, setups=setups)
     top.finish()
-    return _Head(name, method, rules, machine, probe, artefact if fits else None, balls)
+    return _Head(name, method, rules, machine, probe, artefact if fits else None, balls, sources)
 
 
 def _check_plan(head: _Head, part: probings_file.ProbingsPart, faults: Faults) -> None:
@@ -124,6 +133,13 @@ def _targets(head: _Head) -> list[str] | None:
     if rules is not None and rules.targets_are_reflectors and artefact is not None and artefact.reflectors:
         return [reflector.id for reflector in artefact.reflectors]
     return None
+
+
+def _setups(head: _Head) -> list[str] | None:
+    """Return the ids of the setups; None where they could not be read or there are none."""
+    if head.artefact is None or not head.artefact.setups:
+        return None
+    return [setup.id for setup in head.artefact.setups]
 
 
 def _refuse_other_format(top: Table) -> None:

@@ -101,6 +101,8 @@ def _gaps(value: object) -> list[str]:
         return [
             _within(part.name, gap)
             for part in dataclasses.fields(value)
+            # What may be left out of a record is not missing where it is.
+            if not (part.metadata.get("omitted") and getattr(value, part.name) is None)
             for gap in _gaps(getattr(value, part.name))
         ]
     return []

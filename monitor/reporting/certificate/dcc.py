@@ -18,6 +18,7 @@ from xml.etree import ElementTree as ET
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.completeness import check_complete
 from monitor.reporting.certificate.dcc_results import DCC, SI, add, geometric_errors, say, volumetric_error
+from monitor.reporting.certificate.grounds import accepted_statements
 from monitor.reporting.certificate.record import (
     CertificateRecord,
     ConformityStatement,
@@ -25,6 +26,7 @@ from monitor.reporting.certificate.record import (
     Replaced,
     Verdict,
 )
+from monitor.reporting.certificate.tables import guard_band
 from monitor.reporting.certificate.words import amendment, answer, verdict_words
 from monitor.reporting.numbers import decimal_of
 from monitor.reporting.texts import Texts, texts_of
@@ -153,15 +155,17 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
                 texts("dcc.conformity_of", name=verdict.name, state=conformity.state),
                 texts.language,
             )
+            banded = verdict.guard_band is not None
             declaration = texts(
-                "dcc.verdict",
+                "dcc.verdict_band" if banded else "dcc.verdict",
+                band=guard_band(verdict, texts) if banded else "",
                 verdict=verdict_words(verdict.verdict, texts),
                 tolerance=texts.number(decimal_of(verdict.tolerance)),
                 unit=verdict.unit,
                 probability=texts.number(decimal_of(verdict.probability)),
                 rule=conformity.rule,
                 risk=conformity.risk,
-                basis=conformity.basis,
+                basis=" ".join(filter(None, [conformity.basis, conformity.process])),
             )
             say(statement, "declaration", declaration, texts.language)
             add(statement, "conformity", _STATUS[verdict.verdict])
@@ -181,6 +185,7 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
         ("accreditation", record.accreditation),
         ("amendment", amendment(record.replaces, texts)),
     ]
+    statements += [("accepted", words) for words in accepted_statements(record.accepted or (), texts)]
     named = [(texts(f"dcc.{key}"), value) for key, value in statements]
     named[3:3] = [
         (texts("dcc.standard", name=statement.name), answer(statement.certificate, texts))

@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.behind import behind_sentences
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric import printed_map
@@ -70,14 +71,19 @@ def say(parent: ET.Element, tag: str, text: str, language: str) -> ET.Element:
 def geometric_errors(parent: ET.Element, record: CertificateRecord, result: ResultSet, texts: Texts) -> None:
     """The parameters twice, with the ellipsoidal and with the rectangular region, each with the full covariance."""
     say(parent, "name", texts("dcc.result", state=result.state), texts.language)
-    results = _results(parent, record, result.evaluation, texts)
-    for region, factor in (("ellipsoidal", result.k_p), ("rectangular", result.k_q)):
+    sentences = () if result.budget is None else behind_sentences(result, result.budget, texts)
+    results = _results(parent, record, ". ".join([result.evaluation, *sentences]), texts)
+    regions = (
+        ("ellipsoidal", result.k_p, result.k_p_error > 0.0),
+        ("rectangular", result.k_q, result.k_q_error > 0.0),
+    )
+    for region, factor, sampled in regions if result.has_ellipsoid else regions[1:]:
         element = add(results, "result")
         say(element, "name", texts(f"dcc.{region}"), texts.language)
         say(element, "description", texts(f"dcc.{region}_words", rank=result.rank), texts.language)
         quantity = add(add(element, "data"), "quantity")
         say(quantity, "name", "; ".join(result.descriptions), texts.language)
-        _values(quantity, result, region, factor)
+        _values(quantity, result, region, factor, sampled)
     for refusal in result.refused:
         element = add(results, "result")
         say(element, "name", texts("dcc.refused", parameters=", ".join(refusal.parameters)), texts.language)
@@ -124,7 +130,7 @@ def _results(parent: ET.Element, record: CertificateRecord, evaluation: str, tex
     return add(parent, "results")
 
 
-def _values(parent: ET.Element, result: ResultSet, region: str, factor: float) -> None:
+def _values(parent: ET.Element, result: ResultSet, region: str, factor: float, sampled: bool) -> None:
     units = [unit_of(unit) for unit in result.units]
     values = add(parent, "realListXMLList", space=SI)
     add(values, "labelXMLList", " ".join(result.names), SI)
@@ -140,7 +146,7 @@ def _values(parent: ET.Element, result: ResultSet, region: str, factor: float) -
             add(element, "unit", second + unit, SI)
     add(around, "coverageFactor", _number(factor), SI)
     add(around, "coverageProbability", _number(result.p), SI)
-    add(around, "distribution", _distribution(result), SI)
+    add(around, "distribution", "numerical" if sampled else _distribution(result), SI)
 
 
 def _distribution(result: ResultSet) -> str:

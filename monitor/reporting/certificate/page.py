@@ -7,7 +7,9 @@ from typing import Any
 
 from markupsafe import Markup
 
+from monitor.reporting.certificate.behind import PrintedBehind, printed_behind
 from monitor.reporting.certificate.completeness import check_complete
+from monitor.reporting.certificate.grounds import accepted_statements
 from monitor.reporting.certificate.machine_frame import PrintedMachineFrame, printed_machine_frame
 from monitor.reporting.certificate.matrix import Block, correlation_blocks
 from monitor.reporting.certificate.pictures import Picture, beside, map_picture, pictures_of
@@ -37,6 +39,7 @@ class PrintedResult:
     blocks: tuple[Block, ...]
     beside: bool
     pictures: tuple[Picture, ...]
+    behind: PrintedBehind | None
 
 
 def certificate_context(record: CertificateRecord) -> dict[str, Any]:
@@ -54,6 +57,7 @@ def certificate_context(record: CertificateRecord) -> dict[str, Any]:
         "texts": texts,
         "heading": texts.markup("page.number_issued", number=record.number, day=texts.day(record.issued_on)),
         "replaces": amendment(record.replaces, texts),
+        "accepted": accepted_statements(record.accepted or (), texts),
         "received_on": answer(record.received_on, texts),
         "performed_on": first if first == last else texts("page.from_to", first=first, last=last),
         "method": _method(record.method, texts),
@@ -88,10 +92,25 @@ def _method(method: MethodUsed, texts: Texts) -> list[tuple[str, str]]:
     ]
 
 
+def _ellipsoid(result: ResultSet, sign: str) -> tuple[str, str]:
+    """The factor and the half-axes of the hyper-ellipsoid; empty where a few days bound none."""
+    if not result.has_ellipsoid:
+        return "", ""
+    axes = (written_factor(axis, sign, result.k_p_error) for axis in result.half_axes)
+    return written_factor(result.k_p, sign, result.k_p_error), "; ".join(axes)
+
+
+def _explained_by(result: ResultSet) -> str:
+    """The key of the text that says what U is."""
+    if not result.has_ellipsoid:
+        return "page.results_explained_intervals"
+    return "page.results_explained" if result.sampling is None else "page.results_explained_sampled"
+
+
 def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
     sign = texts.decimal_sign
-    k_q, k_p = written_factor(result.k_q, sign), written_factor(result.k_p, sign)
-    half_axes = "; ".join(written_factor(axis, sign) for axis in result.half_axes)
+    k_q = written_factor(result.k_q, sign, result.k_q_error)
+    k_p, half_axes = _ellipsoid(result, sign)
     rows = result_rows(result, texts)
     parameter = texts("page.parameter" if result.machine_frame is None else "page.parameter_referred")
     heads = (
@@ -104,7 +123,7 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
         rows=rows,
         widths=result_widths(rows, heads),
         explained=texts.markup(
-            "page.results_explained",
+            _explained_by(result),
             k_q=k_q,
             k_p=k_p,
             count=len(result.names),
@@ -119,10 +138,11 @@ def _printed(result: ResultSet, texts: Texts) -> PrintedResult:
             )
             for refusal in result.refused
         ),
-        half_axes=texts.markup("page.half_axes", half_axes=half_axes),
+        half_axes=texts.markup("page.half_axes", half_axes=half_axes) if result.has_ellipsoid else Markup(""),
         blocks=correlation_blocks(
             result.names, result.correlation, texts, texts("page.correlation", state=result.state)
         ),
         beside=beside(result),
         pictures=pictures_of(result, texts),
+        behind=printed_behind(result, texts),
     )

@@ -41,7 +41,7 @@ def pictures_of(result: ResultSet, texts: Texts) -> tuple[Picture, ...]:
     limited = result.tolerances is not None and bool(np.any(np.isfinite(result.tolerances)))
     caption = texts(
         "figures.intervals",
-        k_q=written_factor(result.k_q, texts.decimal_sign),
+        k_q=written_factor(result.k_q, texts.decimal_sign, result.k_q_error),
         brackets=texts("figures.brackets") if limited else "",
     )
     drawings = interval_drawings(result, texts, width)

@@ -8,10 +8,12 @@ What does not apply is said by the laboratory in words, with ``NotApplicable``.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
 
+from monitor.documents import OMITTED
+from monitor.reporting.certificate.grounds import AcceptedGround
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.texts import ENGLISH
@@ -90,19 +92,27 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class ConformityVerdict:
-    """What is stated of one parameter: its tolerance (limit of the absolute value) and probability of conformity."""
+    """What is stated of one parameter: its tolerance (limit of the absolute value) and probability of conformity.
+
+    ``guard_band`` w of the rule in the parameter's unit; None in a record of an earlier version. ``consumers_risk`` and
+    ``producers_risk`` are the global risks of the rule (JCGM 106:2012, 9.5) where the spread of the process is stated.
+    """
 
     name: str
     unit: str
     tolerance: float
     verdict: Verdict
     probability: float
+    guard_band: float | None = field(default=None, metadata=OMITTED)
+    consumers_risk: float | None = field(default=None, metadata=OMITTED)
+    producers_risk: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
 class ConformityStatement:
     """A statement of conformity: decision rule and risk in words, the verdicts, the joint probability of conformity.
 
+    ``process`` says in words by which spread of the true values the global risks were found, None where by none.
     ``state``: to which results it applies; ``basis``: from where the tolerances are, and by which distribution the
     probabilities were found (ISO/IEC 17025:2017, 7.8.6.2).
     """
@@ -113,6 +123,7 @@ class ConformityStatement:
     joint_probability: float
     state: str
     basis: str
+    process: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -164,7 +175,8 @@ class CertificateRecord:
     that asks for each field. ``accreditation`` is printed where a laboratory has one;
     ``country`` (ISO 3166-1, two letters) is what a digital certificate asks for besides.
     ``replaces`` is the certificate that this one amends. ``volumetric`` maps follow from the ``results``; they are
-    printed where one was asked for.
+    printed where one was asked for. ``accepted`` are the grounds against it that the laboratory answers for; None where
+    there were none.
     """
 
     title: str | None
@@ -195,3 +207,4 @@ class CertificateRecord:
     replaces: Replaced | None = None
     volumetric: tuple[VolumetricResult, ...] = ()
     language: str = ENGLISH
+    accepted: tuple[AcceptedGround, ...] | None = field(default=None, metadata=OMITTED)

@@ -16,7 +16,9 @@ import numpy.typing as npt
 from monitor.documents import OMITTED
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.budget import Budget, HoldsFor
 from monitor.reporting.certificate.machine_frame_result import MachineFrameResult
+from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import RefusedParameters
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
@@ -43,10 +45,11 @@ class ResultSet:
     ``state`` of the machine that they describe: as found, as left. ``estimate`` (m,), ``covariance`` (m, m) in
     products of the display units. ``k_q`` is the coverage factor of the hyper-rectangle, ``k_p`` that of the
     hyper-ellipsoid of ``rank`` dimensions, both for probability ``p`` (JCGM 102:2011 6.5). ``evaluation`` names the
-    way the uncertainty was found, with its clause. ``trials`` and ``validation`` belong to Monte Carlo.
+    way the uncertainty was evaluated, with its clause. ``trials`` and ``validation`` belong to Monte Carlo.
     ``tolerances`` (m,) are limits of absolute values, NaN where there is none. ``dof``: degrees of freedom of the
-    covariance, for which the factors hold (Student, Hotelling); not finite where it is known. ``machine_frame`` has
-    the location errors in the frame of the machine; None in a result of an earlier version.
+    covariance as a whole; not finite where it is known. ``sampling`` is that of the factors; None in a result of an
+    earlier version, whose factors hold for ``dof`` (Student, Hotelling). ``machine_frame`` has the location errors in
+    the frame of the machine, ``budget`` what stands behind u; both are None in a result of an earlier version.
     """
 
     state: str
@@ -67,6 +70,18 @@ class ResultSet:
     tolerances: Array | None = None
     dof: float = math.inf
     machine_frame: MachineFrameResult | None = field(default=None, metadata=OMITTED)
+    budget: Budget | None = field(default=None, metadata=OMITTED)
+    sampling: FactorSampling | None = None
+
+    @property
+    def k_p_error(self) -> float:
+        """Standard error of the sampling of k_p, which decides its digits; zero where none is stored."""
+        return 0.0 if self.sampling is None else self.sampling.k_p_standard_error
+
+    @property
+    def k_q_error(self) -> float:
+        """Standard error of the sampling of k_q, which decides its digits; zero where none is stored."""
+        return 0.0 if self.sampling is None else self.sampling.k_q_standard_error
 
     @property
     def u(self) -> Array:
@@ -85,6 +100,11 @@ class ResultSet:
         matrix = self.covariance / np.outer(u, u)
         np.fill_diagonal(matrix, 1.0)
         return np.asarray(matrix)
+
+    @property
+    def has_ellipsoid(self) -> bool:
+        """Whether the covariance is known well enough for a hyper-ellipsoid."""
+        return math.isfinite(self.k_p)
 
     @property
     def half_axes(self) -> Array:
@@ -122,6 +142,7 @@ class CoverageFactors:
     k_q: float
     rank: int
     dof: float = math.inf
+    sampling: FactorSampling | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,6 +161,7 @@ class ResultStatements:
     tolerances: Mapping[str, float] | None = None
     descriptions: Mapping[str, str] = field(default_factory=dict)
     machine_frame: MachineFrameResult | None = None
+    budget: Budget | None = None
 
 
 def result_set(
@@ -166,7 +188,8 @@ def result_set(
     estimate = estimate[printed] / factor
     covariance = covariance[np.ix_(printed, printed)] / np.outer(factor, factor)
     _check_numbers(names, estimate, covariance)
-    _check_factors(factors)
+    over_campaign = statements.budget is not None and statements.budget.holds_for is HoldsFor.CAMPAIGN
+    _check_factors(factors, ellipsoid=not over_campaign)
     limits = statements.tolerances
     descriptions = statements.descriptions
     return ResultSet(
@@ -188,6 +211,8 @@ def result_set(
         tolerances=None if limits is None else np.array([limits.get(name, math.nan) for name in names]),
         dof=factors.dof,
         machine_frame=statements.machine_frame,
+        budget=None if statements.budget is None else statements.budget.of(printed),
+        sampling=factors.sampling,
     )
 
 
@@ -201,9 +226,11 @@ def _check_numbers(names: tuple[str, ...], estimate: Array, covariance: Array) -
             )
 
 
-def _check_factors(factors: CoverageFactors) -> None:
+def _check_factors(factors: CoverageFactors, *, ellipsoid: bool) -> None:
     if not 0.0 < factors.p < 1.0:
         raise DataError(f"the coverage probability p must lie between 0 and 1, but is {factors.p}")
     for symbol, factor in (("k_p", factors.k_p), ("k_q", factors.k_q)):
-        if not (math.isfinite(factor) and factor > 0.0):
+        # A few days bound intervals and no ellipsoid.
+        unbounded = symbol == "k_p" and not ellipsoid and factor == math.inf
+        if not (math.isfinite(factor) and factor > 0.0) and not unbounded:
             raise DataError(f"the coverage factor {symbol} must be positive and finite, but is {factor}")

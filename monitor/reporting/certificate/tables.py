@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from decimal import Decimal
 
-from monitor.reporting.certificate.record import ConformityStatement
+from monitor.reporting.certificate.record import ConformityStatement, ConformityVerdict
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.words import verdict_words
 from monitor.reporting.numbers import PLUS_MINUS, decimal_of, round_result, round_to_place, round_uncertainty
@@ -41,11 +41,16 @@ class Row:
 
 @dataclass(frozen=True)
 class PrintedConformity:
-    """The verdicts as printed: (symbol, tolerance, unit, probability, verdict) and the joint probability."""
+    """The verdicts as printed: (symbol, tolerance, unit, probability, verdict) and the joint probability.
+
+    ``bands`` are the guard bands and ``risks`` the global risks (R_C, R_P) of the rows; empty where none are stored.
+    """
 
     rows: tuple[tuple[str, str, str, str, str], ...]
     joint: str
     count: int
+    bands: tuple[str, ...] = ()
+    risks: tuple[tuple[str, str], ...] = ()
 
 
 def result_rows(result: ResultSet, texts: Texts) -> tuple[Row, ...]:
@@ -112,7 +117,38 @@ def conformity_rows(statement: ConformityStatement, texts: Texts) -> PrintedConf
         )
         for verdict in statement.verdicts
     )
-    return PrintedConformity(rows, _probability(statement.joint_probability, texts), len(rows))
+    verdicts = statement.verdicts
+    return PrintedConformity(
+        rows,
+        _probability(statement.joint_probability, texts),
+        len(rows),
+        bands=tuple(guard_band(verdict, texts) for verdict in verdicts)
+        if any(verdict.guard_band is not None for verdict in verdicts)
+        else (),
+        risks=tuple(
+            (_risk(verdict.consumers_risk, texts), _risk(verdict.producers_risk, texts))
+            for verdict in verdicts
+        )
+        if any(verdict.consumers_risk is not None for verdict in verdicts)
+        else (),
+    )
+
+
+def guard_band(verdict: ConformityVerdict, texts: Texts) -> str:
+    """The guard band of a verdict in the unit of its parameter, as an uncertainty is written."""
+    if not verdict.guard_band:
+        return "0"
+    return texts.number(round_uncertainty(verdict.guard_band))
+
+
+def _risk(risk: float | None, texts: Texts) -> str:
+    """A global risk in percent, two digits behind the decimal sign; a dash where no spread is stated."""
+    if risk is None:
+        return "\N{EN DASH}"
+    hundredth = Decimal("0.01")
+    if risk < 1e-4:
+        return f"< {texts.number(hundredth)}\N{NO-BREAK SPACE}%"
+    return f"{texts.number(round_to_place(100.0 * risk, hundredth))}\N{NO-BREAK SPACE}%"
 
 
 def _probability(p: float, texts: Texts) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from monitor import __version__
-from monitor.records import Campaign, LinearAxes
+from monitor.records import Campaign
 from monitor.reporting.pdf.layout_engine import engine_versions
 from monitor.store import Database, StoredModel
 from monitor.workflow.certificate.files import HashedFile, font_hashes
@@ -15,7 +15,7 @@ from monitor.workflow.certificate.inputs import CertificateInputs, RunInputs
 from monitor.workflow.certificate.orders import Measured
 from monitor.workflow.certificate.results import StoredMonteCarlo, stored_monte_carlo
 from monitor.workflow.models import label
-from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.request import Asked, UncertaintyRequest
 from monitor.workflow.uncertainty.stored import StatedUncertainty, stored_uncertainty
 
 
@@ -39,17 +39,17 @@ class CertifiedRun:
 
 
 def certified_run(
-    db: Database, campaign: Campaign, model: StoredModel, measured: Measured, linear_axes: LinearAxes | None
+    db: Database, campaign: Campaign, model: StoredModel, measured: Measured, asked: Asked
 ) -> CertifiedRun:
     """The run's stored evaluation where there is one, else a new one, with the Monte Carlo result stored of it."""
-    evaluated = stored_uncertainty(db, campaign, measured.run, model, linear_axes)
+    evaluated = stored_uncertainty(db, campaign, measured.run, model, asked)
     if evaluated is None:
-        evaluated = _evaluated(db, campaign, model, measured.run, linear_axes)
+        evaluated = _evaluated(db, campaign, model, measured.run, asked)
     return CertifiedRun(measured, evaluated, stored_monte_carlo(db, evaluated))
 
 
 def _evaluated(
-    db: Database, campaign: Campaign, model: StoredModel, run: int, linear_axes: LinearAxes | None
+    db: Database, campaign: Campaign, model: StoredModel, run: int, asked: Asked
 ) -> StatedUncertainty:
     """The evaluation of a run that has none in the database."""
     # Solver and compiler take a second to load, for which a stored result need not wait.
@@ -57,13 +57,14 @@ def _evaluated(
     from monitor.workflow.uncertainty.stating import statement
 
     version = f"{model.name}@{model.version}"
-    request = UncertaintyRequest(campaign.name, run, model=version, method="guf", linear_axes=linear_axes)
+    request = UncertaintyRequest(
+        campaign.name, run, model=version, method="guf", linear_axes=asked.linear_axes, sources=asked.sources,
+        holds_for=asked.holds_for,
+    )  # fmt: skip
     return StatedUncertainty(campaign, model, statement(evaluate(db, request)))
 
 
-def inputs_of(
-    runs: Sequence[CertifiedRun], linear_axes: LinearAxes | None, fonts: Sequence[Path]
-) -> CertificateInputs:
+def inputs_of(runs: Sequence[CertifiedRun], asked: Asked, fonts: Sequence[Path]) -> CertificateInputs:
     """What the results were computed from."""
     evaluated = runs[0].evaluated
     return CertificateInputs(
@@ -77,5 +78,6 @@ def inputs_of(
         fonts=font_hashes(fonts),
         states=tuple(run.measured.state for run in runs),
         as_left=runs[1].inputs if len(runs) > 1 else None,
-        linear_axes_mm=linear_axes,
+        linear_axes_mm=asked.linear_axes,
+        sources=asked.sources,
     )

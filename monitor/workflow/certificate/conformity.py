@@ -1,6 +1,14 @@
-"""Statements of conformity on demand: the tolerances of the campaign, a decision rule with its name, the risk."""
+"""Statements of conformity on demand: the tolerances of the campaign, a decision rule with its name, the risk.
+
+Which rule: ``iso14253`` (or ``probability``, the same decision named after JCGM 106) and ``ilac`` for every parameter
+by itself; ``guard`` where all statements together are to hold; ``simple`` where both sides share the risk.
+"""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,17 +18,41 @@ from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.numbers import decimal_of, round_to_place, written_probability
 from monitor.reporting.texts import Texts
 
-#: Probability of conformity that the third rule asks for; its complement decides for failure.
+#: Probability of conformity that ISO 14253-1:2017 asks for where nothing else is agreed; its complement decides for
+#: failure.
 WANTED = 0.95
+#: Coverage probability of U in ILAC-G8:09/2019 and EA-4/02 M:2022: k = 2 for a normal distribution.
+COVERED = 0.9545
+#: Halvings of an interval that find a limit of acceptance to 1e-12 of the tolerance.
+_HALVINGS = 40
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """One parameter: absolute ``value``, ``limit``, ``u``, degrees of freedom, guard band w, probability."""
+
+    value: float
+    limit: float
+    u: float
+    dof: float
+    band: float
+    probability: float
 
 
 def statement_of(
-    result: ResultSet, rule: str, texts: Texts, *, campaign: str, dof: float
+    result: ResultSet,
+    rule: str,
+    texts: Texts,
+    *,
+    campaign: str,
+    freedoms: Mapping[str, float],
+    process: Mapping[str, float] | None = None,
 ) -> ConformityStatement:
     """The statement on every parameter of a result that has a tolerance, in the language of ``texts``.
 
-    ``dof`` are the degrees of freedom of the result's covariance. Raises InputError where ``campaign``, which the
-    tolerances are from, states none.
+    ``freedoms`` are the degrees of freedom of every parameter's variance, ``process`` the standard deviations of true
+    values about zero where global risks are asked for. Raises InputError where ``campaign``, which the tolerances are
+    from, states none, or ``process`` names a parameter that has none.
     """
     # Loaded here: most certificates state no conformity.
     from monitor.uncertainty.conformity import conformity
@@ -32,41 +64,134 @@ def statement_of(
             f"campaign {campaign} states no tolerance of {', '.join(result.names)}: a statement of conformity "
             "needs [machine.tolerances] in its campaign.toml"
         )
+    names = [result.names[index] for index in limited]
+    unknown = sorted(set(process or {}) - set(names))
+    if unknown:
+        raise InputError(
+            f"--process {unknown[0]}: only {', '.join(names)} have a result and a tolerance in campaign {campaign}"
+        )
     tolerance = limits[limited]
+    dofs = np.array([freedoms[name] for name in names])
     judged = conformity(
-        result.estimate[limited], result.covariance[np.ix_(limited, limited)], -tolerance, tolerance, dof=dof
+        result.estimate[limited], result.covariance[np.ix_(limited, limited)], -tolerance, tolerance, dof=dofs
     )
     verdicts = []
-    for index, p in zip(map(int, limited), map(float, judged.single), strict=True):
-        value, limit = abs(float(result.estimate[index])), float(limits[index])
-        verdict = _verdict(rule, value, limit, float(result.expanded[index]), p)
-        verdicts.append(ConformityVerdict(result.names[index], result.units[index], limit, verdict, p))
-    sign = texts.decimal_sign
-    wanted, failing = (
-        written_probability(round(probability, 12), sign) for probability in (WANTED, 1.0 - WANTED)
+    for index, dof, p in zip(map(int, limited), map(float, dofs), map(float, judged.single), strict=True):
+        u = float(result.u[index])
+        band = _guard_factor(rule, result, dof) * u
+        parameter = _Judged(abs(float(result.estimate[index])), float(limits[index]), u, dof, band, p)
+        name = result.names[index]
+        risks = _global_risks(rule, parameter, (process or {}).get(name))
+        verdicts.append(
+            ConformityVerdict(
+                name, result.units[index], parameter.limit, _verdict(rule, parameter), p, band, *risks
+            )
+        )
+    return ConformityStatement(
+        *_rule_in_words(rule, result, texts),
+        tuple(verdicts),
+        judged.joint,
+        result.state,
+        _basis(campaign, float(dofs.min()), texts),
+        _process_in_words(verdicts, process or {}, texts),
     )
+
+
+def _rule_in_words(rule: str, result: ResultSet, texts: Texts) -> tuple[str, str]:
+    sign = texts.decimal_sign
+    wanted, failing, outside = (
+        written_probability(round(probability, 4), sign)
+        for probability in (WANTED, 1.0 - WANTED, 0.5 * (1.0 - COVERED))
+    )
+    covered, p = written_probability(COVERED, sign), written_probability(result.p, sign)
     rule_text, risk = (
         texts(
-            f"conformity.{what}_{rule}", p=written_probability(result.p, sign), wanted=wanted, failing=failing
+            f"conformity.{what}_{rule}",
+            p=p, wanted=wanted, failing=failing, covered=covered, outside=outside, count=len(result.names),
         )
         for what in ("rule", "risk")
+    )  # fmt: skip
+    return rule_text, risk
+
+
+def _basis(campaign: str, dof: float, texts: Texts) -> str:
+    if math.isinf(dof):
+        return texts("conformity.basis_normal", campaign=campaign)
+    freedom = texts.number(round_to_place(dof, decimal_of(0.1)))
+    return texts("conformity.basis_student", campaign=campaign, dof=freedom)
+
+
+def _process_in_words(
+    verdicts: list[ConformityVerdict], process: Mapping[str, float], texts: Texts
+) -> str | None:
+    if not process:
+        return None
+    units = {verdict.name: verdict.unit for verdict in verdicts}
+    spreads = ", ".join(
+        f"{name} {texts.number(decimal_of(spread))}\N{NO-BREAK SPACE}{units[name]}"
+        for name, spread in process.items()
     )
-    law = "normal" if np.isinf(dof) else "student"
-    freedom = "" if np.isinf(dof) else texts.number(round_to_place(dof, decimal_of(0.1)))
-    basis = texts(f"conformity.basis_{law}", campaign=campaign, dof=freedom)
-    return ConformityStatement(rule_text, risk, tuple(verdicts), judged.joint, result.state, basis)
+    return texts("conformity.process", spreads=spreads)
 
 
-def _verdict(rule: str, value: float, limit: float, expanded: float, probability: float) -> Verdict:
-    """The verdict on an absolute ``value``; ``probability`` is that of conformity."""
+def _guard_factor(rule: str, result: ResultSet, dof: float) -> float:
+    """The guard band w in standard uncertainties."""
+    from monitor.uncertainty.coverage import single_factor
+
+    if rule == "simple":
+        return 0.0
+    if rule == "guard":
+        return result.k_q
+    if rule == "ilac":
+        return single_factor(COVERED, dof)
+    # One limit is near, the other far: the one-sided quantile.
+    return single_factor(2.0 * WANTED - 1.0, dof)
+
+
+def _verdict(rule: str, judged: _Judged) -> Verdict:
+    """The verdict on one parameter."""
+    value, limit, band = judged.value, judged.limit, judged.band
     if rule == "simple":
         return Verdict.PASS if value <= limit else Verdict.FAIL
-    if rule == "guard":
-        if value <= limit - expanded:
+    if rule in ("guard", "ilac"):
+        if value <= limit - band:
             return Verdict.PASS
-        if value > limit + expanded:
+        if value > limit + band:
             return Verdict.FAIL
         return Verdict.CONDITIONAL_PASS if value <= limit else Verdict.CONDITIONAL_FAIL
-    if probability >= WANTED:
+    if judged.probability >= WANTED:
         return Verdict.PASS
-    return Verdict.FAIL if probability <= 1.0 - WANTED else Verdict.UNDECIDED
+    return Verdict.FAIL if judged.probability <= 1.0 - WANTED else Verdict.UNDECIDED
+
+
+def _global_risks(rule: str, judged: _Judged, spread: float | None) -> tuple[float | None, float | None]:
+    """Consumer's and producer's risk of passing by the rule, None where no spread is stated."""
+    if spread is None:
+        return None, None
+    from monitor.uncertainty.risk import Process
+
+    accepted = _acceptance(rule, judged)
+    interval = None if accepted is None else (-accepted, accepted)
+    risks = Process(0.0, spread).risks(judged.u, (-judged.limit, judged.limit), interval)
+    return risks.consumer, risks.producer
+
+
+def _acceptance(rule: str, judged: _Judged) -> float | None:
+    """The largest absolute estimate that passes; None where none does."""
+    from monitor.uncertainty.conformity import conformity
+
+    if rule in ("simple", "guard", "ilac"):
+        return judged.limit - judged.band if judged.band <= judged.limit else None
+
+    def passes(value: float) -> bool:
+        limit = judged.limit
+        p = conformity([value], [[judged.u**2]], [-limit], [limit], dof=judged.dof).single[0]
+        return bool(p >= WANTED)
+
+    if not passes(0.0):
+        return None
+    low, high = 0.0, judged.limit
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if passes(middle) else (low, middle)
+    return low

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED
 from monitor.records import LinearAxes
+from monitor.sources import Source
 from monitor.workflow.certificate.files import HashedFile
 
 
@@ -40,6 +41,7 @@ class CertificateInputs:
     states: tuple[str, ...]
     as_left: RunInputs | None = field(default=None, metadata=OMITTED)
     linear_axes_mm: LinearAxes | None = field(default=None, metadata=OMITTED)
+    sources: tuple[Source, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

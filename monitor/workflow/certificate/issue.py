@@ -8,7 +8,6 @@ from datetime import date
 from typing import Literal
 
 from monitor.documents import to_document
-from monitor.records import Campaign
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.certificate.record import CertificateRecord
@@ -27,9 +26,9 @@ from monitor.workflow.certificate.answer import CertificateFileAnswer, Certifica
 from monitor.workflow.certificate.certified import CertifiedRun, certified_run, inputs_of
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.files import keep_issued, path_of, prepared, publish
+from monitor.workflow.certificate.grounds import accepted_grounds, grounds_of
 from monitor.workflow.certificate.inputs import CertificateInputs
 from monitor.workflow.certificate.orders import (
-    Measured,
     check_adjustment,
     check_day,
     check_number,
@@ -42,14 +41,15 @@ from monitor.workflow.certificate.request import AmendmentRequest, CertificateRe
 from monitor.workflow.certificate.results import results_of
 from monitor.workflow.certificate.states import state_of
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import label, resolve
+from monitor.workflow.models import label, resolve_for
 
 
 def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     """Issue a certificate: the PDF as a file, record and document in the database.
 
     Raises IncompleteCertificateError with the list of what the laboratory's file and the campaign leave open,
-    InputError where the campaign states no tolerances or the key does not open.
+    RefusedResultError with the grounds that speak against it and are not accepted, InputError where the campaign states
+    no tolerances or the key does not open.
     """
     stated = read_laboratory(request.laboratory)
     campaign = machine_campaign(db, request.campaign, "certificate issue", lambda method: method.certificate)
@@ -66,10 +66,15 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     number = request.number or next_number(db, day.year)
     path = path_of(request.out, number)
     keep_issued(db, path)
-    runs = _certified(db, campaign, measured, request)
+    model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
+    grounds = grounds_of(campaign, model, [run.run for run in measured])
+    accepted = accepted_grounds(grounds, request.accept)
+    runs = [certified_run(db, campaign, model, run, request.asked) for run in measured]
     identity = CertificateIdentity(number, day, label(runs[-1].evaluated.model))
-    record = dataclasses.replace(_record(stated, runs, request, identity), replaces=replaced)
-    inputs = inputs_of(runs, request.linear_axes, request.fonts)
+    record = dataclasses.replace(
+        _record(stated, runs, request, identity), replaces=replaced, accepted=accepted or None
+    )
+    inputs = inputs_of(runs, request.asked, request.fonts)
     pdf = certificate_pdf(record, request.fonts, to_document(inputs))
     if request.key is not None:
         pdf = sign(pdf, request.key)
@@ -88,13 +93,6 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
 def today() -> date:
     """The present day by the clock of this computer."""
     return date.today()
-
-
-def _certified(
-    db: Database, campaign: Campaign, measured: Sequence[Measured], request: CertificateRequest
-) -> list[CertifiedRun]:
-    model = resolve(db, request.model, campaign.method)
-    return [certified_run(db, campaign, model, run, request.linear_axes) for run in measured]
 
 
 def _save(
@@ -137,7 +135,12 @@ def _record(
     if request.conformity is not None:
         # Of the state in which the machine is handed back.
         statement = statement_of(
-            results[-1], request.conformity, texts, campaign=last.campaign.name, dof=last.dof
+            results[-1],
+            request.conformity,
+            texts,
+            campaign=last.campaign.name,
+            freedoms=dict(zip(last.names, map(float, last.dof_by_parameter), strict=True)),
+            process=request.process,
         )
         record = dataclasses.replace(record, conformity=statement)
     if request.draft and record.title:

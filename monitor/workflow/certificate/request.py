@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from datetime import date
 from pathlib import Path
 
 from monitor.exceptions import InputError
 from monitor.records import LinearAxes
+from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import Key
+from monitor.sources import Source
+from monitor.workflow.uncertainty.request import Asked, holds_for
 
 METHODS = ("guf", "mcm")
 #: Decision rules of a statement of conformity. Each has its words and its risk among the texts: conformity.rule_simple,
 #: conformity.risk_simple, ...
-RULES = ("simple", "guard", "probability")
+RULES = ("simple", "guard", "iso14253", "ilac", "probability")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,12 +28,15 @@ class CertificateOptions:
     ``laboratory`` is the file of what the laboratory states. ``as_left`` is the run that was measured after an
     adjustment or repair: its results stand beside those as found (ISO/IEC 17025:2017, 7.8.4.1 d), or alone. ``out`` is
     a folder or a file. ``number`` is the next free one of the year and ``issued_on`` today where None. ``linear_axes``
-    are those of `monitor uncertainty`, for a method that takes these axes as known. ``method``: guf, or mcm for the
+    are those of `monitor uncertainty`, for a method that takes these axes as known, and so are ``sources`` and
+    ``holds_for``. ``method``: guf, or mcm for the
     stored Monte Carlo result. ``conformity`` names a decision rule; its statement replaces the laboratory's word on
-    conformity. ``with_map`` adds the volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key``
-    signs it.
+    conformity. ``process`` are standard deviations by parameter, in its unit, with which the true values of machines
+    of this kind scatter about zero: the statement then has the global risks of its rule. ``with_map`` adds the
+    volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key`` signs it. ``accept`` names the
+    grounds against the certificate that the laboratory answers for, each with the reason that is printed on it.
 
-    Raises InputError for a method or a rule that there is not.
+    Raises InputError for a method or a rule that there is not, or a blank reason.
     """
 
     laboratory: Path
@@ -38,18 +46,36 @@ class CertificateOptions:
     issued_on: date | None = None
     model: str | None = None
     linear_axes: LinearAxes | None = None
+    sources: tuple[Source, ...] | None = None
+    holds_for: str | None = None
     method: str = "guf"
     draft: bool = False
     conformity: str | None = None
+    process: Mapping[str, float] = field(default_factory=dict)
     with_map: bool = False
     fonts: tuple[Path, ...] = ()
     key: Key | None = None
+    accept: Mapping[GroundKind, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise InputError(f"--method {self.method}: a certificate states guf or mcm")
         if self.conformity not in (None, *RULES):
             raise InputError(f"there is no decision rule '{self.conformity}'; there are {', '.join(RULES)}")
+        if self.process and self.conformity is None:
+            raise InputError("--process belongs to a statement of conformity: name its rule by --conformity")
+        for name, spread in self.process.items():
+            if not 0.0 < spread < math.inf:
+                raise InputError(f"--process {name}={spread:g}: a standard deviation is positive")
+        holds_for(self.holds_for)
+        for kind, reason in self.accept.items():
+            if not reason.strip():
+                raise InputError(f"--accept {kind}=REASON: say why the laboratory accepts it; it is printed")
+
+    @property
+    def asked(self) -> Asked:
+        """What decides the numbers of the evaluation besides run and model."""
+        return Asked(linear_axes=self.linear_axes, holds_for=holds_for(self.holds_for), sources=self.sources)
 
 
 @dataclass(frozen=True)

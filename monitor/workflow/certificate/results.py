@@ -9,7 +9,8 @@ import numpy as np
 from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods.model import chain_of
-from monitor.records import Array
+from monitor.records import Array, ValidationVerdict
+from monitor.reporting.budget import Budget, HoldsFor, budget_lines
 from monitor.reporting.certificate.machine_frame_result import MachineFrameResult
 from monitor.reporting.certificate.results import (
     CoverageFactors,
@@ -21,7 +22,7 @@ from monitor.reporting.certificate.results import (
 )
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.reporting.frames import referred
-from monitor.reporting.numbers import decimal_of, round_to_place, written_factor
+from monitor.reporting.numbers import decimal_of, round_to_place, round_uncertainty, written_factor
 from monitor.reporting.symbols import describe
 from monitor.reporting.texts import Texts
 from monitor.store import Database, check_analysis, stored_analyses
@@ -104,23 +105,33 @@ def results_of(
 ) -> ResultSet:
     """The results that a certificate prints, by the GUM framework or by Monte Carlo; as found where no state is given.
 
-    The readings' covariance is known from few runs: both methods are printed with the factors that hold for so few
-    (Hotelling, Student), which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where
-    the method cannot be certified, DataError where there are too few runs for any joint region.
+    The readings' covariance is known from few runs: both methods are printed with the factors that hold for so few,
+    which a Monte Carlo of a known covariance cannot give. Raises InputError, NotFoundError where the method cannot be
+    certified, DataError where there are too few runs for any joint region.
     """
-    if not np.isfinite(evaluated.k_p):
+    # Few days bound no ellipsoid, but the intervals over the campaign, which are stated without it.
+    over_campaign = evaluated.answer.holds_for is HoldsFor.CAMPAIGN and np.isfinite(evaluated.k_q)
+    if not (np.isfinite(evaluated.k_p) or over_campaign):
         raise DataError(
-            f"{evaluated.dof:.0f} degrees of freedom bound no joint region of {len(evaluated.names)} parameters; "
+            f"the runs behind the covariance of the readings are too few for a joint region of "
+            f"{len(evaluated.names)} parameters: they need more degrees of freedom than there are parameters; "
             "a certificate needs more repeated runs"
         )
     answer = evaluated.answer
     estimate, covariance = evaluated.estimate, evaluated.covariance
-    factors = CoverageFactors(answer.p, evaluated.k_p, evaluated.k_q, answer.guf.rank, evaluated.dof)
+    factors = CoverageFactors(
+        answer.p,
+        evaluated.k_p,
+        evaluated.k_q,
+        answer.guf.rank,
+        evaluated.dof,
+        answer.guf.coverage_sampling,
+    )
     if method == "mcm":
         monte_carlo = _certifiable(evaluated, monte_carlo)
         estimate, covariance = monte_carlo.estimate, monte_carlo.covariance
         if not np.isfinite(evaluated.dof):
-            factors = replace(factors, k_p=monte_carlo.mcm.k_p, k_q=monte_carlo.mcm.k_q)
+            factors = replace(factors, k_p=monte_carlo.mcm.k_p, k_q=monte_carlo.mcm.k_q, sampling=None)
     limits = evaluated.campaign.machine.tolerances
     chain = chain_of(evaluated.campaign.machine)
     frames = frames_of(evaluated.names, chain)
@@ -145,6 +156,7 @@ def results_of(
             },
             machine_frame=_in_machine_frame(evaluated, chain, estimate, covariance),
             tolerances={name: limits[name] for name in limits if name in evaluated.names} or None,
+            budget=_budget(answer),
         ),
         texts,
     )
@@ -178,6 +190,21 @@ def _single_factor(evaluated: StatedUncertainty) -> float:
     return single_factor(evaluated.answer.p, evaluated.fewest_dof)
 
 
+def _budget(answer: UncertaintyAnswer) -> Budget | None:
+    """What stands behind the uncertainty; None for an answer that does not say it."""
+    if answer.holds_for is None:
+        return None
+    guf = answer.guf
+    u = {name: guf.u[name] for name in answer.parameters}
+    return Budget(
+        answer.holds_for,
+        budget_lines(guf.budget, u, guf.budget_degrees_of_freedom or {}),
+        answer.day_to_day,
+        answer.sources or (),
+        answer.length,
+    )
+
+
 def _certifiable(evaluated: StatedUncertainty, monte_carlo: StoredMonteCarlo | None) -> StoredMonteCarlo:
     if monte_carlo is None:
         run, campaign = evaluated.run, evaluated.campaign.name
@@ -206,14 +233,17 @@ def _evaluation(
         ]
     else:
         parts = [texts("evaluation.framework", readings=readings)]
-    if np.isfinite(evaluated.dof):
-        # Two numbers, so that either factor can be found again: k_q by Student's t of the least known of the outputs,
-        # k_p by Hotelling's T² of all of them together.
-        single, joint = (
-            texts.number(round_to_place(dof, decimal_of(0.1)))
-            for dof in (evaluated.fewest_dof, evaluated.dof)
+    sampling = evaluated.answer.guf.coverage_sampling
+    if np.isfinite(evaluated.dof) and sampling is not None:
+        # Seed and trials, so that either factor can be computed again from the budget.
+        parts[0] += ", " + texts(
+            "evaluation.factors",
+            single=texts.number(round_to_place(evaluated.fewest_dof, decimal_of(0.1))),
+            trials=sampling.trials,
+            seed=sampling.seed,
+            u_q=texts.number(round_uncertainty(max(sampling.k_q_standard_error, 0.0001), 1)),
+            u_p=texts.number(round_uncertainty(max(sampling.k_p_standard_error, 0.0001), 1)),
         )
-        parts[0] += ", " + texts("evaluation.degrees_of_freedom", single=single, joint=joint)
         if method == "mcm" and monte_carlo is not None:
             k_q = written_factor(monte_carlo.mcm.k_q, texts.decimal_sign)
             k_p = written_factor(monte_carlo.mcm.k_p, texts.decimal_sign)
@@ -233,11 +263,20 @@ def _verdict(monte_carlo: StoredMonteCarlo, texts: Texts) -> str | None:
     validation = monte_carlo.answer.validation
     if validation is None:
         return None
-    if validation.passed:
-        return texts("evaluation.validated")
-    if not validation.failed:
+    if validation.verdict is ValidationVerdict.UNDECIDED:
         return texts("evaluation.undecided")
-    return texts("evaluation.not_validated", quantities=", ".join(validation.failed))
+    confirmed = ", ".join(
+        texts("evaluation.estimates") if kind == "estimate" else kind for kind in validation.confirmed
+    )
+    if validation.verdict is ValidationVerdict.VALIDATED:
+        return texts("evaluation.validated", quantities=confirmed)
+    # An earlier version compared a bound of k_q, which no result stated, with what the correlations ask for.
+    bound = validation.failed == ("k_q",) and monte_carlo.answer.guf.coverage_sampling is None
+    return texts(
+        "evaluation.bound_not_validated" if bound else "evaluation.not_validated",
+        quantities=", ".join(validation.failed),
+        confirmed=confirmed,
+    )
 
 
 def _how_it_fits(evaluated: StatedUncertainty, texts: Texts) -> str:

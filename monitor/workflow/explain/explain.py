@@ -9,12 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
-from monitor.discovery import Explanation, Fit, Verdict, find_mistakes, fit, is_gross
+from monitor.discovery import (
+    Explanation,
+    RobustFit,
+    Verdict,
+    find_mistakes,
+    find_other_names,
+    is_gross,
+    robust_fit,
+)
 from monitor.discovery import compare as compare_fit
 from monitor.discovery import explain as search
 from monitor.discovery.curve.explain import explain_curve
 from monitor.documents import to_document
 from monitor.exceptions import DataError
+from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -26,38 +35,45 @@ from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sent
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.measured import load_measured
-from monitor.workflow.models import label, resolve
+from monitor.workflow.models import label, resolve_for, subject_of
 
 # Seeds the search for steps, whose null distribution is drawn; stored with the result.
 SEED = 20260302
 
 
-def first_fit(campaign: Campaign, model: StoredModel) -> Fit:
-    """The model fitted to a machine's campaign.
+def first_fit(campaign: Campaign, model: StoredModel) -> RobustFit:
+    """The model fitted to a machine's campaign, without its grossly wrong readings.
 
     Raises DataError where it cannot be fitted, with what looks wrong in the file where that can be said.
     """
     try:
-        return fit(machine_problem(campaign, model))
+        return robust_fit(machine_problem(campaign, model))
     except DataError as error:
         mistakes = find_mistakes(campaign, lambda changed: machine_problem(changed, model), None)
         raise DataError(f"{error}. {mistake_sentence(mistakes)}" if mistakes else str(error)) from error
 
 
-def explanation_of(campaign: Campaign, model: StoredModel, first: Fit, rate: float = RATE) -> Explanation:
-    """Which physical effect a model lacks, or what looks wrong in the file; ``first`` is its fit to the campaign."""
-    mistakes = (
-        find_mistakes(campaign, lambda changed: machine_problem(changed, model), first)
-        if is_gross(campaign, first)
-        else ()
-    )
+def explanation_of(
+    campaign: Campaign, model: StoredModel, robust: RobustFit, rate: float = RATE
+) -> Explanation:
+    """Which physical effect a model lacks, or what looks wrong in the file; ``robust`` is its fit to the campaign."""
+    first = robust.fit
+
+    def maker(changed: Campaign) -> ChainProblem:
+        return machine_problem(changed, model)
+
+    mistakes = find_other_names(campaign, maker, robust)
+    if not mistakes and is_gross(campaign, first):
+        mistakes = find_mistakes(campaign, maker, first)
     if mistakes:
         comparison = replace(
             compare_fit(first, campaign.name, label(model)), verdict=Verdict.SOMETHING_IS_MISSING
         )
         return Explanation(comparison, (), (), (), (), (), (), first, mistakes)
     rng = np.random.default_rng(SEED)
-    explanation = search(campaign, first.problem, label(model), rate=rate, rng=rng, first=first)
+    explanation = search(
+        campaign, first.problem, label(model), rate=rate, rng=rng, first=first, gross=robust.points
+    )
     if is_hopeless(explanation):
         # The effects of the search leave nearly all of the residual: none of them is an answer.
         return replace(explanation, missing=(), suspect=(), moves=(), steps=())
@@ -70,7 +86,7 @@ def explain(db: Database, request: ExplainRequest) -> ExplainAnswer:
     Raises NotFoundError, DataError where the model cannot be fitted, InputError for a folder that cannot be made.
     """
     measured = load_measured(db, request.campaign)
-    model = resolve(db, request.model, measured.method)
+    model = resolve_for(db, request.model, measured.method, subject_of(measured))
     explanation, draw = (
         _search_curve(measured, model, request.rate)
         if isinstance(measured, CurveCampaign)
@@ -90,7 +106,7 @@ def _search_machine(campaign: Campaign, model: StoredModel, rate: float) -> tupl
         from monitor.workflow.explain.figures import comparison_figures, explanation_figures
 
         files = [
-            *comparison_figures(explanation.comparison, first, folder),
+            *comparison_figures(explanation.comparison, first.fit, folder),
             *explanation_figures(answer, explanation, folder),
         ]
         # The residual over the workspace belongs to both.

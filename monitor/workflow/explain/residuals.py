@@ -22,9 +22,10 @@ def in_machine_frame(fit: Fit, vectors: Array | None = None) -> tuple[Array, Arr
     """
     context = fit.problem.context
     evaluated = fit.problem.evaluated(fit.solution.local, fit.solution.common)
-    turned = np.einsum(
-        "nij,nj->ni", evaluated.work_rotation, evaluated.residual if vectors is None else vectors
-    )
+    whole = evaluated.residual
+    if fit.problem.observes_numbers:
+        whole = fit.problem.as_vectors(whole)
+    turned = np.einsum("nij,nj->ni", evaluated.work_rotation, whole if vectors is None else vectors)
     linear = [index for index, joint in enumerate(context.chain.joints) if not joint.turns]
     positions = np.zeros((len(context), 3))
     if len(linear) < 3:

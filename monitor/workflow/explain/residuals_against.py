@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import Explanation, Fit
-from monitor.effects import ArtefactEffect, Basis, ChainEffect, parse_effect
+from monitor.effects import Basis, ChainEffect, ParsedEffect, parse_effect
 from monitor.effects.drivers import Channel, EachRun, RunTime, WarmUp
 from monitor.effects.shapes import Const, Cyclic, FormulaShape, Reversal
 from monitor.exceptions import InputError
@@ -83,18 +83,18 @@ def against_effect(explanation: Explanation, effect: str) -> Against | None:
     return Against(driver, along, columns[driver], before, after)
 
 
-def _fitted(fit: Fit, effect: str) -> tuple[ChainEffect | ArtefactEffect, Array] | None:
+def _fitted(fit: Fit, effect: str) -> tuple[ParsedEffect, Array] | None:
     """The added effect of that text and its coefficients (k,); None where the fit has none."""
     start = 0
     for added in fit.problem.added:
         size = added.basis(fit.problem.context).size
-        if added.text == effect and isinstance(added, ChainEffect | ArtefactEffect):
+        if added.text == effect and isinstance(added, ParsedEffect):
             return added, fit.solution.common[start : start + size]
         start += size
     return None
 
 
-def _direction(fit: Fit, effect: ChainEffect | ArtefactEffect, basis: Basis, size: Array | None) -> Array:
+def _direction(fit: Fit, effect: ParsedEffect, basis: Basis, size: Array | None) -> Array:
     """The displacement (n, d) along which an effect acts: that of its error motion, else that of its coefficients."""
     if isinstance(effect, ChainEffect):
         term = effect.term
@@ -104,7 +104,7 @@ def _direction(fit: Fit, effect: ChainEffect | ArtefactEffect, basis: Basis, siz
     return displacement
 
 
-def _what_drives(fit: Fit, effect: ChainEffect | ArtefactEffect) -> dict[str, Array]:
+def _what_drives(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
     """The columns (n,) that an effect names: its axis's position and its driver, each as people know it."""
     columns = _axis_columns(fit, effect) | _driver_columns(fit, effect)
     if isinstance(effect.driver, EachRun) or (not columns and isinstance(effect, ChainEffect)):
@@ -112,7 +112,7 @@ def _what_drives(fit: Fit, effect: ChainEffect | ArtefactEffect) -> dict[str, Ar
     return columns
 
 
-def _axis_columns(fit: Fit, effect: ChainEffect | ArtefactEffect) -> dict[str, Array]:
+def _axis_columns(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
     """The position of the axis whose shape an effect follows."""
     if not isinstance(effect, ChainEffect) or isinstance(effect.shape, Const | FormulaShape):
         return {}
@@ -127,7 +127,7 @@ def _axis_columns(fit: Fit, effect: ChainEffect | ArtefactEffect) -> dict[str, A
     return {f"{joint.name} / {'°' if joint.turns else 'mm'}": reading}
 
 
-def _driver_columns(fit: Fit, effect: ChainEffect | ArtefactEffect) -> dict[str, Array]:
+def _driver_columns(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
     """What a driver reads: a channel, the time since the first start, the part of the run."""
     context, driver = fit.problem.context, effect.driver
     if isinstance(driver, Channel):

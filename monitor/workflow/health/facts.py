@@ -54,13 +54,14 @@ def parameter_health(
     if tolerance is not None and abs(values[-1]) > tolerance:
         inside = np.flatnonzero(np.abs(values) <= tolerance)
         beyond = starts[int(inside[-1]) + 1 if inside.size else 0]
+    estimate, u, expanded = _stated(series, stated)
     return ParameterHealth(
         name=name,
         description=describe(name),
-        unit=stated.units[name],
-        estimate=stated.guf.estimate[name],
-        u=stated.guf.u[name],
-        expanded=stated.guf.expanded[name],
+        unit=series.unit,
+        estimate=estimate,
+        u=u,
+        expanded=expanded,
         tolerance=tolerance,
         probability_out=judgement.probability_out,
         out_since=beyond,
@@ -74,6 +75,15 @@ def parameter_health(
         # Scatter of a few days, stated a year, would only mislead.
         drift=stated_drift(past.drift, judgement.ahead),
     )
+
+
+def _stated(series: Series, stated: UncertaintyAnswer) -> tuple[float, float, float]:
+    """Estimate, u and U of a parameter: as evaluated, or of an effect added to the model as its last run gives it."""
+    name = series.name
+    if name in stated.units:
+        return stated.guf.estimate[name], stated.guf.u[name], stated.guf.expanded[name]
+    u = float(series.u[-1])
+    return float(series.values[-1]), u, (stated.guf.k_q_with_degrees_of_freedom or stated.guf.k_q) * u
 
 
 def moment_of(t: float, series: Series) -> datetime:

@@ -47,7 +47,7 @@ from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.event_steps import event_steps
 from monitor.workflow.history.past import machine_past, splitting_events
 from monitor.workflow.history.runs import only_runs
-from monitor.workflow.models import resolve
+from monitor.workflow.models import resolve_for
 from monitor.workflow.trend.volumetric import VOLUMETRIC
 
 
@@ -97,7 +97,9 @@ def read_week(db: Database, name: MachineName, week: Week, options: ReportOption
     last = next((run for run in reversed(runs) if week.holds(run.local_start)), None)
     if last is not None:
         measured = MeasuredWeek(
-            last, campaign_span(every, last.campaign, week), resolve(db, options.model, last.method)
+            last,
+            campaign_span(every, last.campaign, week),
+            resolve_for(db, options.model, last.method, name.machine),
         )
         results = stored_results(db, measured)
         task = task_of(db, name.machine, runs, measured, results)
@@ -132,7 +134,8 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         )
     judged = with_volumetric(conformity_of(stated, limits), beyond)
     parameters, drifts = [], {}
-    for name in () if stated is None else stated.parameters:
+    added = [name for name in parameter_pasts if name.startswith(model.effects)]
+    for name in () if stated is None else (*stated.parameters, *added):
         if stated is None or name not in parameter_pasts:
             continue
         parameter = parameter_pasts[name]

@@ -13,13 +13,13 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from monitor.discovery import Fit, fit
+from monitor.discovery import Fit, RobustFit, fit
 from monitor.exceptions import MonitorError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.records import Campaign
 from monitor.store import StoredIdentification, StoredModel
-from monitor.workflow.explain.explain import explanation_of
+from monitor.workflow.explain.explain import explanation_of, first_fit
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.machine_answer import machine_explanation
 from monitor.workflow.explain.version_answer import HistoryAnswer
@@ -98,7 +98,14 @@ class _Fitted:
         self._task = task
 
     @cached_property
+    def robust(self) -> RobustFit:
+        return first_fit(self._task.past, self._task.model)
+
+    @cached_property
     def fit(self) -> Fit:
+        """The fit of all readings: what is identified and stated leaves none out."""
+        if not self.robust.gross:
+            return self.robust.fit
         past = self._task.past
         return fit(campaign_method(past).problem_of(past, as_model(self._task.model)))
 
@@ -133,7 +140,7 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
         )
     if task.explanation:
         explanation = attempted(
-            lambda: machine_explanation(explanation_of(task.past, task.model, fitted.fit)),
+            lambda: machine_explanation(explanation_of(task.past, task.model, fitted.robust)),
             "model and measurement could not be compared",
             remarks,
         )

@@ -15,8 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.documents import OMITTED
+from monitor.exceptions import DataError
+from monitor.statistics.before_after import before_after
 from monitor.statistics.normalised_error import K, normalised_error, result_of_runs
 from monitor.store import Database, MachineEvent, MachineHistory, latest_documents
+from monitor.workflow.history.series import day_numbers
 
 
 class PairKind(Enum):
@@ -28,7 +31,12 @@ class PairKind(Enum):
 
 @dataclass(frozen=True)
 class ParameterAgreement:
-    """A parameter of two results, in ``unit``: their difference, its expanded uncertainty, and E_n."""
+    """A parameter of two results, in ``unit``: their difference, its expanded uncertainty with the factor ``k``, and
+    E_n.
+
+    Before and after an event u is that of the means without what both share; ``between_days`` is the standard deviation
+    of the days that it holds, None where each side has one day (then it is that of runs alone).
+    """
 
     unit: str
     first: float
@@ -40,6 +48,8 @@ class ParameterAgreement:
     k: float
     e_n: float
     agree: bool
+    degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
+    between_days: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,8 +83,11 @@ def agreement(
 ) -> tuple[AgreementPair, ...]:
     """Compare the results of a machine that should agree, or should not.
 
-    The uncertainty of a result is that of its identification or, where it is larger, the one that was evaluated for
-    its campaign (the latest `monitor uncertainty`), and the scatter of its runs.
+    The uncertainty of the result of a method is that of its identification or, where it is larger, the one that was
+    evaluated for its campaign (the latest `monitor uncertainty`), and the scatter of its runs. Before and after an
+    event
+    one method measured with the same artefact and probe: what they share drops out, and the scatter of runs and days is
+    left (``before_after``).
     """
     comparisons = list(_comparisons(history, events))
     # Of years of campaigns few are compared: only their results are read.
@@ -129,16 +142,46 @@ def _with_stated(history: MachineHistory, stated: Mapping[str, Mapping[str, floa
     return replace(history, u=u)
 
 
+def _rows(history: MachineHistory, comparison: _Comparison, column: int) -> list[npt.NDArray[np.bool_]]:
+    """The runs (n,) of each side that have a parameter."""
+    sides = zip(comparison.pair.campaigns, (comparison.before, comparison.after), strict=True)
+    finite = np.isfinite(history.values[:, column])
+    return [
+        finite & (history.campaign == campaign) & (True if side is None else side) for campaign, side in sides
+    ]
+
+
+def _across_event(
+    history: MachineHistory, comparison: _Comparison, column: int, unit: str
+) -> ParameterAgreement | None:
+    """A parameter before and after an event; None where its runs do not suffice."""
+    days, (before, after) = day_numbers(history), _rows(history, comparison, column)
+    if not before.any() or not after.any():
+        return None
+    values = history.values[:, column]
+    try:
+        result = before_after(values[before], values[after], days[before], days[after])
+    except DataError:
+        return None
+    return ParameterAgreement(
+        unit, result.before, result.u_before, result.after, result.u_after, result.difference, result.expanded,
+        result.k, result.e_n, result.agree, result.dof, result.between,
+    )  # fmt: skip
+
+
 def _compared(history: MachineHistory, comparison: _Comparison) -> AgreementPair:
     first, second = comparison.pair.campaigns
-    parameters = {}
+    parameters: dict[str, ParameterAgreement] = {}
     for column, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
+        if comparison.pair.kind is PairKind.EVENT:
+            across = _across_event(history, comparison, column, unit)
+            if across is not None:
+                parameters[name] = across
+            continue
         results = []
-        for campaign, side in ((first, comparison.before), (second, comparison.after)):
+        for campaign in (first, second):
             rows = (history.campaign == campaign) & np.isfinite(history.values[:, column])
             rows &= np.isfinite(history.u[:, column])
-            if side is not None:
-                rows &= side
             if rows.any():
                 results.append(result_of_runs(history.values[rows, column], history.u[rows, column]))
         if len(results) < 2 or results[0][1] + results[1][1] == 0.0:
@@ -168,4 +211,9 @@ def sentence(pair: AgreementPair) -> str:
         for name in pair.disagree
     )
     subject = f"before and after the {pair.event} ({first}, {second}; {pair.method})"
-    return f"{subject}: {moved or 'nothing moved beyond the uncertainties'}; {number}"
+    days = (
+        "; each side is one day: days that differ are not told from a change"
+        if all(parameter.between_days is None for parameter in pair.parameters.values())
+        else ""
+    )
+    return f"{subject}: {moved or 'nothing moved beyond the scatter of runs and days'}; {number}{days}"

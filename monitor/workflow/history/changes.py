@@ -16,6 +16,7 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics import Change, History, find_changes
+from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 
 #: Probability of any change where there is none, over all parameters and the whole history of a machine: a change that
@@ -99,7 +100,7 @@ def search_changes(
         try:
             history = find_changes(
                 plan.values, t, rng=np.random.default_rng([seed, len(t)]), events=sorted(events),
-                u=plan.u, days=plan.days,
+                u=plan.u, days=plan.days, cycle=DAYS_PER_YEAR,
                 false_alarm=false_alarm * len(plan.values) / len(series),
                 # Five times as many trials as the level of one parameter in one piece needs at least.
                 trials=max(TRIALS, ceil(5 * len(series) * pieces / false_alarm)),

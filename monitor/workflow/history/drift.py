@@ -9,6 +9,7 @@ import numpy as np
 
 from monitor.exceptions import DataError
 from monitor.statistics import Trend, trend
+from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 
 #: A slope a year is stated from so many days of history on. Over fewer, the scatter of a few days, multiplied by
@@ -40,7 +41,7 @@ class PieceDrift:
         if len(piece.t) and np.ptp(piece.values) == 0.0:
             return f"no drift of {piece.name}: it has the same value in every run"
         try:
-            return trend(piece.values, piece.t, u=piece.weights(), days=piece.days)
+            return trend(piece.values, piece.t, u=piece.weights(), days=piece.days, cycle=DAYS_PER_YEAR)
         except DataError as error:
             return f"no drift: {error}"
 

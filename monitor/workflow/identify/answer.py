@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from monitor.documents import INLINED, OMITTED
 from monitor.effects.shapes import REVERSAL_VALUE, has_reversal_value
+from monitor.methods.chain.identification import TakenUp
 from monitor.records import FrameOfReference
 from monitor.reporting.refused import RefusedParameters
 
@@ -105,7 +106,8 @@ class ResponseOverInputs:
 
 @dataclass(frozen=True, kw_only=True)
 class IdentifyAnswer:
-    """The runs of a campaign under a model; ``added`` are the effects that all runs share.
+    """The runs of a campaign under a model; ``added`` are the effects that all runs share, ``taken_up`` the errors that
+    no plan gives a number of their own, where the method names them.
 
     A curve has ``curve`` and the ``autocorrelation`` of its rows, a machine neither; a machine has ``frames``, what
     each parameter is stated relative to, and the ``reversal_values`` (ISO 230-2) of plays among the added effects.
@@ -122,6 +124,7 @@ class IdentifyAnswer:
     autocorrelation: CurveNoise | None = field(default=None, metadata=OMITTED)
     frames: Mapping[str, FrameOfReference] | None = field(default=None, metadata=OMITTED)
     reversal_values: Mapping[str, Estimate] | None = field(default=None, metadata=OMITTED)
+    taken_up: tuple[TakenUp, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from monitor.methods.curve.problem import CurveProblem
 from monitor.records import Campaign, CurveCampaign
 from monitor.store import Database, StoredModel
 from monitor.workflow.measured import load_measured
-from monitor.workflow.models import as_model, resolve
+from monitor.workflow.models import as_model, resolve_for, subject_of
 
 
 @dataclass(frozen=True)
@@ -44,5 +44,5 @@ def fit_of(campaign: Campaign | CurveCampaign, model: StoredModel) -> Fit | Curv
 def fitted(db: Database, campaign: str, model: str | None) -> FittedModel:
     """A model (the method's own with None) fitted to a campaign. Raises NotFoundError, DataError."""
     measured = load_measured(db, campaign)
-    stored = resolve(db, model, measured.method)
+    stored = resolve_for(db, model, measured.method, subject_of(measured))
     return FittedModel(measured, stored, fit_of(measured, stored))

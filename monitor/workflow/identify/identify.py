@@ -14,7 +14,7 @@ from monitor.workflow.identify.fitting import curve_problem
 from monitor.workflow.identify.machine import identified, machine_answer
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import load_measured
-from monitor.workflow.models import label, resolve
+from monitor.workflow.models import label, resolve, resolve_for
 
 
 def identify(db: Database, request: IdentifyRequest) -> IdentifyAnswer:
@@ -27,7 +27,9 @@ def identify(db: Database, request: IdentifyRequest) -> IdentifyAnswer:
     if isinstance(measured, CurveCampaign):
         return _identify_curve(db, measured, request)
     campaign = measured if request.run is None else only_run(measured, request.run)
-    identification, stored = identified(campaign, resolve(db, request.model, campaign.method))
+    identification, stored = identified(
+        campaign, resolve_for(db, request.model, campaign.method, campaign.machine.id)
+    )
     save_identification(db, stored)
     return machine_answer(campaign.machine, identification)
 

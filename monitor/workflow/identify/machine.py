@@ -9,6 +9,7 @@ from monitor.methods.chain.identification import Identification, RunIdentificati
 from monitor.methods.chain.problem import Solver, solve_problem
 from monitor.methods.model import chain_of
 from monitor.records import Array, Campaign, Machine
+from monitor.refusal import Reason, ReasonKind, Refusal
 from monitor.reporting.refused import refusal_sentence, refused_parameters
 from monitor.store import StoredIdentification, StoredModel, StoredRun
 from monitor.units import MICROMETRE, Unit
@@ -50,6 +51,7 @@ def machine_answer(machine: Machine, identification: Identification) -> Identify
         added_refused=tuple(map(refused_parameters, identification.added_refused)),
         frames=frames_of((*identification.parameters, *identification.added), chain_of(machine)),
         reversal_values=values or None,
+        taken_up=identification.taken_up or None,
     )
 
 
@@ -79,20 +81,28 @@ def _run(machine: Machine, identification: Identification, run: RunIdentificatio
 
 
 def _stored(campaign: Campaign, identification: Identification, model: StoredModel) -> StoredIdentification:
-    probings = campaign.probings
-    return StoredIdentification(
-        campaign=identification.campaign,
-        model=model.name,
-        model_version=model.version,
-        method=identification.method,
-        parameters=identification.parameters,
-        units=identification.units,
-        runs=tuple(
+    """The runs with their own parameters and, behind them, the added effects as each run alone determines them."""
+    probings, followed = campaign.probings, identification.followed
+    runs = []
+    for index, run in enumerate(identification.runs):
+        count, more = len(run.estimate), len(followed.names)
+        # How the two depend on each other is not stated: the run's own parameters know the effects from all runs.
+        covariance = np.full((count + more, count + more), np.nan)
+        covariance[:count, :count] = run.covariance
+        covariance[count:, count:] = followed.covariance[index]
+        unseen = tuple(
+            Refusal((name,), Reason(ReasonKind.UNSEEN))
+            for name, value in zip(followed.names, followed.estimate[index], strict=True)
+            if np.isnan(value)
+        )
+        runs.append(
             StoredRun(
                 run=run.run,
-                estimate=run.estimate,
-                covariance=run.covariance,
-                refused=tuple((refusal.parameters, refusal_sentence(refusal)) for refusal in run.refused),
+                estimate=np.concatenate([run.estimate, followed.estimate[index]]),
+                covariance=covariance,
+                refused=tuple(
+                    (refusal.parameters, refusal_sentence(refusal)) for refusal in (*run.refused, *unseen)
+                ),
                 rms_mm=run.rms,
                 iterations=identification.iterations,
                 degrees_of_freedom=run.degrees_of_freedom,
@@ -100,6 +110,13 @@ def _stored(campaign: Campaign, identification: Identification, model: StoredMod
                 sequence=probings.sequence[probings.run == run.run],
                 residuals=run.residuals,
             )
-            for run in identification.runs
-        ),
+        )
+    return StoredIdentification(
+        campaign=identification.campaign,
+        model=model.name,
+        model_version=model.version,
+        method=identification.method,
+        parameters=(*identification.parameters, *followed.names),
+        units=(*identification.units, *followed.units),
+        runs=tuple(runs),
     )

@@ -8,9 +8,12 @@ import numpy as np
 
 from monitor.exceptions import EffectError
 from monitor.machine.terms import LOCATION, parse_term
+from monitor.methods import method_named
+from monitor.methods.chain.gross import GrossReading
 from monitor.methods.chain.identification import Identification, RunIdentification
 from monitor.methods.model import chain_of
 from monitor.records import Machine
+from monitor.units import DEGREE, MICROMETRE
 
 # Residuals beyond so many stated standard uncertainties: a probe's statement is seldom wrong by a factor of three.
 TOO_LARGE = 3.0
@@ -24,7 +27,33 @@ LARGEST_PART, LARGEST_OFFSET = 0.05, 5.0
 
 def note(machine: Machine, identification: Identification, run: RunIdentification) -> str:
     """The notes of one run, empty where there is nothing to note."""
-    return "; ".join((*_residuals(run), *_locations(machine, identification, run)))
+    gross = (
+        gross_sentence(reading, method_named(identification.method).nouns.target)
+        for reading in identification.gross
+        if reading.run == run.run
+    )
+    return "; ".join((*gross, *_residuals(run), *_locations(machine, identification, run)))
+
+
+def gross_sentence(reading: GrossReading, target_word: str) -> str:
+    """Which reading is wrong beyond doubt, where it stands in the file, and what to do."""
+    pose = " ".join(
+        f"{at.joint}={DEGREE.to_display(at.reading):.6g}°" if at.turns else f"{at.joint}={at.reading:.6g} mm"
+        for at in reading.pose
+    )
+    stands = f" at {pose}" if pose else ""
+    size = (
+        f"{reading.size:+.3g} mm"
+        if abs(reading.size) >= 0.1
+        else f"{MICROMETRE.to_display(reading.size):+.3g} µm"
+    )
+    others = ", ".join(map(str, reading.others))
+    instead = f" (or sequence {others}: these readings cannot say which)" if others else ""
+    return (
+        f"run {reading.run}: sequence {reading.sequence}, {target_word} {reading.target}{stands}, is off by {size} in "
+        f"{reading.axis}{instead}: no number of this run holds; correct or remove the row in probings.csv, withdraw "
+        "the campaign and import it again"
+    )
 
 
 def _residuals(run: RunIdentification) -> Iterator[str]:

@@ -13,7 +13,7 @@ from monitor.workflow.identify.answer import StepwiseAnswer, StepwiseParameter
 from monitor.workflow.identify.fitting import machine_problem
 from monitor.workflow.identify.request import StepwiseRequest
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import resolve
+from monitor.workflow.models import resolve_for
 
 
 def identify_stepwise(db: Database, request: StepwiseRequest) -> StepwiseAnswer:
@@ -26,7 +26,7 @@ def identify_stepwise(db: Database, request: StepwiseRequest) -> StepwiseAnswer:
     assert isinstance(stepwise, Stepwise)  # required with the campaign
     number = max(run.run for run in campaign.runs) if request.run is None else request.run
     campaign = only_run(campaign, number)
-    problem = machine_problem(campaign, resolve(db, request.model, campaign.method))
+    problem = machine_problem(campaign, resolve_for(db, request.model, campaign.method, campaign.machine.id))
     coefficients = stepwise.coefficients(problem, solve_problem(problem), number)
     return StepwiseAnswer(
         request.campaign,

@@ -21,6 +21,7 @@ from monitor.store import (
 )
 from monitor.workflow.intake.copied_runs import check_copies
 from monitor.workflow.intake.curve_base import check_base
+from monitor.workflow.intake.gross_doubts import gross_doubts
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,12 @@ def _import(db: Database, folder: Path) -> Imported:
             check_base(campaign)
             imported = import_curve(db, campaign)
         else:
-            notes = (*check_copies(db, campaign), *doubts(campaign))
+            if campaign.sources:
+                # Loaded here: hardly any campaign states sources, and the solver takes a third of a second.
+                from monitor.workflow.intake.checked_sources import check_sources
+
+                check_sources(campaign)
+            notes = (*check_copies(db, campaign), *doubts(campaign), *gross_doubts(campaign))
             imported = import_campaign(db, campaign, notes)
     except StoreError:
         # Nothing is wrong with the folder; and where the database cannot be written nothing can be recorded.

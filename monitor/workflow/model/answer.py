@@ -55,6 +55,38 @@ class ChangeModelAnswer:
     note_on_name: str | None
 
 
+@dataclass(frozen=True)
+class UseModelAnswer:
+    """The model that a machine is followed by from now on, and ``before``.
+
+    ``identified`` are the campaigns of the method that were identified by it just now; ``failed`` could not be, with
+    the reason, and have no part in its history.
+    """
+
+    machine: str
+    method: str
+    model: str
+    before: str
+    reason: str
+    identified: tuple[str, ...]
+    failed: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class AffectedAnswer:
+    """What a change would make: version ``next_version`` of ``name``, which others already use where it is ``in_use``.
+
+    ``changed`` are machines that are followed by the method's own model, and then by the new version; ``keep`` those
+    for which a model was chosen.
+    """
+
+    name: str
+    next_version: int
+    in_use: bool
+    changed: tuple[str, ...]
+    keep: tuple[str, ...]
+
+
 def model_version(stored: StoredModel) -> ModelVersion:
     """A stored version as people see it."""
     return ModelVersion(

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from monitor.exceptions import InputError, NotFoundError
-from monitor.store import Database, StoredModel, list_models, save_model
+from monitor.methods import methods
+from monitor.store import (
+    Database,
+    StoredModel,
+    list_models,
+    load_model,
+    machine_models,
+    machines_of_method,
+    save_model,
+)
 from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 from monitor.workflow.explain.versions import history
-from monitor.workflow.model.answer import ChangeModelAnswer
+from monitor.workflow.model.answer import AffectedAnswer, ChangeModelAnswer
 from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest
 from monitor.workflow.model.show import shown
 from monitor.workflow.model.subjects import subjects_of
@@ -28,6 +37,29 @@ def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
             raise
         steps = ()
     return _changed(db, model, request.new_name, steps)
+
+
+def affected(db: Database, request: AddEffectRequest) -> AffectedAnswer:
+    """For whom adding an effect changes the model that is meant: for nobody under a new name.
+
+    Nothing is written. Raises EffectError, NotFoundError.
+    """
+    parent = resolve(db, request.to)
+    # What would be refused changes nothing for anybody.
+    subjects_of(db, parent).canonical(request.effect, request.campaign)
+    if request.new_name is not None and request.new_name != parent.name:
+        return AffectedAnswer(request.new_name, 1, False, (), ())
+    latest = load_model(db, parent.name)
+    # Only a method's own model is taken by machines for which none was chosen.
+    machines = machines_of_method(db, parent.name) if parent.name in methods() else ()
+    with_choice = {choice.machine for choice in machine_models(db) if choice.method == parent.name}
+    return AffectedAnswer(
+        parent.name,
+        latest.version + 1,
+        True,
+        tuple(machine for machine in machines if machine not in with_choice),
+        tuple(machine for machine in machines if machine in with_choice),
+    )
 
 
 def remove_effect(db: Database, request: RemoveEffectRequest) -> ChangeModelAnswer:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from monitor.exceptions import InputError
+
 
 @dataclass(frozen=True)
 class ShowModelRequest:
@@ -33,3 +35,19 @@ class RemoveEffectRequest:
     effect: str
     model: str
     new_name: str | None = None
+
+
+@dataclass(frozen=True)
+class UseModelRequest:
+    """Follow a ``machine`` by a ``model``, a version of it or its latest, for a ``reason`` that is stored.
+
+    Raises InputError for a blank reason.
+    """
+
+    model: str
+    machine: str
+    reason: str
+
+    def __post_init__(self) -> None:
+        if not self.reason.strip():
+            raise InputError(f"say why {self.machine} is followed by another model: --reason TEXT")

@@ -12,7 +12,7 @@ from monitor.records import Campaign
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.units import MICROMETRE
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import label, resolve
+from monitor.workflow.models import label, resolve_for
 from monitor.workflow.plan.angles import plan_angles
 from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, PlanAnswer, TimeAnswer
 from monitor.workflow.plan.balls import ball_plan, best_subsets, blind_spots, parameter_units
@@ -27,7 +27,7 @@ def plan(db: Database, request: PlanRequest) -> PlanAnswer:
     Raises InputError, DataError, NotFoundError, EffectError.
     """
     campaign = machine_campaign(db, request.campaign, "plan", lambda method: method.plan)
-    model = resolve(db, request.model, campaign.method)
+    model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     method = campaign_method(campaign).plan
     answer: PlanAnswer = (
         plan_angles(method, campaign, model, request)

@@ -43,8 +43,11 @@ class VarianceComponents:
 class ParameterStatistics:
     """Statistics of one parameter over ``n`` runs: of all, pooled over the groups, by group (which a key calls day).
 
-    ``bartlett_p`` and ``levene_p`` belong to equal variances, ``anova_p``, ``welch_p`` and ``kruskal_p`` to equal
-    means; the false discovery rates ``anova_q`` and ``bartlett_q`` are those among all parameters.
+    ``bartlett_p`` and ``levene_p`` belong to equal variances, ``anova_p``, ``welch_p``, ``brown_forsythe_p`` and
+    ``kruskal_p`` to equal means; the false discovery rates ``anova_q`` and ``bartlett_q`` are those among all
+    parameters.
+    ``anova_q`` holds whatever the scatter of the groups: it rests on the larger p-value of Welch and of Brown and
+    Forsythe.
     """
 
     unit: str
@@ -60,6 +63,7 @@ class ParameterStatistics:
     levene_p: float | None
     anova_p: float | None
     welch_p: float | None
+    brown_forsythe_p: float | None
     kruskal_p: float | None
     anova_q: float | None
     bartlett_q: float | None

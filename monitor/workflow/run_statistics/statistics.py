@@ -25,7 +25,7 @@ from monitor.units import Unit
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import resolve
+from monitor.workflow.models import resolve_for
 from monitor.workflow.run_statistics.answer import (
     GroupCorrelation,
     NoVarianceComponents,
@@ -54,7 +54,16 @@ def _matrix(identification: StoredIdentification, runs: list[int]) -> tuple[list
 
 
 #: The keys of p-values and false discovery rates.
-_TESTS = ("bartlett_p", "levene_p", "anova_p", "welch_p", "kruskal_p", "anova_q", "bartlett_q")
+_TESTS = (
+    "bartlett_p",
+    "levene_p",
+    "anova_p",
+    "welch_p",
+    "brown_forsythe_p",
+    "kruskal_p",
+    "anova_q",
+    "bartlett_q",
+)
 
 
 def _p_values(tests: Homogeneity | None, index: int) -> Mapping[str, float | None]:
@@ -73,8 +82,9 @@ def _p_values(tests: Homogeneity | None, index: int) -> Mapping[str, float | Non
         "levene_p": p_value(tests.levene),
         "anova_p": p_value(tests.anova),
         "welch_p": p_value(tests.welch),
+        "brown_forsythe_p": p_value(tests.brown_forsythe),
         "kruskal_p": p_value(tests.kruskal),
-        "anova_q": q_value(tests.anova_discoveries),
+        "anova_q": q_value(tests.mean_discoveries),
         "bartlett_q": q_value(tests.bartlett_discoveries),
     }
 
@@ -105,7 +115,7 @@ def _parameter(
 
 def _identified(db: Database, campaign: Campaign, model: str | None) -> StoredIdentification:
     """The identification of every run of a campaign; computed where it is not stored yet."""
-    stored = resolve(db, model, campaign.method)
+    stored = resolve_for(db, model, campaign.method, campaign.machine.id)
     try:
         identification = load_identification(db, campaign.name, stored.name, stored.version)
         if len(identification.runs) == len(campaign.runs):

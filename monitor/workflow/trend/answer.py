@@ -8,10 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 
 from monitor.documents import INLINED, OMITTED, named
+from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
 
+#: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
+FEW_DAYS = DAYS_THAT_SHOW
 #: The ends of an interval of time; None where open.
 Between = tuple[str | None, str | None]
 
@@ -25,12 +29,35 @@ class RecordedEvent:
     description: str
 
 
+class Season(Enum):
+    """What a slope says of the year: a wave of it was fitted beside the slope, or the history cannot tell the two."""
+
+    ALLOWED_FOR = "allowed for"
+    NOT_TOLD = "not told from the drift"
+
+
+@dataclass(frozen=True)
+class DayResemblance:
+    """Neighbouring blocks of days correlate by ``correlation`` as estimated, ``allowed_for`` with what that may be off.
+
+    The interval of the slope is ``widening`` times as wide as with independent days; ``blocks`` are the blocks of
+    days that it rests on.
+    """
+
+    correlation: float
+    allowed_for: float
+    widening: float
+    blocks: int
+
+
 @dataclass(frozen=True, kw_only=True)
 class DriftStatement:
     """The slope a year of the present piece of history, since the last change or event.
 
     ``robust_slope_per_year`` by Theil and Sen, ``monotone_p`` by Mann and Kendall; ``between_days`` and
-    ``within_days`` are standard deviations about the line.
+    ``within_days`` are standard deviations about the line. ``resemblance`` says how the slope's interval allows for
+    days
+    that resemble each other, ``season`` whether a wave of a year is allowed for.
     """
 
     slope_per_year: float | None = None
@@ -43,6 +70,8 @@ class DriftStatement:
     autocorrelation: float | None = None
     between_days: float | None = None
     within_days: float | None = None
+    resemblance: DayResemblance | None = None
+    season: Season | None = None
     since: str | None
     n: int
     days: int
@@ -62,7 +91,10 @@ class LatestMean:
 
 @dataclass(frozen=True)
 class DatedChange:
-    """A change of a parameter, between which times it lies, and its size; a slope is stated a day or a year."""
+    """A change of a parameter, between which times it lies, and its size; a slope is stated a day or a year.
+
+    ``days`` is the number of days that were searched.
+    """
 
     at: str | None
     interval: Between
@@ -71,6 +103,7 @@ class DatedChange:
     u: float
     unit: str
     p_value: float
+    days: int
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,11 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics import (
+    correlated_reference,
     cusum_chart,
     ewma_chart,
     individuals_chart,
     mewma_chart,
-    reference_period,
     t_squared_chart,
 )
 from monitor.store import MachineHistory
@@ -106,7 +106,7 @@ class Charts:
         if not len(before):
             return ParameterCharts("no chart: no run of the history lies in the reference period")
         try:
-            reference = reference_period(before)
+            reference = correlated_reference(before)
         except DataError as error:
             return ParameterCharts(f"no chart: {error}")
         if not len(values):
@@ -148,8 +148,10 @@ class Charts:
             )
         t = self.points.t[rows & ~self.inside]
         try:
-            single = t_squared_chart(after, before, arl=RUN_LENGTH)
-            path = mewma_chart(after, before, rng=rng, arl=VECTOR_RUN_LENGTH, trials=VECTOR_TRIALS)
+            single = t_squared_chart(after, before, arl=RUN_LENGTH, correlated=True)
+            path = mewma_chart(
+                after, before, rng=rng, arl=VECTOR_RUN_LENGTH, trials=VECTOR_TRIALS, correlated=True
+            )
         except DataError as error:
             return VectorCharts(f"no chart of the vector: {error}")
         shares, path_shares = (

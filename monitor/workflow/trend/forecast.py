@@ -58,7 +58,14 @@ def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, str | None]:
             f"{BACKTEST_DAYS} are needed"
         )
     try:
-        test = backtest(piece.values, piece.t, u=piece.weights(), days=piece.days, first=BACKTEST_DAYS - 1)
+        test = backtest(
+            piece.values,
+            piece.t,
+            u=piece.weights(),
+            days=piece.days,
+            cycle=DAYS_PER_YEAR,
+            first=BACKTEST_DAYS - 1,
+        )
     except DataError as error:
         return None, f"no backtest: {error}"
     return ForecastTest(

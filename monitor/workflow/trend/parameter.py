@@ -22,8 +22,10 @@ from monitor.workflow.trend.answer import (
     ConditionEffect,
     Cycle,
     DatedChange,
+    DayResemblance,
     DriftStatement,
     LatestMean,
+    Season,
     WarmUp,
 )
 
@@ -53,7 +55,7 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
     line, year = drift.stated, DAYS_PER_YEAR
     if line is None:
         return statement
-    robust = line.robust_interval
+    robust, resemblance = line.robust_interval, line.resemblance
     return replace(
         statement,
         slope_per_year=line.slope * year,
@@ -66,6 +68,10 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
         autocorrelation=None if line.monotone is None else line.monotone.autocorrelation,
         between_days=line.between,
         within_days=number(float(np.sqrt(max(line.run_sd**2 - line.between**2, 0.0)))),
+        resemblance=DayResemblance(
+            resemblance.correlation, resemblance.allowed, resemblance.widening, resemblance.blocks
+        ),
+        season=Season.ALLOWED_FOR if resemblance.cyclic else Season.NOT_TOLD,
     )
 
 
@@ -91,6 +97,7 @@ def dated_change(change: Change, series: Series) -> DatedChange:
         u=change.u * (days if slope else 1.0),
         unit=f"{series.unit}/{period}" if slope else series.unit,
         p_value=change.p_value,
+        days=series.steady.day_count,
     )
 
 

@@ -17,6 +17,7 @@ from monitor.store import (
     Database,
     MachineEvent,
     MachineHistory,
+    followed_by,
     machine_events,
     machine_history,
     save_analysis,
@@ -85,8 +86,9 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
 
     def read() -> MachineHistory:
         return machine_history(
-            db, machine, model=model, version=version, parameter=request.parameter, since=request.since
-        )
+            db, machine, model=model, version=version, parameter=request.parameter, since=request.since,
+            followed_by=followed_by(db, machine),
+        )  # fmt: skip
 
     history = read()
     if not db.read_only and history.unidentified:
@@ -103,9 +105,9 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
         history = read()
     history = selected_campaigns(history, request.campaigns)
     if request.parameter is not None and len(history.run) and request.parameter not in history.parameters:
-        names = machine_history(db, machine, model=model, version=version).parameters
+        every = _history(db, replace(request, parameter=None, volumetric_limit_um=None)).parameters
         raise NotFoundError(
-            f"machine {machine} has no parameter {request.parameter!r}; it has {', '.join(names) or 'none yet'}"
+            f"machine {machine} has no parameter {request.parameter!r}; it has {', '.join(every) or 'none yet'}"
         )
     return history
 
@@ -128,7 +130,7 @@ def _answer(
             RecordedEvent(event.at.astimezone(UTC).isoformat(), event.kind, event.description)
             for event in events
         ),
-        notes=tuple(same_hours(history)),
+        notes=(*same_hours(history), *_not_followed(history)),
         false_alarm=FALSE_ALARM,
         seed=SEED,
         why=None if past else _why_none(request),
@@ -161,6 +163,17 @@ def _answer(
         parameters=parameters,
         volumetric_error=volumetric,
     )
+
+
+def _not_followed(history: MachineHistory) -> list[str]:
+    """What is lacking, because it is not identified under the model that the machine is followed by."""
+    if not history.unidentified:
+        return []
+    names = ", ".join(history.unidentified)
+    return [
+        f"not identified by the model that {history.machine} is followed by, and left out: {names}; "
+        f"type `monitor identify {history.unidentified[0]}`"
+    ]
 
 
 def _why_none(request: TrendRequest) -> str:

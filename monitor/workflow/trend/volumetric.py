@@ -85,16 +85,24 @@ class _Vectors:
 
 
 def _held(piece: Series) -> Trend:
-    """A parameter without a drift: its mean since the last change, without slope; at least two runs."""
+    """A parameter without a drift: its mean since the last change, without slope; at least two runs.
+
+    The runs of a day resemble each other: its level is known as well as the means of the days scatter, those of one day
+    as a run of it.
+    """
     n = len(piece.t)
     if n < 2:
         raise DataError(f"{piece.name} has one run since its last change")
     sd = float(piece.values.std(ddof=1))
     at = float(piece.t.mean())
+    index = np.unique(piece.days, return_inverse=True)[1]
+    means = np.bincount(index, piece.values) / np.bincount(index)
+    count = len(means)
+    level = sd if count == 1 else max(float(means.std(ddof=1)), sd / np.sqrt(n / count)) / np.sqrt(count)
     return Trend(
         at=at, level_at=float(piece.values.mean()), slope=0.0, u_slope=0.0, slope_interval=(0.0, 0.0),
-        dof=float(n - 1), p_value=1.0, covariance=np.array([[sd * sd / n, 0.0], [0.0, 0.0]]), within=sd, between=0.0,
-        run_sd=sd, n=n, days=len(np.unique(piece.days)), confidence=0.95, robust_slope=0.0, robust_interval=None,
+        dof=float(max(count - 1, 1)), p_value=1.0, covariance=np.array([[level * level, 0.0], [0.0, 0.0]]), within=sd,
+        between=0.0, run_sd=sd, n=n, days=count, confidence=0.95, robust_slope=0.0, robust_interval=None,
         monotone=None,
     )  # fmt: skip
 
@@ -109,12 +117,12 @@ def _vectors(
     from monitor.uncertainty.geometric_errors import GeometricErrors
     from monitor.uncertainty.volumetric import grid, middle, volumetric_error
     from monitor.workflow.identify.fitting import machine_problem
-    from monitor.workflow.models import resolve
+    from monitor.workflow.models import resolve_for
     from monitor.workflow.volumetric.error_map import poses_of, ranges_of
     from monitor.workflow.volumetric.request import POINTS
 
     campaign = load_campaign(db, str(history.campaign[-1]))
-    fitted = fit(machine_problem(campaign, resolve(db, model, campaign.method)))
+    fitted = fit(machine_problem(campaign, resolve_for(db, model, campaign.method, campaign.machine.id)))
     problem, run = fitted.problem, int(history.run[-1])
     effects = [
         effect
@@ -187,7 +195,9 @@ def _backtest(
         if drift.stated is None:
             return _held(drift.whole.part(np.isin(drift.whole.t, t[mask])))
         weights = u[mask, column] if weighed[column] else None
-        return trend(values[mask, column], t[mask], u=weights, days=days[mask], robust=False)
+        return trend(
+            values[mask, column], t[mask], u=weights, days=days[mask], cycle=DAYS_PER_YEAR, robust=False
+        )
 
     try:
         series = JointSeries(values, t, days)

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from monitor.documents import OMITTED
-from monitor.records import Array, FrameOfReference
+from monitor.records import Array, FrameOfReference, ValidationVerdict
+from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource
 from monitor.reporting.covariance_source import CovarianceSource
+from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import RefusedParameters
 from monitor.workflow.uncertainty.machine_frame import MachineFrameAnswer
 from monitor.workflow.uncertainty.request import Asked
@@ -36,10 +38,13 @@ class RunResiduals:
 class FrameworkAnswer:
     """Results of the GUM framework (JCGM 102:2011, 6) by parameter; ``correlation`` (m, m) in their order.
 
-    ``k_p`` and ``k_q`` are those of 6.5 for normal outputs; those ``with_degrees_of_freedom`` are what so few runs
-    allow to claim, and belong to the ``expanded`` uncertainty. None: infinite, or no joint region. ``budget`` has the
-    part of every source in the variance of every parameter. ``joint_coverage_of_k_2_each`` takes half a second of
-    sampling and is left out where nobody reads it.
+    ``k_p`` and ``k_q`` are those of 6.5 for normal outputs of known covariance; those ``with_degrees_of_freedom`` are
+    what so few runs allow to claim, for the sum of the budget's lines with what is known of each, and belong to the
+    ``expanded`` uncertainty; ``coverage_sampling`` is theirs. None: infinite, or no joint region. ``budget`` has the
+    part of every source in the variance of every parameter, the largest first, ``budget_degrees_of_freedom`` those of
+    every line (None: known), ``degrees_of_freedom_by_parameter`` the effective ones of
+    every variance (None: infinite). ``joint_coverage_of_k_2_each`` takes half a second of sampling and is left out
+    where nobody reads it.
     """
 
     estimate: Mapping[str, float]
@@ -55,7 +60,10 @@ class FrameworkAnswer:
     k_q_with_degrees_of_freedom: float | None
     expanded: Mapping[str, float]
     budget: Mapping[str, Mapping[str, float]]
+    budget_degrees_of_freedom: Mapping[str, float | None] | None = field(default=None, metadata=OMITTED)
     joint_coverage_of_k_2_each: float | None = field(default=None, metadata=OMITTED)
+    degrees_of_freedom_by_parameter: Mapping[str, float | None] | None = field(default=None, metadata=OMITTED)
+    coverage_sampling: FactorSampling | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -80,7 +88,7 @@ class ValidationAnswer:
     """Whether Monte Carlo confirms the framework (JCGM 102:2011, 8), quantity by quantity: ``u EA0B``, ``k_q``."""
 
     passed: bool
-    verdict: str
+    verdict: ValidationVerdict
     differences: Mapping[str, float]
     tolerances: Mapping[str, float]
 
@@ -90,6 +98,13 @@ class ValidationAnswer:
         return tuple(
             name for name, difference in self.differences.items() if abs(difference) > self.tolerances[name]
         )
+
+    @property
+    def confirmed(self) -> tuple[str, ...]:
+        """Return the kinds of quantity of which none differs: ``estimate``, ``u``, ``lambda_max``, ``k_p``, ``k_q``."""
+        kinds = dict.fromkeys(name.split()[0] for name in self.differences)
+        differing = {name.split()[0] for name in self.failed}
+        return tuple(kind for kind in kinds if kind not in differing)
 
 
 @dataclass(frozen=True)
@@ -109,6 +124,8 @@ class UncertaintyAnswer:
     it is restored (``stored.restored``). ``frames`` say what each parameter of the chain is stated relative to,
     ``machine_frame`` has the location errors in the frame of the machine; None in earlier answers. ``refused`` are
     parameters without a number. ``mcm`` and ``validation`` are left out where no Monte Carlo was asked for.
+    ``holds_for`` says for which time the uncertainty holds, ``day_to_day`` how runs and days differ, ``sources`` which
+    Type B sources were stated, ``length`` to what gains refer; all are None in an answer of an earlier version.
     """
 
     campaign: str
@@ -129,6 +146,10 @@ class UncertaintyAnswer:
     lack_of_fit_causes: tuple[LackOfFitCause, ...] | None = field(default=None, metadata=OMITTED)
     mcm: MonteCarloAnswer | None = field(default=None, metadata=OMITTED)
     validation: ValidationAnswer | None = field(default=None, metadata=OMITTED)
+    holds_for: HoldsFor | None = field(default=None, metadata=OMITTED)
+    day_to_day: DayToDay | None = field(default=None, metadata=OMITTED)
+    sources: tuple[StatedSource, ...] | None = field(default=None, metadata=OMITTED)
+    length: LengthReference | None = field(default=None, metadata=OMITTED)
 
     @property
     def covariance(self) -> Array:

@@ -34,15 +34,21 @@ from monitor.uncertainty import (
 from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.row_run import measured_run
 from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
+from monitor.uncertainty.sourced_trials import Moves
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
 from monitor.workflow.measured import machine_campaign
-from monitor.workflow.models import as_model, resolve
+from monitor.workflow.models import as_model, resolve_for
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-from monitor.workflow.uncertainty.inputs import calibrated_inputs, reading_inputs, with_linear_axes
+from monitor.workflow.uncertainty.beside import Linearised, beside_readings
+from monitor.workflow.uncertainty.inputs import (
+    calibrated_inputs,
+    reading_inputs,
+    with_linear_axes,
+)
 from monitor.workflow.uncertainty.request import UncertaintyRequest
-from monitor.workflow.uncertainty.result import RunUncertainty
+from monitor.workflow.uncertainty.result import Behind, RunUncertainty
 from monitor.workflow.uncertainty.spreading import trials_of
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import LACK_OF_FIT, save_uncertainty
@@ -58,8 +64,9 @@ MOST_READINGS, MOST_READINGS_MCM = 4000, 1200
 class _Propagated:
     """What is propagated: a run, its inputs, where it is linearised, and the m outputs ``names`` with their ``units``.
 
-    ``readings`` are the inputs without the errors of the linear axes, which for the budget are ``contributions`` to the
-    outputs, as lack of fit is.
+    ``readings`` are the inputs without the errors of the linear axes and without sources, which for the budget are
+    ``contributions`` to the outputs, as lack of fit is. ``on_outputs`` are those of them that no input carries but a
+    Monte Carlo draws besides, ``moves`` what it draws.
     """
 
     run: MeasuredRun
@@ -70,6 +77,9 @@ class _Propagated:
     inputs: Inputs
     contributions: tuple[OutputContribution, ...]
     source: CovarianceSource
+    behind: Behind
+    moves: Moves
+    on_outputs: tuple[OutputContribution, ...]
 
     @property
     def unit_names(self) -> tuple[str, ...]:
@@ -91,7 +101,7 @@ def evaluate(db: Database, request: UncertaintyRequest) -> RunUncertainty:
 def evaluate_campaign(db: Database, whole: Campaign, request: UncertaintyRequest) -> RunUncertainty:
     """As ``evaluate``, of a campaign that is loaded."""
     campaign = runs_before(whole, request.before)
-    model = resolve(db, request.model, campaign.method)
+    model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     fitted = fit(campaign_method(campaign).problem_of(campaign, as_model(model)))
     selected = None
     if request.select is not None:
@@ -139,6 +149,7 @@ def evaluate_fit(
         monte_carlo=sampled,
         validation=validation,
         causes=causes,
+        behind=propagated.behind,
     )
 
 
@@ -151,29 +162,38 @@ def _propagated(
     selected: SelectedReadings | None,
 ) -> tuple[_Propagated, tuple[tuple[str, float], ...]]:
     """What is propagated for the run at ``index`` of the fit, and the effects that lack of fit may come from."""
-    readings, source = reading_inputs(fit, campaign, run, selected)
+    asked = request.asked
+    readings, source = reading_inputs(fit, campaign, run, selected, asked.holds_for)
     calibrated = calibrated_inputs(run)
     inputs = joined(readings, calibrated) if calibrated is not None else readings
     at = sensitivity_of(run, start=fit.solution.local[index])
     names = tuple(name for name in fit.problem.base_names if at.determined[at.names.index(name)])
-    propagated = _Propagated(run, at, names, _units(fit, names), inputs, inputs, (), source)
+    units = _units(fit, names)
+    added = beside_readings(campaign, fit, Linearised(run, at, index, names, units), source, asked)
+    propagated = _Propagated(
+        run, at, names, units, inputs, inputs, (*added.of_sources, *added.of_days), source, added.behind,
+        added.moves, added.of_days,
+    )  # fmt: skip
     causes: tuple[tuple[str, float], ...] = ()
     if request.model_uncertainty:
         line, causes = _lack_of_fit(campaign, fit, index, names)
-        propagated = replace(propagated, contributions=() if line is None else (line,))
+        further = () if line is None else (line,)
+        propagated = replace(propagated, contributions=(*propagated.contributions, *further))
     if request.linear_axes is not None:
         inputs, of_axes = with_linear_axes(run, inputs, at, names, request.linear_axes)
         propagated = replace(propagated, inputs=inputs, contributions=(*of_axes, *propagated.contributions))
-    method_knows = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
-    stated = request.linear_axes is not None
     source = replace(
         source,
-        linear_axes=stated,
-        taken_as_known=tuple(
-            name for name in method_knows if not (stated and name is TakenAsKnown.LINEAR_AXES)
-        ),
+        linear_axes=request.linear_axes is not None,
+        taken_as_known=_taken_as_known(campaign, added.axes_covered or request.linear_axes is not None),
     )
     return replace(propagated, source=source), causes
+
+
+def _taken_as_known(campaign: Campaign, axes_covered: bool) -> tuple[TakenAsKnown, ...]:
+    """What the method takes as known, less the linear axes where their errors are stated."""
+    known = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
+    return tuple(name for name in known if not (axes_covered and name is TakenAsKnown.LINEAR_AXES))
 
 
 def _lack_of_fit(
@@ -185,8 +205,9 @@ def _lack_of_fit(
     in_model = [effect.text for effect in (*problem.base, *problem.added)]
     # Only what depends on the time within a run, not on its day, can be the same in every run.
     effects = catalogue(problem.context.chain, in_model, ("run_time",), pitches)
+    shown = filter(problem.can_show, effects)
     unexplained = model_uncertainty(
-        fit, index, [variant for effect in effects for variant in variants_of(effect)]
+        fit, index, [variant for effect in shown for variant in variants_of(effect)]
     )
     if unexplained is None:
         return None, ()
@@ -217,7 +238,7 @@ def _units(fit: Fit, names: tuple[str, ...]) -> tuple[Unit, ...]:
 
 def _sampled(propagated: _Propagated, request: UncertaintyRequest) -> MonteCarloResult:
     tighten = VALIDATION_TIGHTENING if request.method == "both" else 1.0
-    with trials_of(propagated.run, propagated.inputs, propagated.names, request) as (
+    with trials_of(propagated.run, propagated.inputs, propagated.names, request, propagated.moves) as (
         trials,
         sampler,
         threads,
@@ -229,13 +250,14 @@ def _sampled(propagated: _Propagated, request: UncertaintyRequest) -> MonteCarlo
 def _validated(propagated: _Propagated, sampled: MonteCarloResult, request: UncertaintyRequest) -> Validation:
     """The framework of a known covariance, which is what a Monte Carlo samples, compared with it."""
     plain = gum_framework(
-        propagated.inputs,
+        propagated.moves.with_sources(propagated.inputs),
         propagated.sensitivity.rows(propagated.names),
         propagated.estimate,
         propagated.names,
         propagated.unit_names,
         p=request.p,
         finite_dof=False,
+        contributions=propagated.on_outputs,
     )
     return validate(plain, sampled, digits=request.digits)
 

@@ -15,6 +15,7 @@ from monitor.discovery import Fit
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.exceptions import DataError, InputError
 from monitor.records import Array, Campaign, LinearAxes
+from monitor.reporting.budget import HoldsFor
 from monitor.reporting.covariance_source import CovarianceKind, CovarianceSource
 from monitor.uncertainty import Inputs, OutputContribution, overall, pooled_by_day, uncorrelated
 from monitor.uncertainty.linear_axes import row_covariances
@@ -29,14 +30,21 @@ BAR = "scale bar"
 CALIBRATED = "calibrated quantities"
 # A covariance from fewer degrees of freedom than this says little about itself; then the next choice is taken.
 FEWEST_DEGREES_OF_FREEDOM = 8
+#: Between-day scatter from two days may be 32 times as large (chi-square, one degree of freedom, 95 %); from three 6.
+FEWEST_DAYS = 3
 
 
 def reading_inputs(
-    fit: Fit, campaign: Campaign, run: MeasuredRun, selected: SelectedReadings | None
+    fit: Fit,
+    campaign: Campaign,
+    run: MeasuredRun,
+    selected: SelectedReadings | None,
+    holds_for: HoldsFor | None = None,
 ) -> tuple[Inputs, CovarianceSource]:
     """Inputs of the readings of a run, and where their covariance comes from: all runs, or a stored selection.
 
-    Raises DataError where the selection has too few runs.
+    With ``holds_for`` a run it is the scatter within runs. Raises DataError where the selection has too few runs, or
+    the runs are too few for what is to hold within a day or over the campaign.
     """
     names = run.reading_names
     count = len(names)
@@ -50,12 +58,23 @@ def reading_inputs(
             f"covariance; at least {FEWEST_DEGREES_OF_FREEDOM} are needed"
         )
     within_days = runs - len(np.unique(days))
-    if len(values) and within_days >= FEWEST_DEGREES_OF_FREEDOM:
+    repeated = len(values) > 0 and holds_for is not HoldsFor.RUN
+    if repeated and within_days >= FEWEST_DEGREES_OF_FREEDOM:
         inputs = pooled_by_day(values, days, names, units, source=READINGS)
         source = CovarianceSource(CovarianceKind.POOLED_BY_DAY, runs, within_days, selection=name)
-    elif len(values) and runs - 1 >= FEWEST_DEGREES_OF_FREEDOM:
+    elif holds_for is HoldsFor.DAY:
+        raise DataError(
+            f"--holds-for day: {runs} runs of one plan on {len(np.unique(days))} days leave {max(within_days, 0)} "
+            f"degrees of freedom within days; at least {FEWEST_DEGREES_OF_FREEDOM} are needed (write --holds-for run)"
+        )
+    elif repeated and runs - 1 >= FEWEST_DEGREES_OF_FREEDOM:
         inputs = overall(values, names, units, source=READINGS)
         source = CovarianceSource(CovarianceKind.ALL_RUNS, runs, runs - 1, selection=name)
+    elif holds_for is HoldsFor.CAMPAIGN:
+        raise DataError(
+            f"--holds-for campaign: {runs} runs of one plan are too few; at least {FEWEST_DEGREES_OF_FREEDOM + 1} on "
+            "three days or more are needed (write --holds-for run)"
+        )
     else:
         stated = campaign.probe.standard_uncertainty
         u = max(stated, lack_of_fit(fit)[1] or 0.0)
@@ -64,6 +83,15 @@ def reading_inputs(
         source = CovarianceSource(kind, u_um=u * 1e3, selection=name)
     # The estimate is that of the run itself: its results are stated.
     return replace(inputs, estimate=run.inputs[:count]), source
+
+
+def holding_for(source: CovarianceSource, days: int) -> HoldsFor:
+    """For which time a covariance of the readings holds by itself: what repeated runs show of ``days`` days."""
+    if source.kind is CovarianceKind.POOLED_BY_DAY:
+        return HoldsFor.DAY
+    if source.kind is CovarianceKind.ALL_RUNS:
+        return HoldsFor.CAMPAIGN if days >= FEWEST_DAYS else HoldsFor.DAY
+    return HoldsFor.RUN
 
 
 def _repeated(fit: Fit, campaign: Campaign, count: int) -> tuple[Array, npt.NDArray[np.int64]]:

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from datetime import datetime
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.records import LinearAxes
+from monitor.reporting.budget import HoldsFor
+from monitor.sources import Source
 
 #: Coverage probability of what is certified, and of results where no other is asked for.
 COVERAGE = 0.95
 METHODS = ("guf", "mcm", "both")
+#: The words of --holds-for.
+HOLDS_FOR = tuple(word.value for word in HoldsFor)
+
+
+def holds_for(word: str | None) -> HoldsFor | None:
+    """What a word of --holds-for stands for. Raises InputError for another."""
+    if word is not None and word not in HOLDS_FOR:
+        raise InputError(f"--holds-for {word}: choose run, day or campaign")
+    return None if word is None else HoldsFor(word)
 
 
 @dataclass(frozen=True)
@@ -24,6 +36,8 @@ class Asked:
     select: str | None = None
     model_uncertainty: bool = True
     linear_axes: LinearAxes | None = None
+    holds_for: HoldsFor | None = field(default=None, metadata=OMITTED)
+    sources: tuple[Source, ...] | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -52,6 +66,8 @@ class UncertaintyRequest:
     select: str | None = None
     before: datetime | None = None
     linear_axes: LinearAxes | None = None
+    sources: tuple[Source, ...] | None = None
+    holds_for: str | None = None
     workers: int | None = None
     cluster: str | None = None
 
@@ -64,8 +80,16 @@ class UncertaintyRequest:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 to 9223372036854775807")
         if not 0.0 < self.p < 1.0:
             raise InputError(f"-p {self.p}: a coverage probability lies between 0 and 1")
+        holds_for(self.holds_for)
 
     @property
     def asked(self) -> Asked:
         """The part of the question that decides the numbers of the GUM framework."""
-        return Asked(self.p, self.select, self.model_uncertainty, self.linear_axes)
+        return Asked(
+            self.p,
+            self.select,
+            self.model_uncertainty,
+            self.linear_axes,
+            holds_for(self.holds_for),
+            self.sources,
+        )

@@ -7,11 +7,22 @@ from dataclasses import dataclass
 from monitor.discovery import Fit
 from monitor.records import Campaign
 from monitor.refusal import Refusal
+from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.store import StoredModel
 from monitor.uncertainty import FrameworkResult, MonteCarloResult, Validation
 from monitor.units import Unit
 from monitor.workflow.uncertainty.request import Asked
+
+
+@dataclass(frozen=True)
+class Behind:
+    """What stands behind a stated uncertainty: for which time it holds, how days differ, the sources, the length."""
+
+    holds_for: HoldsFor
+    day_to_day: DayToDay
+    sources: tuple[StatedSource, ...]
+    length: LengthReference | None
 
 
 @dataclass(frozen=True)
@@ -33,3 +44,4 @@ class RunUncertainty:
     monte_carlo: MonteCarloResult | None
     validation: Validation | None
     causes: tuple[tuple[str, float], ...]
+    behind: Behind

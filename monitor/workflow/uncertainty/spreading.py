@@ -9,11 +9,12 @@ from functools import partial
 from threadpoolctl import threadpool_limits
 
 from monitor.exceptions import InputError
-from monitor.uncertainty import BlockSampler, Inputs, normal_inputs, run_estimator
+from monitor.uncertainty import BlockSampler, Inputs
 from monitor.uncertainty.cluster import cluster
 from monitor.uncertainty.measured_run import MeasuredRun
 from monitor.uncertainty.processes import processes
 from monitor.uncertainty.propagation import Model
+from monitor.uncertainty.sourced_trials import Moves, moved_estimator
 from monitor.uncertainty.spread import spread
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 
@@ -23,20 +24,20 @@ THREADS = 2
 
 @contextmanager
 def trials_of(
-    run: MeasuredRun, inputs: Inputs, names: tuple[str, ...], request: UncertaintyRequest
+    run: MeasuredRun, inputs: Inputs, names: tuple[str, ...], request: UncertaintyRequest, moves: Moves
 ) -> Iterator[tuple[Model, BlockSampler, int]]:
     """Model, sampler and number of threads for ``adaptive_monte_carlo``: the same numbers wherever they are made.
 
     ``request.workers`` processes of this machine, or the Dask cluster at ``request.cluster``, or else threads of this
-    process. Raises InputError where both are asked for.
+    process. ``moves`` are drawn besides the inputs. Raises InputError where both are asked for.
     """
     workers, address = request.workers, request.cluster
     if workers is not None and address is not None:
         raise InputError(
             "--workers starts processes here, --cluster uses those of a cluster: choose one of them"
         )
-    recipe = partial(run_estimator, run, inputs, names, seed=request.seed)
-    sampler = BlockSampler(normal_inputs(inputs), seed=request.seed)
+    recipe = partial(moved_estimator, run, inputs, names, moves, seed=request.seed)
+    sampler = BlockSampler(moves.distributions(inputs), seed=request.seed)
     if workers is None and address is None:
         # As in the workers: with several threads the linear algebra of the recipe may round otherwise.
         with threadpool_limits(1, "blas"):

@@ -12,8 +12,11 @@ from monitor.machine import Chain
 from monitor.methods.model import chain_of
 from monitor.records import Array
 from monitor.reporting.covariance_source import covariance_sentence
+from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import refused_parameters
-from monitor.uncertainty.coverage import ellipsoid_factor, joint_coverage, rectangle_factor, single_factor
+from monitor.uncertainty.coverage import joint_coverage, single_factor
+from monitor.uncertainty.parts import known
+from monitor.uncertainty.regions import region_factors
 from monitor.uncertainty.validation import Comparison, Validation
 from monitor.units import MICROMETRE
 from monitor.workflow.models import label
@@ -62,6 +65,10 @@ def statement(result: RunUncertainty) -> UncertaintyAnswer:
         lack_of_fit_causes=causes or None,
         mcm=_monte_carlo(result),
         validation=None if result.validation is None else _validation(result, result.validation),
+        holds_for=result.behind.holds_for,
+        day_to_day=result.behind.day_to_day,
+        sources=result.behind.sources or None,
+        length=result.behind.length,
     )
 
 
@@ -89,13 +96,17 @@ def _finite(value: float) -> float | None:
 
 def _framework(result: RunUncertainty) -> FrameworkAnswer:
     framework = result.framework
+    pairs = list(zip(framework.budget, framework.budget_shares(), strict=True))
+    # The line that matters most for any parameter first; none is dropped.
+    lines = sorted(pairs, key=lambda pair: -float(np.max(np.abs(pair[1]), initial=0.0)))
+    factors, of_known = framework.factors, region_factors(known(framework.budget), framework.p)
     return FrameworkAnswer(
         estimate=_displayed(result, framework.estimate),
         u=_displayed(result, framework.u),
         correlation=framework.correlation,
         # JCGM 102:2011 6.5 as it stands: normal outputs. Beside them what so few runs allow to claim.
-        k_p=ellipsoid_factor(framework.rank, framework.p),
-        k_q=rectangle_factor(len(framework.names), framework.p),
+        k_p=of_known.k_p,
+        k_q=of_known.k_q,
         lambda_max=framework.lambda_max,
         rank=framework.rank,
         degrees_of_freedom=_finite(framework.dof),
@@ -104,9 +115,16 @@ def _framework(result: RunUncertainty) -> FrameworkAnswer:
         k_q_with_degrees_of_freedom=_finite(framework.k_q),
         expanded=_displayed(result, framework.expanded),
         budget={
-            line.source: dict(zip(framework.names, map(float, shares), strict=True))
-            for line, shares in zip(framework.budget, framework.budget_shares(), strict=True)
+            line.source: dict(zip(framework.names, map(float, shares), strict=True)) for line, shares in lines
         },
+        budget_degrees_of_freedom={
+            line.source: None if line.dof is None else _finite(line.dof) for line, _ in lines
+        },
+        degrees_of_freedom_by_parameter={
+            name: _finite(float(dof))
+            for name, dof in zip(framework.names, framework.dof_by_output, strict=True)
+        },
+        coverage_sampling=FactorSampling(factors.seed, factors.trials, factors.k_p_error, factors.k_q_error),
     )
 
 
@@ -137,7 +155,7 @@ def _validation(result: RunUncertainty, validation: Validation) -> ValidationAns
 
     return ValidationAnswer(
         passed=validation.passed,
-        verdict=validation.verdict.value,
+        verdict=validation.verdict,
         differences={
             _quantity(comparison): displayed(comparison, comparison.difference)
             for comparison in validation.comparisons

@@ -15,7 +15,7 @@ import numpy as np
 
 from monitor import __version__
 from monitor.documents import from_document, to_document
-from monitor.records import Array, Campaign, LinearAxes
+from monitor.records import Array, Campaign
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.store import Database, StoredModel, check_analysis, save_analysis, stored_analyses
 from monitor.workflow.campaign_parts import kind_of, method_of
@@ -94,6 +94,14 @@ class StatedUncertainty:
         return _or_infinite(self.answer.guf.fewest_degrees_of_freedom)
 
     @property
+    def dof_by_parameter(self) -> Array:
+        """Degrees of freedom (m,) of every variance; those of the covariance as a whole where none are stored."""
+        by_name = self.answer.guf.degrees_of_freedom_by_parameter
+        if by_name is None:
+            return np.full(len(self.names), self.dof)
+        return np.array([_or_infinite(by_name[name]) for name in self.names])
+
+    @property
     def counts_lack_of_fit(self) -> bool:
         """Whether the budget has a line for lack of fit of the model."""
         return LACK_OF_FIT in self.answer.guf.budget
@@ -144,18 +152,24 @@ def covariance_source(document: Mapping[str, Any]) -> CovarianceSource:
 
 
 def stored_uncertainty(
-    db: Database, campaign: Campaign, run: int, model: StoredModel, linear_axes: LinearAxes | None = None
+    db: Database, campaign: Campaign, run: int, model: StoredModel, asked: Asked | None = None
 ) -> StatedUncertainty | None:
-    """The latest stored answer about a run by this model that was asked for nothing else; None where there is none.
+    """The latest stored answer about a run by this model to what was ``asked`` (default: nothing but the run); None
+    where there is none.
 
     Only what this version of the software evaluated is taken: another may have evaluated otherwise. Raises StoreError
     where it was altered since it was stored.
     """
-    asked = to_document(Asked(linear_axes=linear_axes))
+    wanted = to_document(asked or Asked())
     for analysis in stored_analyses(
         db, KIND, campaign=campaign.name, run=run, model=model.name, model_version=model.version
     ):
-        if analysis.document.get("asked") == asked and analysis.software_version == __version__:
+        # An answer that does not say for which time it holds is of before that was evaluated.
+        same = analysis.document.get("asked") == wanted and "holds_for" in analysis.document
+        if same and analysis.software_version == __version__:
             check_analysis(db, analysis.number)
-            return StatedUncertainty(campaign, model, restored(analysis.document), analysis.number)
+            answer = restored(analysis.document)
+            # Factors of a former kind, from one number of degrees of freedom for all directions, are not stated again.
+            if answer.guf.coverage_sampling is not None:
+                return StatedUncertainty(campaign, model, answer, analysis.number)
     return None

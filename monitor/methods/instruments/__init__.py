@@ -1,0 +1,1 @@
+"""Any instrument on any machine: a reading is a statement about tool side and work side."""

@@ -1,0 +1,147 @@
+"""The problem of a campaign of instruments under a model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.effects import ArtefactEffect, Context, ParsedEffect, context_of
+from monitor.exceptions import DataError, EffectError
+from monitor.machine import Chain, evaluate
+from monitor.methods.instruments.base import instrument_base
+from monitor.methods.instruments.problem import InstrumentProblem, Part
+from monitor.methods.instruments.reading import LEVER, Reading, Rows
+from monitor.methods.instruments.readings import readings
+from monitor.methods.instruments.readings.direction import Direction
+from monitor.methods.model import Model, chain_of
+from monitor.records import Array, Campaign, Setup
+from monitor.units import MICROMETRE, MICRORADIAN
+
+NAME = "instruments"
+DEFAULT_MODEL = Model(NAME)
+#: The column of a row's setup, counted from 1 in the order of the file, and those of a row's own uncertainty.
+SETUP, U_LENGTH, U_ANGLE = "setup", "u_um", "u_urad"
+#: The factor from a column of the file to mm, by the end of its name; a component of a direction has none.
+TO_MM = {"um": MICROMETRE.factor, "mm": 1.0, "urad": MICRORADIAN.factor * LEVER}
+
+
+def problem_of(campaign: Campaign, model: Model = DEFAULT_MODEL) -> InstrumentProblem:
+    """The least-squares problem of a campaign: every number with the standard uncertainty of its row, or else that of
+    its setup.
+
+    Raises DataError where no setup is described or one was never used, EffectError for effects of an artefact.
+    """
+    setups = campaign.artefact.setups
+    if not setups:
+        raise DataError(f"campaign {campaign.name} has no [[setups]]; the method {NAME} needs one or more")
+    chain = chain_of(campaign.machine)
+    context = context_of(campaign, chain)
+    number = campaign.probings.channels[SETUP].astype(np.int64) - 1
+    parts = _parts(chain, context, setups, number)
+    used = tuple(setups[index] for index in np.unique(number))
+    texts = replace(model, base=model.base or instrument_base(chain, used))
+    # A level alone sees no location error: then no effect is free in every run.
+    base = texts.base_of(chain) if texts.base else ()
+    added = texts.added_to(chain)
+    _refuse_artefact((*base, *added))
+    ratios = {name: axis.gear_ratio for name, axis in campaign.machine.axes.items()}
+    return InstrumentProblem(
+        context=replace(context, sight=_sight(setups, number), nominal=_places(context, parts)),
+        base=base,
+        added=added,
+        sigma=_sigma(context, setups, number, parts),
+        parts=parts,
+        setups=used,
+        gear_ratios=tuple((name, ratio) for name, ratio in ratios.items() if ratio is not None),
+    )
+
+
+def _parts(
+    chain: Chain, context: Context, setups: tuple[Setup, ...], number: npt.NDArray[np.int64]
+) -> tuple[Part, ...]:
+    """Every setup that has rows. The outer frame of the first direction is the machine's; another one floats."""
+    runs = np.searchsorted(np.unique(context.run), context.run)
+    parts: list[Part] = []
+    for index in np.unique(number):
+        setup = setups[index]
+        kind = readings()[setup.reading]
+        at = np.flatnonzero(number == index)
+        rows = Rows(
+            chain=chain,
+            run=runs[at],
+            target=context.target[at],
+            measured=np.column_stack([_column(context, name)[at] for name in kind.columns]),
+            positions=context.positions[at],
+            nominal=context.nominal[at],
+            guess=np.zeros((len(at), 0)),
+        )
+        reading: Reading
+        reading, rows = kind.of(setup, rows)
+        if isinstance(reading, Direction) and "frame" not in setup.known:
+            floating = any(isinstance(part.reading, Direction) for part in parts)
+            reading = replace(reading, floating=floating)
+        parts.append(Part(setup.id, reading, rows, at))
+    return tuple(parts)
+
+
+def _places(context: Context, parts: tuple[Part, ...]) -> Array:
+    """Where people look for a row (n, 3) mm in the frame of the last work axis: the tool point of a machine without
+    errors, of a direction its end at one metre."""
+    places = context.nominal.copy()
+    for part in parts:
+        if isinstance(part.reading, Direction):
+            places[part.at] = LEVER * part.reading.pointed(part.rows)
+            continue
+        start = part.reading.start(1)[np.zeros(len(part.at), dtype=np.int64)]
+        work, tool = part.reading.ends(start, part.rows)
+        none = np.zeros((len(part.at), len(context.chain.joints), 2, 6))
+        places[part.at] = evaluate(context.chain, part.rows.positions, none, work, tool).residual + work
+    return places
+
+
+def _column(context: Context, name: str) -> Array:
+    """A column in mm (a component of a direction as it is); NaN where it is empty or not there."""
+    values = context.columns.get(name, np.full(len(context), np.nan))
+    return values * TO_MM.get(name.rpartition("_")[2], 1.0)
+
+
+def _sigma(
+    context: Context, setups: tuple[Setup, ...], number: npt.NDArray[np.int64], parts: tuple[Part, ...]
+) -> Array:
+    """Standard uncertainty (n, d) in mm of every number; infinite where a row has none."""
+    sigma = np.full((len(context), max(len(part.reading.numbers) for part in parts)), np.inf)
+    for part in parts:
+        angular = part.reading.angular
+        stated = (setups[number[part.at[0]]].standard_uncertainty or np.nan) * (LEVER if angular else 1.0)
+        of_rows = _column(context, U_ANGLE if angular else U_LENGTH)[part.at]
+        u = np.where(np.isfinite(of_rows), of_rows, stated)
+        kinds = len(part.reading.numbers)
+        read = np.isfinite(part.rows.measured)
+        # Of a direction all three components together make two numbers.
+        read = read[:, :kinds] & (
+            read.all(axis=1, keepdims=True) if part.rows.measured.shape[1] > kinds else True
+        )
+        sigma[part.at, :kinds] = np.where(read, u[:, None], np.inf)
+    return sigma
+
+
+def _sight(setups: tuple[Setup, ...], number: npt.NDArray[np.int64]) -> Array | None:
+    """Where the tool points (n, 3) in the frame of the last tool axis: as each setup says it, else as the first one
+    that does; None where none does."""
+    stated = [setup.tool_direction for setup in setups if setup.tool_direction is not None]
+    if not stated:
+        return None
+    of_setups = np.array([setup.tool_direction or stated[0] for setup in setups])
+    sight: Array = of_setups[number]
+    return sight
+
+
+def _refuse_artefact(effects: tuple[ParsedEffect, ...]) -> None:
+    for effect in effects:
+        if isinstance(effect, ArtefactEffect):
+            raise EffectError(
+                f"'{effect.text}' is a change of targets that are touched or tracked; the readings of the method "
+                f"{NAME} have none. Effects of axes, flexure:... and sight:... are possible"
+            )

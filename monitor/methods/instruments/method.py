@@ -1,0 +1,68 @@
+"""The method ``instruments``: one machine, whatever instruments measured it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from monitor.exceptions import DataError
+from monitor.machine import Chain
+from monitor.methods.chain.identification import TakenUp
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.sufficiency import still_joints
+from monitor.methods.instruments.assembly import NAME, problem_of
+from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
+from monitor.methods.instruments.problem import InstrumentProblem
+from monitor.methods.method import ChainMethod, Nouns, Unable
+from monitor.records import Campaign
+from monitor.refusal import Advice, AdviceKind
+
+
+def usual_base(chain: Chain) -> tuple[str, ...]:
+    """The effects that are free in every run of a machine of which no campaign says how it was measured."""
+    return instrument_base(chain, usual_setups(chain))
+
+
+def advice(problem: ChainProblem, parameters: tuple[str, ...], run: int) -> Advice:
+    """What the plan did not move and would have to move."""
+    still = tuple(joint.name for joint in still_joints(problem, run))
+    if still:
+        return Advice(AdviceKind.STOOD_STILL, still)
+    return Advice(AdviceKind.MORE_POSES)
+
+
+def refuse(campaign: Campaign, problem: ChainProblem) -> None:
+    """DataError where a run has fewer numbers than unknowns: what nothing was read of is no number."""
+    for run in problem.runs:
+        rows = problem.context.run == run
+        numbers = int(np.isfinite(problem.sigma[rows]).sum()) + len(problem.extra_names)
+        unknowns = len(problem.local_names)
+        if numbers < unknowns:
+            raise DataError(
+                f"run {run} of campaign {campaign.name} has {numbers} readings for {unknowns} unknowns; "
+                "measure more poses"
+            )
+
+
+def without_numbers(problem: ChainProblem) -> tuple[TakenUp, ...]:
+    """What these setups cannot give a number, whatever the plan."""
+    assert isinstance(problem, InstrumentProblem)
+    return taken_up(problem.context.chain, problem.setups)
+
+
+METHOD = ChainMethod(
+    name=NAME,
+    title="instruments",
+    description="any instruments on one machine: where it points, points, distances, displacements, angles",
+    nouns=Nouns(target="target", row="reading"),
+    problem_of=problem_of,
+    refuse=refuse,
+    advice=advice,
+    base_effects=usual_base,
+    trial_rows=150,
+    taken_up=without_numbers,
+    coordinates=Unable("readings of instruments are no coordinates that could stand side by side"),
+    certificate=Unable(
+        "a certificate states a probe and an artefact, and does not know several instruments yet; identify, "
+        "uncertainty and trend give the numbers"
+    ),
+)

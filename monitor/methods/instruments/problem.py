@@ -1,0 +1,307 @@
+"""The problem of readings of any instruments on one chain: every setup's rows in the numbers of its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.effects import ArtefactEffect, ChainEffect, Effect
+from monitor.effects.catalogue import of_drives, of_sight
+from monitor.machine import ChainPose, Orientation, evaluate, orientation
+from monitor.methods.chain.added_effects import columns_of
+from monitor.methods.chain.least_squares import Solution
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance
+from monitor.records import Array, Setup
+
+# What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
+# mount sags by a degree's fraction, a joint gives way by millimetres.
+LARGEST_OUTSIDE = (5.0, 0.02)
+# A zero that is off by more than 20 degrees is another zero.
+LARGEST_TURN = 0.35
+# Residuals of directions of more than a tenth of a radian are no errors of this mount.
+CONTRADICTS = 0.1
+
+
+# What is read of an error's displacement is at least this part, else it comes from products of errors alone.
+SECOND_ORDER = 5e-3
+
+
+@dataclass(frozen=True)
+class Part:
+    """The rows of one setup: its ``reading``, its ``rows`` as its kind knows them, and their indices ``at`` (m,) among
+    all rows."""
+
+    id: str
+    reading: Reading
+    rows: Rows
+    at: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class InstrumentPose(ChainPose):
+    """The readings at n rows: ``residual`` (n, d) in mm, ``by_error`` (n, d, J, 2, 6), ``by_own`` (n, d, q)."""
+
+    by_own: Array
+
+
+@dataclass(frozen=True)
+class InstrumentProblem(ChainProblem):
+    """Readings of the setups ``parts``; a row of a kind with fewer than d numbers has no weight in the others.
+
+    ``setups`` are those that have rows, ``gear_ratios`` those that the machine file gives.
+    """
+
+    parts: tuple[Part, ...] = ()
+    setups: tuple[Setup, ...] = ()
+    gear_ratios: tuple[tuple[str, float], ...] = ()
+
+    @cached_property
+    def own_names(self) -> tuple[str, ...]:
+        """The unknowns of every setup; with several setups each begins with the setup's id."""
+        several = len(self.parts) > 1
+        return tuple(
+            f"{part.id} {name}" if several else name for part in self.parts for name in part.reading.unknowns
+        )
+
+    @cached_property
+    def own_columns(self) -> tuple[slice, ...]:
+        """Where the unknowns of each setup stand among a run's own."""
+        return columns_of(len(part.reading.unknowns) for part in self.parts)
+
+    @cached_property
+    def own_start(self) -> Array:
+        """The first guesses (R, q)."""
+        runs = len(self.runs)
+        return np.concatenate(
+            [np.zeros((runs, 0)), *(part.reading.start(runs) for part in self.parts)], axis=1
+        )
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """The numbers of a row: by their names where there is one kind, else counted."""
+        names = {part.reading.numbers for part in self.parts}
+        if len(names) == 1:
+            return next(iter(names))
+        return tuple(f"number {number + 1}" for number in range(self.sigma.shape[1]))
+
+    @property
+    def largest_error(self) -> float:
+        """A turn of 20 degrees."""
+        return LARGEST_TURN
+
+    @property
+    def target_word(self) -> str:
+        """A target."""
+        return "target"
+
+    @cached_property
+    def kinds(self) -> frozenset[str]:
+        """The kinds of readings that there are."""
+        return frozenset(part.reading.name for part in self.parts)
+
+    @property
+    def largest_effect(self) -> tuple[float, float]:
+        """More where a mount or a robot is looked at from outside than on a machine tool."""
+        return LARGEST_OUTSIDE if self.kinds & {"direction", "point"} else super().largest_effect
+
+    @property
+    def observes_numbers(self) -> bool:
+        """A number may be the length of a vector, or a turn."""
+        return True
+
+    def can_show(self, effect: Effect) -> bool:
+        """Nothing of targets that are touched or tracked; angles alone show no displacement."""
+        if isinstance(effect, ArtefactEffect):
+            return False
+        angular = all(part.reading.angular for part in self.parts)
+        return not angular or not isinstance(effect, ChainEffect) or effect.term.is_rotation
+
+    @property
+    def needs_whole_periods(self) -> bool:
+        """Over a part of a turn flexure and refraction look like any harmonic."""
+        return True
+
+    def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
+        """Drives for all, the line of sight where something points."""
+        chain = self.context.chain
+        pointing = of_sight(chain) if self.context.sight is not None else ()
+        return (*pointing, *of_drives(chain, dict(self.gear_ratios)))
+
+    def as_vectors(self, rows: Array) -> Array:
+        """The shortest vectors (n, 3) mm, in the frame of the last work axis, that would show such numbers (n, d); of a
+        turn the vector about which it is, of a direction where its end at one metre lies off."""
+        return np.asarray(np.einsum("nik,nk->ni", self._inverse, rows))
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """Vectors (n, 3, d) for a unit of each number, at the start."""
+        context = self.context
+        errors, work, tool = self.state(self.start, self.common_start)
+        vectors = evaluate(context.chain, context.positions, errors, work, tool).residual
+        inverse = np.zeros((len(self.context), 3, self.sigma.shape[1]))
+        for part, values in self._with_own(self.own_start):
+            shown = part.reading.shown(self._stance_of(part, vectors, self._nominal), values, part.rows)
+            along = shown.along if shown.along is not None else shown.by_shift
+            assert along is not None
+            inverse[part.at, :, : along.shape[1]] = np.linalg.pinv(along)
+        return inverse
+
+    def ends(self, nuisance: Array) -> tuple[Array, Array]:
+        """The work points and tool points of all rows."""
+        work, tool = np.zeros((2, len(self.context), 3))
+        for part, values in self._with_own(nuisance):
+            work[part.at], tool[part.at] = part.reading.ends(values, part.rows)
+        return work, tool
+
+    def _with_own(self, nuisance: Array) -> Iterator[tuple[Part, Array]]:
+        """Every setup with its unknowns (m, q) row by row."""
+        for part, columns in zip(self.parts, self.own_columns, strict=True):
+            yield part, nuisance[part.rows.run][:, columns]
+
+    @cached_property
+    def _nominal(self) -> Orientation:
+        """How the sides of a machine without errors stand."""
+        return orientation(
+            self.context.chain,
+            self.context.positions,
+            np.zeros((len(self.context), len(self.context.chain.joints), 2, 6)),
+        )
+
+    def evaluated(self, local: Array, common: Array, *, jacobian: bool = False) -> InstrumentPose:
+        """The readings at (R, p) and (c,), less those that were read."""
+        context, nuisance = self.context, self.own_of(local)
+        errors, work, tool = self.state(local, common)
+        pose = evaluate(context.chain, context.positions, errors, work, tool, jacobian=jacobian)
+        sides = orientation(context.chain, context.positions, errors, jacobian=jacobian)
+        count, numbers = len(context), self.sigma.shape[1]
+        residual, by_own = np.zeros((count, numbers)), np.zeros((count, numbers, nuisance.shape[1]))
+        by_error = np.zeros((count, numbers, len(context.chain.joints), 2, 6)) if jacobian else None
+        for (part, values), columns in zip(self._with_own(nuisance), self.own_columns, strict=True):
+            at = part.at
+            shown = part.reading.shown(self._stance_of(part, pose.residual, sides), values, part.rows)
+            kinds = shown.residual.shape[1]
+            residual[at, :kinds] = np.nan_to_num(shown.residual)
+            if shown.by_own is not None:
+                by_own[at, :kinds, columns] = shown.by_own
+            if by_error is not None:
+                derivatives = self._by_error(shown, pose, sides, at)
+                by_error[at, :kinds] = derivatives * self._first_order(part.id, shown, derivatives, pose, at)
+        return InstrumentPose(residual, pose.by_tip, pose.work_rotation, by_error, by_own)
+
+    @cached_property
+    def _masks(self) -> dict[str, npt.NDArray[np.bool_]]:
+        """Which errors each setup reads, by its id, as they were first looked at."""
+        return {}
+
+    def _first_order(
+        self, setup: str, shown: Shown, derivatives: Array, pose: ChainPose, at: npt.NDArray[np.int64]
+    ) -> npt.NDArray[np.bool_]:
+        """Which errors (J, 2, 6) a setup of lengths reads more of than products of errors.
+
+        One that moves the tool along the line of sight alone, or across the one direction that is read, shows only
+        through products with other errors. Its derivatives are taken as zero: they are as large as the other errors let
+        them be, and turn with every step.
+        """
+        assert pose.by_error is not None
+        if shown.by_shift is None or shown.by_turn is not None:
+            return np.ones(derivatives.shape[2:], dtype=bool)
+        if setup not in self._masks:
+            moved = np.sum(pose.by_error[at] ** 2, axis=(0, 1))
+            self._masks[setup] = np.sum(derivatives**2, axis=(0, 1)) > SECOND_ORDER**2 * moved
+        return self._masks[setup]
+
+    def _stance_of(self, part: Part, vectors: Array, sides: Orientation) -> Stance:
+        """How the sides stand at the rows of a setup, for ``vectors`` (n, 3) mm from work points to tool points."""
+        nominal = _stance(vectors[part.at], self._nominal, part.at)
+        return replace(_stance(vectors[part.at], sides, part.at), nominal=nominal)
+
+    def _by_error(
+        self, shown: Shown, pose: ChainPose, sides: Orientation, at: npt.NDArray[np.int64]
+    ) -> Array:
+        """Derivatives (m, k, J, 2, 6) of what a setup shows by every error."""
+        assert pose.by_error is not None
+        assert sides.by_error is not None
+        chain = self.context.chain
+        shape = (len(at), shown.residual.shape[1], len(chain.joints), 2, 6)
+        total = np.zeros((*shape[:2], shape[2] * 12))
+        turns = sides.by_error[at].reshape(len(at), 3, -1)
+        on_tool = np.repeat(np.arange(len(chain.joints)) >= len(chain.work), 12)
+        if shown.by_shift is not None:
+            total += shown.by_shift @ pose.by_error[at].reshape(len(at), 3, -1)
+        if shown.by_turn is not None:
+            relative = np.swapaxes(sides.work[at], 1, 2) @ (turns * np.where(on_tool, 1.0, -1.0))
+            total += shown.by_turn @ relative
+        if shown.by_tool is not None:
+            total += shown.by_tool @ (turns * on_tool)
+        if shown.by_work is not None:
+            total += shown.by_work @ (turns * ~on_tool)
+        return total.reshape(shape)
+
+    def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
+        """Derivatives (n, d, q) by the unknowns of the setups."""
+        assert isinstance(pose, InstrumentPose)
+        return pose.by_own
+
+    @cached_property
+    def _priors(self) -> tuple[tuple[int, float], ...]:
+        """Own unknowns that are known with a standard uncertainty."""
+        return tuple(
+            (columns.start + index, u)
+            for part, columns in zip(self.parts, self.own_columns, strict=True)
+            for index, u in part.reading.prior()
+        )
+
+    @property
+    def extra_names(self) -> tuple[str, ...]:
+        """What is known of the setups beforehand."""
+        return tuple(self.own_names[index] for index, _ in self._priors)
+
+    def extras(self, nuisance: Array) -> tuple[Array, Array]:
+        """What the unknowns are off what is known of them, in standard uncertainties."""
+        by_own = np.zeros((len(self.runs), len(self._priors), nuisance.shape[1]))
+        residual = np.zeros((len(self.runs), len(self._priors)))
+        for number, (index, u) in enumerate(self._priors):
+            residual[:, number] = nuisance[:, index] / u
+            by_own[:, number, index] = 1.0 / u
+        return residual, by_own
+
+    def taken(self, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> Self:
+        """The problem of chosen rows, with repetitions, that belong to the runs ``run``."""
+        chosen = super().taken(rows, run)
+        index = np.searchsorted(chosen.runs, run)
+        parts = []
+        for part in self.parts:
+            where = np.full(len(self.context), -1)
+            where[part.at] = np.arange(len(part.at))
+            at = np.flatnonzero(where[rows] >= 0)
+            parts.append(replace(part, rows=part.rows.taken(where[rows[at]], index[at]), at=at))
+        return replace(chosen, parts=tuple(parts))
+
+    def contradiction(self, solution: Solution) -> str | None:
+        """Directions that are off by more than any mount's errors."""
+        pointing = [part for part in self.parts if part.reading.name == "direction"]
+        if not pointing:
+            return None
+        vectors = self.vectors(solution.local, solution.common)
+        for part in pointing:
+            # A direction that points the other way has no component across: it is looked at by itself.
+            weighted = np.isfinite(self.sigma[part.at]).all(axis=1)
+            off = np.linalg.norm(vectors[part.at][weighted], axis=1) / 1000.0
+            if len(off) and float(np.sqrt(np.mean(off**2))) > CONTRADICTS:
+                return (
+                    f"setup {part.id}: after the fit the directions are off by {np.sqrt(np.mean(off**2)):.2g} rad; "
+                    "check the signs and directions of the axes, tool_direction and the outer frame"
+                )
+        return None
+
+
+def _stance(r: Array, sides: Orientation, at: npt.NDArray[np.int64]) -> Stance:
+    """How the sides stand at the rows of a setup."""
+    work, tool = sides.work[at], sides.tool[at]
+    return Stance(r, np.swapaxes(work, 1, 2) @ tool, work, tool)

@@ -1,0 +1,151 @@
+"""``point``: where a point of the tool is, in the frame of the instrument that looks at it (a tracker, a CMM, a plate).
+
+Or, of a part that the machine cut, where it was cut. Unknown in every run are the frame (three turns and three shifts
+in its own directions, away from a first guess) and a place on the tool for each target, unless they are known. A row
+whose third number is empty has two: the plane of a part is no reading, and neither is a third number that is the same
+in all rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.methods.instruments.frames import first_frame, seen_points
+from monitor.methods.instruments.reading import SHIFT, TURN, Plain, Rows, Shown, Stance
+from monitor.methods.instruments.readings.direction import frame_turn
+from monitor.records import Array, Setup
+
+# Where the points vary along the line of sight by less than this part of what they vary across it, two numbers show a
+# tilt of the frame only through products of errors.
+FLAT = 5e-3
+
+
+@dataclass(frozen=True)
+class Point(Plain):
+    """A point with ``targets`` (T), their first ``places`` (T, 3) mm on the tool, in ``plane`` where no row has a third
+    number, ``flat`` where all of them lie in a plane across the line of sight then."""
+
+    targets: tuple[str, ...] = ()
+    places: tuple[tuple[float, ...], ...] = ()
+    plane: bool = False
+    flat: bool = False
+
+    name: ClassVar[str] = "point"
+    columns: ClassVar[tuple[str, ...]] = ("point_x_mm", "point_y_mm", "point_z_mm")
+    holdable: ClassVar[tuple[str, ...]] = ("frame", "targets")
+
+    @classmethod
+    def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:
+        measured = _without_constant(rows)
+        plane = bool(np.isnan(measured[:, 2]).all())
+        rows = replace(rows, measured=measured[:, :2] if plane else measured)
+        targets = tuple(str(name) for name in np.unique(rows.target))
+        places = _stated_places(setup, rows, targets)
+        guess = np.tile(np.concatenate([np.eye(3).reshape(9), np.zeros(3)]), (len(rows), 1))
+        if "frame" not in setup.known:
+            guess, places = first_frame(rows, places, held="targets" in setup.known)
+        points = seen_points(rows, guess, places)
+        spread = points.std(axis=0)
+        flat = plane and bool(spread[2] < FLAT * spread[:2].max())
+        middle = np.zeros_like(points)
+        for run in np.unique(rows.run):
+            middle[rows.run == run] = points[rows.run == run].mean(axis=0)
+        reading = cls(setup, targets, tuple(map(tuple, places.tolist())), plane, flat)
+        return reading, replace(rows, guess=np.concatenate([guess, middle], axis=1))
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        return ("x", "y") if self.plane else ("x", "y", "z")
+
+    @property
+    def _free(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The turns and shifts of the frame that are unknown, by their axes in the instrument's frame."""
+        if self.holds("frame"):
+            return (), ()
+        return ((2,) if self.flat else (0, 1, 2)), ((0, 1) if self.plane else (0, 1, 2))
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        turns, shifts = self._free
+        targets = () if self.holds("targets") else self.targets
+        return (
+            *(TURN[axis] for axis in turns),
+            *(SHIFT[axis] for axis in shifts),
+            *(f"target {name} {axis}" for name in targets for axis in "xyz"),
+        )
+
+    def start(self, runs: int) -> Array:
+        frame = np.zeros(sum(map(len, self._free)))
+        places = np.zeros(0) if self.holds("targets") else np.array(self.places).reshape(-1)
+        return np.tile(np.concatenate([frame, places]), (runs, 1))
+
+    def _target(self, rows: Rows) -> npt.NDArray[np.int64]:
+        return np.searchsorted(np.array(self.targets), rows.target)
+
+    def ends(self, values: Array, rows: Rows) -> tuple[Array, Array]:
+        count, at = len(rows), self._target(rows)
+        if self.holds("targets"):
+            places = np.array(self.places)[at]
+        else:
+            places = values[:, -3 * len(self.targets) :].reshape(count, -1, 3)[np.arange(count), at]
+        return np.zeros((count, 3)), places
+
+    def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
+        count, kinds = len(rows), len(self.numbers)
+        turns, shifts = self._free
+        turned, shift = np.zeros((2, count, 3))
+        turned[:, turns] = values[:, : len(turns)]
+        shift[:, shifts] = values[:, len(turns) : len(turns) + len(shifts)]
+        moved, axes = frame_turn(turned)
+        into = np.swapaxes(rows.guess[:, :9].reshape(-1, 3, 3), 1, 2)
+        middle = rows.guess[:, 12:]
+        arm = np.einsum(
+            "nij,nj->ni", moved, np.einsum("nij,nj->ni", into, stance.r - rows.guess[:, 9:12]) - middle
+        )
+        by_shift = moved @ into
+        by_own = np.zeros((count, 3, values.shape[1]))
+        for column, axis in enumerate(turns):
+            by_own[:, :, column] = np.cross(axes[:, axis], arm)
+        for column, axis in enumerate(shifts, start=len(turns)):
+            by_own[:, axis, column] = 1.0
+        if not self.holds("targets"):
+            first, at = values.shape[1] - 3 * len(self.targets), self._target(rows)
+            on_tool = by_shift @ stance.turned
+            if self.plane:
+                # Along the line of sight a place shows only through products of errors.
+                on_tool = np.where(np.linalg.norm(on_tool[:, :2], axis=1, keepdims=True) < FLAT, 0.0, on_tool)
+            for axis in range(3):
+                by_own[np.arange(count), :, first + 3 * at + axis] = on_tool[:, :, axis]
+        return Shown(
+            residual=(arm + middle + shift)[:, :kinds] - rows.measured,
+            by_shift=by_shift[:, :kinds],
+            by_own=by_own[:, :kinds],
+        )
+
+
+def _without_constant(rows: Rows) -> Array:
+    """The measured points (m, 3), the third numbers empty where they are one and the same in all of several rows: a
+    plane that was written down, not measured."""
+    measured = rows.measured.copy()
+    z = measured[:, 2]
+    moves = np.ptp(rows.positions, axis=0).max(initial=0.0) > 0.0
+    if len(z) > 2 and moves and not np.isnan(z).any() and np.ptp(z) == 0.0:
+        measured[:, 2] = np.nan
+    return measured
+
+
+def _stated_places(setup: Setup, rows: Rows, targets: tuple[str, ...]) -> Array:
+    """Places (T, 3) of the targets on the tool: as the rows state them, else that of the setup."""
+    places = np.tile(setup.tool_point, (len(targets), 1)).astype(np.float64)
+    for number, name in enumerate(targets):
+        stated = rows.nominal[rows.target == name]
+        if len(stated) and np.isfinite(stated).all():
+            places[number] = stated.mean(axis=0)
+    return places
+
+
+READING = Point

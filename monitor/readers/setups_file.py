@@ -1,0 +1,203 @@
+"""The setups of instruments of ``campaign.toml``: ``[[setups]]``, each with the keys of its kind of reading."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from monitor.readers.axes import FARTHEST_MM
+from monitor.readers.chain_tables import LETTERS, unit_vector
+from monitor.readers.faults import near, one_of, quoted
+from monitor.readers.toml_table import Table
+from monitor.records import Branch, Probe, Probings, Setup, Vector
+from monitor.units import METRE, MICROMETRE, MICRORADIAN
+
+#: A setup's id stands in names of unknowns and in a column: letters, digits and the signs between them.
+IDENTITY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,40}")
+#: A standard uncertainty of an angle beyond this is a slip of unit: 0.1 rad.
+LARGEST_URAD = 1e5
+POINT = "[0.0, 0.0, -120.0]"
+BRANCHES: tuple[Branch, ...] = ("tool", "work")
+
+
+@dataclass(frozen=True)
+class ReadingFormat:
+    """What a kind of reading asks of the file: its ``columns`` (those of ``optional`` may be empty or missing), whether
+    they are angles, the keys that it needs, those that it allows, and the unknowns that may be ``known``."""
+
+    columns: tuple[str, ...]
+    angular: bool = False
+    optional: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    allows: tuple[str, ...] = ()
+    known: tuple[str, ...] = ()
+
+
+ONE_LENGTH, ONE_ANGLE = ("reading_um",), ("reading_urad",)
+POINTS = ("point_x_mm", "point_y_mm", "point_z_mm")
+FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
+    "vector": ReadingFormat(("dx_um", "dy_um", "dz_um"), allows=("frame",), known=("work_point",)),
+    "component": ReadingFormat(ONE_LENGTH, needs=("direction",), known=("zero",)),
+    "distance": ReadingFormat(
+        ONE_LENGTH, needs=("length_mm",), allows=("length_standard_uncertainty_um",), known=("work_point", "length")
+    ),
+    "displacement": ReadingFormat(ONE_LENGTH, needs=("direction",), known=("direction",)),
+    "offset": ReadingFormat(ONE_LENGTH, needs=("direction", "along"), known=("zero", "slope")),
+    "angle": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), known=("zero",)),
+    "level": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), allows=("side",), known=("zero",)),
+    "direction": ReadingFormat(
+        ("direction_x", "direction_y", "direction_z"), angular=True, needs=("tool_direction",), known=("frame",)
+    ),
+    "point": ReadingFormat(
+        POINTS, optional=("point_z_mm",), allows=("tool_direction",), known=("frame", "targets")
+    ),
+})  # fmt: skip
+
+
+def read_setups(top: Table) -> tuple[Setup, ...] | None:
+    """Read the setups; None if anything in them is wrong, or there is none."""
+    before = len(top.faults)
+    setups: dict[str, Setup] = {}
+    rows = top.tables("setups")
+    if not rows and len(top.faults) == before:
+        top.fault(
+            "setups", "the tables [[setups]] are missing; the method needs one for each instrument set up"
+        )
+    for row in rows:
+        setup = _setup(row)
+        if setup is not None and setup.id in setups:
+            row.fault("id", f"setup {quoted(setup.id)} is listed twice; give every setup its own id")
+        elif setup is not None:
+            setups[setup.id] = setup
+    return None if len(top.faults) > before else tuple(setups.values())
+
+
+def _setup(table: Table) -> Setup | None:
+    before = len(table.faults)
+    identity = table.text("id", required=True, example='"bar-xy"')
+    if identity is not None and not IDENTITY.fullmatch(identity):
+        table.fault("id", f"{quoted(identity)} cannot name a setup: write letters, digits and . _ + - only")
+    kind = table.text("reading", required=True, example='"distance"')
+    instrument = table.text("instrument")
+    if kind is not None and kind not in FORMATS:
+        table.fault(
+            "reading",
+            f"{quoted(kind)} is no kind of reading; {near(kind, FORMATS)}the kinds are {one_of(FORMATS)}",
+        )
+    if kind is None or kind not in FORMATS or identity is None:
+        return None
+    form = FORMATS[kind]
+    length_u = None
+    if "length_standard_uncertainty_um" in form.allows:
+        length_u = table.number(
+            "length_standard_uncertainty_um",
+            positive=True,
+            largest=1e3 * FARTHEST_MM,
+            unit="um",
+            example="0.3",
+        )
+    setup = Setup(
+        id=identity,
+        reading=kind,
+        standard_uncertainty=_uncertainty(table, form),
+        instrument=instrument,
+        tool_point=_point(table, "tool_point_mm"),
+        work_point=_point(table, "work_point_mm"),
+        direction=_unit(table, "direction") if "direction" in form.needs else None,
+        tool_direction=_unit(table, "tool_direction", required="tool_direction" in form.needs)
+        if "tool_direction" in (*form.needs, *form.allows)
+        else None,
+        length=_length(table) if "length_mm" in form.needs else None,
+        length_uncertainty=None if length_u is None else MICROMETRE.to_internal(length_u),
+        along=table.text("along", required=True, example='"X"') if "along" in form.needs else None,
+        side=_branch(table, "side", "tool") if "side" in form.allows else "tool",
+        frame=_branch(table, "frame", "work") if "frame" in form.allows else "work",
+        known=_known(table, form),
+    )
+    table.finish()
+    return None if len(table.faults) > before else setup
+
+
+def _uncertainty(table: Table, form: ReadingFormat) -> float | None:
+    """The standard uncertainty of one reading in mm or rad; None where the rows have to state it."""
+    right, wrong = ("urad", "um") if form.angular else ("um", "urad")
+    other = f"standard_uncertainty_{wrong}"
+    if other in table.data:
+        table.raw(other, required=False, example="")
+        what = "an angle" if form.angular else "a length"
+        table.fault(other, f"the reading is {what}: write standard_uncertainty_{right}")
+    unit = MICRORADIAN if form.angular else MICROMETRE
+    value = table.number(
+        f"standard_uncertainty_{right}",
+        positive=True,
+        largest=LARGEST_URAD if form.angular else MICROMETRE.to_display(FARTHEST_MM),
+        unit=right,
+        example="0.5",
+    )
+    return None if value is None else unit.to_internal(value)
+
+
+def _point(table: Table, key: str) -> Vector:
+    point = table.numbers(key, 3, largest=FARTHEST_MM, unit="mm", example=POINT)
+    return (0.0, 0.0, 0.0) if point is None else (point[0], point[1], point[2])
+
+
+def _length(table: Table) -> float | None:
+    return table.number(
+        "length_mm", required=True, positive=True, largest=FARTHEST_MM, unit="mm", example="150.0"
+    )
+
+
+def _unit(table: Table, key: str, *, required: bool = True) -> Vector | None:
+    value = table.raw(key, required=required, example="[1.0, 0.0, 0.0]")
+    if value is None:
+        return None
+    if isinstance(value, str) and value in LETTERS:
+        return LETTERS[value]
+    return unit_vector(table, key)
+
+
+def _branch(table: Table, key: str, default: Branch) -> Branch:
+    value = table.text(key)
+    for branch in BRANCHES:
+        if value == branch:
+            return branch
+    if value is not None:
+        table.fault(key, f'{quoted(value)} is no side of the machine; write "tool" or "work"')
+    return default
+
+
+def _known(table: Table, form: ReadingFormat) -> tuple[str, ...]:
+    value = table.raw("known", required=False, example='["zero"]')
+    if value is None:
+        return ()
+    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+        table.fault(
+            "known", f'{quoted(value)} is no list of names; write for example known = ["{form.known[0]}"]'
+        )
+        return ()
+    for name in value:
+        if name not in form.known:
+            table.fault(
+                "known",
+                f"{quoted(name)} is no unknown of this reading; what may be known is {one_of(form.known)}",
+            )
+    return tuple(value)
+
+
+def probe_of(setups: tuple[Setup, ...], probings: Probings) -> Probe:
+    """Return what stands for the probe of a campaign of instruments: their names, and the smallest standard uncertainty
+    of a reading, of an angle that at one metre."""
+    stated = [
+        setup.standard_uncertainty * (METRE.factor if FORMATS[setup.reading].angular else 1.0)
+        for setup in setups
+        if setup.standard_uncertainty is not None
+    ]
+    rows = [probings.channels[name] for name in ("u_um", "u_urad") if name in probings.channels]
+    stated += [MICROMETRE.to_internal(float(np.nanmedian(u))) for u in rows if np.isfinite(u).any()]
+    names = dict.fromkeys(setup.instrument or setup.reading for setup in setups)
+    return Probe("; ".join(setup.id for setup in setups), "; ".join(names), min(stated))

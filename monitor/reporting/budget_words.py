@@ -1,0 +1,79 @@
+"""Sentences on what stands behind a stated uncertainty, in each language."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from monitor.reporting.budget import DayToDay, HoldsFor, LengthReference, StatedSource, larger_than_u
+from monitor.reporting.numbers import decimal_of, round_result, round_to_place, round_uncertainty
+from monitor.reporting.texts import Texts
+from monitor.sources import HALF_WIDTHS, Law
+
+#: More parameters are counted, not named.
+_NAMED = 3
+
+
+def days_sentences(
+    holds_for: HoldsFor,
+    days: DayToDay | None,
+    expanded: Mapping[str, float],
+    units: Mapping[str, str],
+    texts: Texts,
+) -> tuple[str, ...]:
+    """For which time the uncertainty holds, what the days differ by, and what cannot be known."""
+    sentences = [texts(f"budget.holds_for_{holds_for.value}")]
+    if days is None:
+        return tuple(sentences)
+    if days.not_known is not None:
+        sentences.append(texts(f"budget.{days.not_known.replace(' ', '_')}", runs=days.runs, days=days.days))
+    beyond = larger_than_u(days, expanded) if holds_for is not HoldsFor.CAMPAIGN else ()
+    beyond = tuple(sorted(beyond, key=lambda name: -days.spread[name] / expanded[name]))
+    if beyond:
+        named = []
+        for name in beyond[:_NAMED]:
+            spread = _at_place_of(days.spread[name], expanded[name], texts)
+            limit = _two_digits(expanded[name], texts)
+            named.append(f"{name} ({spread} {units[name]}, U = {limit} {units[name]})")
+        names = ", ".join([*named, *beyond[_NAMED:]])
+        sentences.append(texts("budget.days_differ", names=names, days=days.days))
+    return tuple(sentences)
+
+
+def negative_sentence(days: DayToDay, texts: Texts) -> str:
+    """Which estimates of u_day were negative; empty where none was."""
+    return texts("budget.negative", names=", ".join(days.not_from_zero)) if days.not_from_zero else ""
+
+
+def length_sentence(length: LengthReference, texts: Texts) -> str:
+    """To what gains refer, and whether that is 20 °C."""
+    values = {
+        "temperature": None if length.temperature is None else _plain(length.temperature, 0.01, texts),
+        "reference": None if length.reference is None else _plain(length.reference, 0.01, texts),
+        "expansion": None if length.expansion is None else _plain(1e6 * length.expansion, 0.01, texts),
+    }
+    key = length.kind.value if length.temperature is not None else f"{length.kind.value}_unknown"
+    return texts(f"length.{key}", gains=", ".join(length.gains), **values)
+
+
+def source_words(source: StatedSource, texts: Texts) -> str:
+    """A source's size, law and sharing: ``± 1 K, rectangular, shared by all runs``."""
+    sign = "± " if source.distribution in [law.value for law in HALF_WIDTHS] else "u = "
+    size = f"{source.size:.4g}".replace(".", texts.decimal_sign)
+    law = texts(f"budget.law_{Law(source.distribution).name.lower()}")
+    shared = texts(f"budget.shared_{source.shared_by.replace(' ', '_')}")
+    quantity = texts(f"budget.quantity_{source.quantity}")
+    if source.acts_on is not None:
+        quantity = f"{quantity} {source.acts_on}"
+    return f"{quantity}, {sign}{size} {source.unit}, {law}, {shared}"
+
+
+def _two_digits(value: float, texts: Texts) -> str:
+    return texts.number(round_uncertainty(value)) if value > 0.0 else "0"
+
+
+def _at_place_of(value: float, expanded: float, texts: Texts) -> str:
+    return texts.number(round_result(value, expanded).estimate)
+
+
+def _plain(value: float, place: float, texts: Texts) -> str:
+    return texts.number(round_to_place(value, decimal_of(place)).normalize())

@@ -1,0 +1,82 @@
+"""Grounds on which a certificate is refused, unless the laboratory accepts them by name and with a reason.
+
+Each ground is data, found by the workflow; its sentence is made here, in the language of the certificate and in English
+for who issues it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from enum import StrEnum
+
+from monitor.reporting.texts import Texts
+
+
+class GroundKind(StrEnum):
+    """What speaks against a certificate; the value is how it is accepted and stored."""
+
+    LACK_OF_FIT = "lack-of-fit"
+    GROSS_READINGS = "gross-readings"
+    IMPLAUSIBLE = "implausible"
+    SCALE_BAR = "scale-bar"
+    TEMPERATURE = "temperature"
+
+
+@dataclass(frozen=True)
+class Ground:
+    """One ground: of a ``run`` and a ``subject`` (a parameter, a reading, a bar), a ``size`` beyond its ``limit``.
+
+    Both are in ``unit``; a temperature that is missing has none of the three.
+    """
+
+    kind: GroundKind
+    run: int
+    subject: str
+    size: float | None = None
+    limit: float | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class AcceptedGround:
+    """Grounds of one kind that the laboratory accepts, and its reason in its own words."""
+
+    kind: GroundKind
+    grounds: tuple[Ground, ...]
+    reason: str
+
+
+def ground_sentence(ground: Ground, texts: Texts) -> str:
+    """A ground in words, without a full stop."""
+    key = ground.kind.value.replace("-", "_")
+    return texts(
+        f"grounds.{key}",
+        run=ground.run,
+        subject=ground.subject,
+        size=_written(ground.size, texts),
+        limit=_written(ground.limit, texts),
+        unit=ground.unit,
+    )
+
+
+def _written(value: float | None, texts: Texts) -> str:
+    """A number to four digits, all of them before the decimal sign; empty for none."""
+    if value is None:
+        return ""
+    return texts.number(
+        Decimal(round(value)) if abs(value) >= 1e4 else Decimal(f"{Decimal(f'{value:.4g}'):f}")
+    )
+
+
+def accepted_statements(accepted: Sequence[AcceptedGround], texts: Texts) -> list[str]:
+    """What is printed of each accepted kind: its grounds, and the laboratory's reason."""
+    return [
+        texts(
+            "grounds.accepted",
+            grounds="; ".join(ground_sentence(ground, texts) for ground in entry.grounds),
+            reason=entry.reason,
+        )
+        for entry in accepted
+    ]

@@ -1,0 +1,114 @@
+"""Which model a machine is followed by: stored with its reason, audited, the latest choice of a machine and method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from monitor import __version__
+from monitor.exceptions import InputError
+from monitor.store import audit
+from monitor.store.catalogue import check_machine
+from monitor.store.connection import Database, utc_now
+
+
+@dataclass(frozen=True)
+class MachineModel:
+    """The model that campaigns of a ``method`` on a machine are identified by, and why."""
+
+    machine: str
+    method: str
+    model: str
+    version: int
+    reason: str
+    made_at: datetime
+
+
+def save_machine_model(
+    db: Database, machine: str, method: str, model: tuple[str, int], reason: str
+) -> MachineModel:
+    """Store a choice; the same as the present one is stored once. Raises NotFoundError, InputError without a reason."""
+    if not reason.strip():
+        raise InputError("say why the machine gets another model: --reason TEXT")
+    name, version = model
+    with db.transaction():
+        check_machine(db, machine)
+        present = machine_model(db, machine, method)
+        if present is not None and (present.model, present.version) == model and present.reason == reason:
+            return present
+        number = db.next_number("machine_model", "choice_id")
+        choice = MachineModel(machine, method, name, version, reason.strip(), utc_now())
+        db.execute(
+            "INSERT INTO machine_model VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            [number, machine, method, name, version, choice.reason, __version__, choice.made_at],
+        )
+        audit.record(db, "save", "machine model", str(number), machine_model_content(db, number))
+    return choice
+
+
+def machine_model(db: Database, machine: str, method: str) -> MachineModel | None:
+    """The present choice of a machine and method; None where it is the method's own model."""
+    rows = db.rows(
+        "SELECT machine, method, model, model_version, reason, made_at FROM v_machine_models "
+        "WHERE machine = ? AND method = ?",
+        [machine, method],
+    )
+    return MachineModel(*rows[0]) if rows else None
+
+
+def machine_models(db: Database, machine: str | None = None) -> list[MachineModel]:
+    """The present choices of all machines, or of one."""
+    rows = db.rows(
+        "SELECT machine, method, model, model_version, reason, made_at FROM v_machine_models "
+        "WHERE $machine IS NULL OR machine = $machine ORDER BY machine, method",
+        {"machine": machine},
+    )
+    return [MachineModel(*row) for row in rows]
+
+
+def followed_by(db: Database, machine: str) -> dict[str, tuple[str, int]]:
+    """Name and version of the model of each method by which a machine is followed: the chosen one, else the latest of
+    the method's own, which has its name and no parent at first. The values of two versions are never mixed."""
+    rows = db.rows(
+        "SELECT model, max(version) FROM model WHERE model IN "
+        "(SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model"
+    )
+    every = {str(model): (str(model), int(version)) for model, version in rows}
+    return every | {choice.method: (choice.model, choice.version) for choice in machine_models(db, machine)}
+
+
+# Machines with a model of their own, and those of methods whose own model has another version by now: few of a fleet.
+_NOT_IDENTIFIED = """
+WITH own AS (
+    SELECT model AS method, max(version) AS version FROM model
+    WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model HAVING version > 1
+), followed AS (
+    SELECT c.campaign_id, c.campaign, m.model, m.model_version
+    FROM campaign AS c JOIN v_machine_models AS m USING (machine, method)
+    UNION ALL
+    SELECT c.campaign_id, c.campaign, c.method, own.version
+    FROM campaign AS c JOIN own USING (method) ANTI JOIN v_machine_models USING (machine, method)
+)
+SELECT campaign FROM followed ANTI JOIN identification USING (campaign_id, model, model_version) ORDER BY campaign
+"""
+
+
+def not_identified(db: Database) -> tuple[str, ...]:
+    """The campaigns that were not identified by the model which their machine is followed by since that changed."""
+    return tuple(str(campaign) for (campaign,) in db.rows(_NOT_IDENTIFIED))
+
+
+def machines_of_method(db: Database, method: str) -> tuple[str, ...]:
+    """The machines that a campaign of a method measured, by name."""
+    rows = db.rows("SELECT DISTINCT machine FROM campaign WHERE method = ? ORDER BY machine", [method])
+    return tuple(str(machine) for (machine,) in rows)
+
+
+def machine_model_content(db: Database, number: int) -> str:
+    """The hash of all that is stored of a choice."""
+    ((machine, method, model, version, reason, software, made_at),) = db.rows(
+        "SELECT machine, method, model, model_version, reason, software_version, made_at FROM machine_model "
+        "WHERE choice_id = ?",
+        [number],
+    )
+    return audit.digest(number, machine, method, model, version, reason, software, made_at)

@@ -1,0 +1,30 @@
+"""Grossly wrong readings of a folder, told at its import: which run, row and target."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from monitor.exceptions import MonitorError
+from monitor.records import Campaign
+
+
+def gross_doubts(campaign: Campaign) -> tuple[str, ...]:
+    """A sentence for each reading that the others of its run contradict beyond doubt, by the method's own model.
+
+    No fit is made: what only a fit or the other runs show is told by `identify`. A campaign that its method cannot
+    identify has none.
+    """
+    # Loaded here: the methods take longer to load than a folder of curves to read.
+    from monitor.methods import campaign_method
+    from monitor.methods.chain.gross import gross_readings
+    from monitor.workflow.identify.notes import gross_sentence
+
+    try:
+        method = campaign_method(campaign)
+        problem = method.problem_of(campaign, method.own_model)
+        with np.errstate(all="ignore"):
+            readings = gross_readings(problem)
+    except (MonitorError, np.linalg.LinAlgError):
+        # What cannot be identified is said by the verb that is asked to.
+        return ()
+    return tuple(gross_sentence(reading, method.nouns.target) for reading in readings)

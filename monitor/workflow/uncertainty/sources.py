@@ -1,0 +1,106 @@
+"""Which Type B sources count beside the readings of a run, and which the scatter of repeated runs contains already."""
+
+from __future__ import annotations
+
+from monitor.effects import ChainEffect, parse_effect
+from monitor.exceptions import InputError
+from monitor.machine import Chain
+from monitor.records import Array, Campaign, LinearAxes
+from monitor.reporting.budget import LengthKind, LengthReference, StatedSource
+from monitor.reporting.covariance_source import CovarianceKind
+from monitor.sources import Quantity, Sharing, Source
+from monitor.uncertainty.measured_run import MeasuredRun
+from monitor.uncertainty.type_b import SourceColumns, source_columns
+from monitor.units import ONE
+
+_LINEAR = (Quantity.LINEAR_POSITIONING, Quantity.LINEAR_STRAIGHTNESS)
+#: What a covariance from repeated runs contains: what takes another value in every run, and within it.
+_BY_RUN = frozenset({Sharing.RUN, Sharing.PROBING})
+
+
+def all_sources(campaign: Campaign, further: tuple[Source, ...] | None) -> tuple[Source, ...]:
+    """The sources of the campaign and those of a file. Raises InputError for a name that both have."""
+    named = {source.name for source in campaign.sources}
+    for source in further or ():
+        if source.name in named:
+            raise InputError(
+                f"--sources: '{source.name}' is a source of campaign {campaign.name} already; it would count twice"
+            )
+    return (*campaign.sources, *(further or ()))
+
+
+def contained(kind: CovarianceKind, days: int, between_days: bool) -> frozenset[Sharing]:
+    """What the scatter of the repeated runs contains: sources that take a new value so often show in it."""
+    if kind is CovarianceKind.POOLED_BY_DAY:
+        return _BY_RUN | {Sharing.DAY} if between_days else _BY_RUN
+    if kind is CovarianceKind.ALL_RUNS:
+        return _BY_RUN | {Sharing.DAY} if days > 1 else _BY_RUN
+    return frozenset()
+
+
+def counted_columns(
+    run: MeasuredRun,
+    unknowns: Array,
+    campaign: Campaign,
+    number: int,
+    sources: tuple[Source, ...],
+    seen: frozenset[Sharing],
+) -> tuple[SourceColumns, ...]:
+    """What the sources that count do to the inputs; those in ``seen`` are looked at, and left out."""
+    columns = source_columns(run, unknowns, campaign, number, sources)
+    return tuple(part for part in columns if part.source.shared_by not in seen)
+
+
+def axes_stated(sources: tuple[Source, ...], chain: Chain) -> frozenset[str]:
+    """The linear axes of whose errors a source speaks."""
+    names = {source.axis for source in sources if source.quantity in _LINEAR}
+    for source in sources:
+        if source.effect is not None:
+            effect = parse_effect(source.effect, chain)
+            if isinstance(effect, ChainEffect) and not effect.joint.turns:
+                names.add(effect.joint.name)
+    return frozenset(name for name in names if name is not None)
+
+
+def refuse_twice(sources: tuple[Source, ...], axes: LinearAxes | None, chain: Chain) -> None:
+    """InputError where the errors of a linear axis are stated by a source and by --linear-axes."""
+    twice = sorted(axes_stated(sources, chain) & set(axes.axes)) if axes is not None else []
+    if twice:
+        raise InputError(
+            f"errors of {', '.join(twice)} stand in --linear-axes and among the sources, and would count twice; state "
+            "those of an axis in one of them"
+        )
+
+
+def stated(sources: tuple[Source, ...], counted: tuple[SourceColumns, ...]) -> tuple[StatedSource, ...]:
+    """The sources as they are shown."""
+    names = {part.source.name for part in counted}
+    return tuple(
+        StatedSource(
+            name=source.name,
+            quantity=source.quantity.value,
+            size=source.unit.to_display(source.size),
+            unit="1/K" if source.unit is ONE else source.unit.name,
+            distribution=source.law.value,
+            degrees_of_freedom=source.degrees_of_freedom,
+            shared_by=source.shared_by.value,
+            counted=source.name in names,
+            acts_on=source.axis or source.along or source.effect,
+        )
+        for source in sources
+    )
+
+
+def length_reference(campaign: Campaign, number: int, gains: tuple[str, ...]) -> LengthReference | None:
+    """At which temperature the gains of a run hold; None where it has none."""
+    if not gains:
+        return None
+    bar = campaign.artefact.scale_bar
+    ambient = next((run.conditions.get("ambient_degC") for run in campaign.runs if run.run == number), None)
+    if bar is None:
+        return LengthReference(LengthKind.NO_BAR, gains, temperature=ambient)
+    if bar.expansion_coefficient is None or bar.reference_temperature is None or ambient is None:
+        return LengthReference(LengthKind.NOT_CORRECTED, gains, temperature=ambient)
+    return LengthReference(
+        LengthKind.CORRECTED, gains, ambient, bar.reference_temperature, bar.expansion_coefficient
+    )

@@ -1,0 +1,329 @@
+"""False alarms and power where days and runs are not alike and not independent, as tables of Markdown.
+
+``python tests/benchmarks/trial_dependence.py``; last results in docs/trials-statistics.md. Five minutes and no test.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal, stats
+
+from monitor.statistics import (
+    anova,
+    backtest,
+    brown_forsythe,
+    correlated_reference,
+    cusum_chart,
+    ewma_chart,
+    find_changes,
+    individuals_chart,
+    mewma_chart,
+    reference_period,
+    robust_p_value,
+    t_squared_chart,
+    welch_anova,
+)
+from monitor.statistics.before_after import before_after
+from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
+
+SEED = 20261122
+YEAR = 365.25
+
+
+def table(title: str, head: list[str], rows: list[list[object]]) -> None:
+    """Print one table in Markdown."""
+    print(f"\n## {title}\n")
+    print("| " + " | ".join(head) + " |\n|" + " --- |" * len(head))
+    for row in rows:
+        print(
+            "| " + " | ".join(f"{x:.3f}" if isinstance(x, float) else str(x) for x in row) + " |", flush=True
+        )
+
+
+def first_order(rng: np.random.Generator, count: int, n: int, r: float) -> np.ndarray:
+    """Return stationary first-order series (count, n) of unit variance."""
+    steps = rng.normal(size=(count, n))
+    steps[:, 1:] *= np.sqrt(1.0 - r * r)
+    return np.asarray(signal.lfilter([1.0], [1.0, -r], steps, axis=1))
+
+
+def slope_rate(values: np.ndarray, t: np.ndarray, cycle: float | None = YEAR) -> float:
+    """Share of series (c, n) of day means whose slope is called at 5 %."""
+    place = np.unique(block_of(t, int(block_count(len(t))), t[0], t[-1]), return_inverse=True)[1]
+    counts = np.bincount(place).astype(float)
+    sums = np.zeros((len(values), len(counts)))
+    np.add.at(sums.T, place, values.T)
+    shape = (len(values), 1)
+    times = np.bincount(place, t) / counts
+    days = np.full(len(values), float(len(t)))
+    lines = block_lines(
+        Blocks(np.tile(counts, shape), np.tile(times, shape), sums / counts, days), cycle=cycle
+    )
+    return float((2.0 * stats.t.sf(np.abs(lines.slope / lines.u_slope), lines.dof) < 0.05).mean())
+
+
+def plain_rate(values: np.ndarray, t: np.ndarray) -> float:
+    """The same of a line through independent days."""
+    away = t - t.mean()
+    slope = values @ away / (away @ away)
+    residual = values - values.mean(axis=1, keepdims=True) - slope[:, np.newaxis] * away
+    u = np.sqrt((residual**2).sum(axis=1) / (len(t) - 2) / (away @ away))
+    return float((2.0 * stats.t.sf(np.abs(slope / u), len(t) - 2) < 0.05).mean())
+
+
+def slopes(rng: np.random.Generator) -> None:
+    """Slopes of weekly days of four runs."""
+    rows: list[list[object]] = []
+    for n in (3, 4, 5, 8, 12, 20, 40, 100, 250):
+        t = 7.0 * np.arange(n)
+        u = np.sqrt(1.25 / ((t - t.mean()) ** 2).sum())
+        for r in (0.0, 0.3, 0.6, 0.8):
+            row: list[object] = [n, r]
+            for component in (0.0, 0.5, 1.0, 2.0):
+                values = component * first_order(rng, 4000, n, r) + rng.normal(size=(4000, n, 4)).mean(axis=2)
+                row.append(slope_rate(values, t, None))
+            row.append(plain_rate(values, t))
+            if r == 0.0:
+                values = rng.normal(size=(4000, n)) + rng.normal(size=(4000, n, 4)).mean(axis=2)
+                row += [
+                    rate(values + 4.0 * u * t, t)
+                    for rate in (lambda y, t: slope_rate(y, t, None), plain_rate)
+                ]
+                row.append(slope_rate(values + 8.0 * u * t, t, None))
+            else:
+                row += ["", "", ""]
+            rows.append(row)
+    table(
+        "Slopes called at 5 %, by the number of days, their correlation, and the day component in scatters of a run",
+        [
+            "days",
+            "r",
+            "0",
+            "0.5",
+            "1",
+            "2",
+            "independent days, 2",
+            "drift of 4 u",
+            "the same, independent",
+            "8 u",
+        ],
+        rows,
+    )
+    rows = []
+    for n, gap in ((12, 30.0), (24, 30.0), (52, 7.0), (104, 7.0), (260, 7.0), (365, 1.0)):
+        t = gap * np.arange(n)
+        for r in (0.0, 0.6):
+            noise = r * first_order(rng, 2000, n, r) + rng.normal(size=(2000, n, 4)).mean(axis=2)
+            wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, YEAR, (2000, 1))) / YEAR)
+            # A temperature that nobody recorded: the year, and weather of a correlation of 0.7 from day to day.
+            warmth = wave + 0.5 * first_order(rng, 2000, n, 0.7)
+            tails = rng.standard_t(3, (2000, n)) / np.sqrt(3.0)
+            cases = (noise + 0.5 * wave, noise + wave, noise + 2.0 * wave, noise + warmth, noise + tails)
+            rows.append(
+                [n, gap, r, *(slope_rate(case, t) for case in cases), slope_rate(noise + wave, t, None)]
+            )
+    table(
+        "Slopes called at 5 % with a yearly cycle, in scatters of a run",
+        [
+            "days",
+            "every (days)",
+            "r",
+            "0.5",
+            "1",
+            "2",
+            "temperature",
+            "Student, 3",
+            "1, no cycle in the null",
+        ],
+        rows,
+    )
+    rows = []
+    for campaigns, gap in ((3, 180.0), (4, 180.0), (6, 120.0), (10, 90.0)):
+        t = (gap * np.arange(campaigns)[:, np.newaxis] + np.arange(5.0)).ravel()
+        for component in (0.0, 0.5, 1.0, 2.0):
+            values = (
+                component * rng.normal(size=(2000, campaigns, 1))
+                + 0.7 * rng.normal(size=(2000, campaigns, 5))
+            ).reshape(2000, -1)
+            rows.append([campaigns, component, slope_rate(values, t, None), plain_rate(values, t)])
+    table(
+        "Slopes called at 5 % where campaigns of five days differ, in scatters of a run",
+        ["campaigns", "differ by", "slope", "independent days"],
+        rows,
+    )
+
+
+def forecasts(rng: np.random.Generator) -> None:
+    """Held-out runs in their interval."""
+    rows: list[list[object]] = []
+    for n, ahead in ((10, 1), (16, 8), (40, 1), (40, 8)):
+        day = np.repeat(np.arange(n), 3)
+        t = 7.0 * day + np.tile([0.0, 0.05, 0.1], n)
+        for r in (0.0, 0.6, 0.8):
+            for component in (0.0, 1.0, 2.0):
+                made = inside = 0
+                for _ in range(80):
+                    y = component * first_order(rng, 1, n, r)[0][day] + rng.normal(size=len(day))
+                    result = backtest(y, t, days=day, first=5, ahead=ahead)
+                    made, inside = made + result.forecasts, inside + result.covered
+                rows.append([n, ahead, r, component, made, inside / made])
+    table(
+        "Forecasts of a run in their 95 % interval, every day foretold by the days before it",
+        ["days", "days ahead", "r", "day component", "forecasts", "inside"],
+        rows,
+    )
+
+
+def charts(rng: np.random.Generator) -> None:
+    """Histories with an alarm within 100 points."""
+    rows: list[list[object]] = []
+    kinds = (individuals_chart, ewma_chart, cusum_chart)
+    for m in (8, 15, 30):
+        for r in (0.0, 0.3, 0.5, 0.8):
+            hits = np.zeros(9)
+            for series in first_order(rng, 300, m + 100, r):
+                reference, plain = correlated_reference(series[:m]), reference_period(series[:m])
+                hits[:3] += [len(chart(series[m:], reference, arl=370.0).alarms) > 0 for chart in kinds]
+                hits[3:6] += [len(chart(series[m:], plain, arl=370.0).alarms) > 0 for chart in kinds]
+                hits[6:] += [
+                    len(chart(series[m : m + 30] + 3.0, reference, arl=370.0).alarms) > 0 for chart in kinds
+                ]
+            rows.append([m, r, *(hits / 300.0).tolist()])
+    head = ["Shewhart", "EWMA", "CUSUM"]
+    seen = [f"{name}: 3 sd in 30 points" for name in head]
+    table(
+        "Charts with an alarm within 100 points, nominal 0.24",
+        ["reference", "r", *head, *(f"{name}, independent" for name in head), *seen],
+        rows,
+    )
+    rows = []
+    for r in (0.0, 0.5, 0.8):
+        hits = np.zeros(4)
+        for _ in range(100):
+            series = first_order(rng, 5, 130, r).T
+            before, after = series[:30], series[30:]
+            for place, correlated in ((0, True), (2, False)):
+                single = t_squared_chart(after, before, arl=370.0, correlated=correlated)
+                path = mewma_chart(after, before, rng=rng, arl=200.0, correlated=correlated)
+                hits[place : place + 2] += [len(single.alarms) > 0, len(path.alarms) > 0]
+        rows.append([r, *(hits / 100.0).tolist()])
+    table(
+        "Charts of five parameters with an alarm within 100 points, nominal 0.24 and 0.39",
+        ["r", "T²", "MEWMA", "T², independent", "MEWMA, independent"],
+        rows,
+    )
+
+
+def changes(rng: np.random.Generator) -> None:
+    """Histories with any change at 1 %, of one parameter and of one of 13."""
+    rows: list[list[object]] = []
+    for n in (20, 52, 104):
+        t = 7.0 * np.arange(n)
+        wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, YEAR, (200, 1))) / YEAR)
+        cases = {
+            "independent": rng.normal(size=(200, n)),
+            "r = 0.6": first_order(rng, 200, n, 0.6),
+            "r = 0.8": first_order(rng, 200, n, 0.8),
+            "yearly cycle of one scatter": rng.normal(size=(200, n)) + wave,
+            "Student, 4 degrees of freedom": rng.standard_t(4, (200, n)),
+            "step of 3": rng.normal(size=(200, n)) + 3.0 * (np.arange(n) >= 0.6 * n),
+        }
+        for name, series in cases.items():
+            rows.append(
+                [
+                    f"{n} day means, {name}",
+                    *(_called(series, t, None, level, rng) for level in (0.01, 0.01 / 13)),
+                ]
+            )
+    for days, runs in ((5, 4), (10, 4)):
+        day = np.repeat(np.arange(days), runs)
+        for component in (0.0, 1.0, 2.0):
+            series = rng.normal(size=(200, len(day))) + component * rng.normal(size=(200, days))[:, day]
+            t = day + np.tile(np.arange(runs) / 24.0, days)
+            rates = [_called(series, t, day, level, rng) for level in (0.01, 0.01 / 13)]
+            rows.append([f"{days} days of {runs}, day component {component:g}", *rates])
+    table("Changes called at 1 %", ["history", "one parameter", "one of 13 (nominal 0.0008)"], rows)
+
+
+def _called(
+    series: np.ndarray, t: np.ndarray, days: np.ndarray | None, level: float, rng: np.random.Generator
+) -> float:
+    trials = 1999 if level > 0.005 else 6499
+    together = [
+        find_changes({"a": y}, t, rng=rng, days=days, cycle=YEAR, false_alarm=level, trials=trials)
+        for y in series[:120]
+    ]
+    return float(np.mean([bool(found.changes or found.trends) for found in together]))
+
+
+def events(rng: np.random.Generator) -> None:
+    """Changes called between two campaigns."""
+    rows: list[list[object]] = []
+    for before, after in (
+        ((1, 4), (1, 4)),
+        ((1, 10), (1, 10)),
+        ((5, 4), (5, 4)),
+        ((5, 4), (2, 4)),
+        ((3, 1), (3, 1)),
+    ):
+        for component in (0.0, 1.0, 2.0):
+            u = np.sqrt(sum((component**2 + 1.0 / runs) / days for days, runs in (before, after)))
+            calls = np.zeros(2)
+            for _ in range(300):
+                sides = []
+                for days, runs in (before, after):
+                    values = component * rng.normal(size=(days, 1)) + rng.normal(size=(days, runs))
+                    sides.append((values.ravel(), np.repeat(np.arange(days), runs)))
+                (x, of_x), (y, of_y) = sides
+                calls += [not before_after(x, y + shift * u, of_x, of_y).agree for shift in (0.0, 3.5)]
+            rows.append(
+                [
+                    f"{before[0]} of {before[1]}",
+                    f"{after[0]} of {after[1]}",
+                    component,
+                    *(calls / 300.0).tolist(),
+                ]
+            )
+    table(
+        "Before and after an event: called where nothing changed, and where it did by 3.5 standard deviations",
+        ["days of runs before", "after", "day component", "no change", "3.5 u"],
+        rows,
+    )
+
+
+def means(rng: np.random.Generator) -> None:
+    """Equal means called where the groups scatter differently."""
+    rows: list[list[object]] = []
+    tests = (anova, welch_anova, brown_forsythe)
+    for k in (3, 5, 10, 20):
+        for n in (2, 3, 4, 6, 12):
+            groups = np.repeat(np.arange(k), n)
+            for text, scale in (("alike", np.ones(k)), ("one 4 times", np.r_[4.0, np.ones(k - 1)])):
+                y = scale[groups, np.newaxis] * rng.normal(size=(k * n, 10_000))
+                tails = scale[groups, np.newaxis] * rng.standard_t(4, (k * n, 10_000))
+                rates = [float((test(y, groups).p_value < 0.05).mean()) for test in tests]
+                both = robust_p_value(y, groups)
+                rows.append([
+                    k, n, text, *rates, float((both < 0.05).mean()), float((both < 0.005).mean()),
+                    float((robust_p_value(tails, groups) < 0.05).mean()),
+                ])  # fmt: skip
+    table(
+        "Equal means called at 5 % where one day scatters differently",
+        [
+            "days",
+            "runs",
+            "scatter",
+            "ANOVA",
+            "Welch",
+            "Brown-Forsythe",
+            "larger p",
+            "larger p, at 0.5 %",
+            "Student, 4",
+        ],
+        rows,
+    )
+
+
+if __name__ == "__main__":
+    for trial in (slopes, means, events, charts, forecasts, changes):
+        trial(np.random.default_rng(SEED))

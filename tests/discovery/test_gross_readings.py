@@ -1,0 +1,118 @@
+"""One grossly wrong reading stops nothing and is named; data without one are fitted as ever, to the last bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from by_path import load
+
+from monitor.discovery import fit, robust_fit
+from monitor.methods import campaign_method
+from monitor.methods.chain.gross import gross_readings
+from monitor.methods.model import Model
+from monitor.readers import read_campaign
+from monitor.workflow.identify.notes import gross_sentence
+from monitor.workflow.intake.gross_doubts import gross_doubts
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+wrong = load("gross_readings", Path(__file__).with_name("gross_readings.py"))
+
+SIZES = (0.05, -0.5, 5.0, -50.0)
+
+
+def problem_of(campaign, model=None):
+    method = campaign_method(campaign)
+    return method.problem_of(campaign, model or method.own_model)
+
+
+def second_run(campaign):
+    runs = np.unique(campaign.probings.run)
+    return np.flatnonzero(campaign.probings.run == runs[min(1, len(runs) - 1)])
+
+
+@pytest.mark.parametrize("machine", ["trunnion", "one rotary table"])
+def test_a_wrong_reading_of_a_ball_is_the_one_that_is_named(virtual_campaigns, seeds, machine):
+    campaign = virtual_campaigns.on_machine(machine, 5)[0]
+    rows, axes = second_run(campaign), ("X", "Y", "Z")
+    rng = np.random.default_rng(7)
+    for trial in seeds(len(rows) * len(SIZES), 6):
+        row, size = int(rng.choice(rows)), SIZES[trial % len(SIZES)]
+        axis = str(rng.choice(axes))
+        robust = robust_fit(problem_of(wrong.with_wrong_reading(campaign, row, axis, size)))
+        assert [reading.row for reading in robust.gross] == [row], (row, axis, size)
+        # A ball that the run touches once (those of the bar) is known from the other runs alone, to their placement.
+        assert robust.gross[0].axis == axis.lower()
+        assert robust.gross[0].size == pytest.approx(size, abs=0.01)
+        clean = fit(replace(problem_of(campaign)), robust.fit.left_out)
+        determined = robust.fit.solution.local_free & clean.solution.local_free
+        difference = np.where(determined, robust.fit.solution.local - clean.solution.local, 0.0)
+        # The numbers are those of the campaign without the row, whatever stood in it.
+        assert np.abs(difference).max() < 1e-9
+
+
+@pytest.mark.parametrize("example", ["tilting-table", "free-form-pocket", "tracked-robot"])
+@pytest.mark.parametrize("size", [0.5, 50.0])
+def test_other_methods_find_it_too(example, size):
+    campaign = read_campaign(EXAMPLES / example)
+    row = int(second_run(campaign)[40])
+    if example == "tracked-robot":
+        channels = dict(campaign.probings.channels)
+        channels["tracker_y_mm"] = channels["tracker_y_mm"].copy()
+        channels["tracker_y_mm"][row] += 10.0 * size
+        spoiled = replace(campaign, probings=replace(campaign.probings, channels=channels))
+    else:
+        axis = wrong.along_normal(campaign, problem_of(campaign), row)
+        spoiled = wrong.with_wrong_reading(campaign, row, axis, size)
+    assert [reading.row for reading in robust_fit(problem_of(spoiled)).gross] == [row]
+
+
+@pytest.mark.parametrize(
+    "example", ["five-days", "hidden-loose-ball", "hidden-reversal-x", "tilting-table", "l-shape"]
+)
+def test_without_a_gross_reading_the_fit_is_plain_least_squares_to_the_last_bit(example):
+    problem = problem_of(read_campaign(EXAMPLES / example))
+    robust, plain = robust_fit(problem), fit(problem)
+    assert robust.gross == ()
+    assert np.array_equal(robust.fit.solution.local, plain.solution.local)
+    assert not robust.fit.left_out.any()
+
+
+def test_the_drop_is_that_of_a_fit_without_the_row(virtual_campaigns):
+    """The independent computation: numpy's least squares of one run, with the row and without it."""
+    campaign = virtual_campaigns.on_machine("trunnion", 3, noise_um=1.0)[0]
+    row = int(second_run(campaign)[17])
+    problem = problem_of(wrong.with_wrong_reading(campaign, row, "Z", 0.3))
+    run = int(np.flatnonzero(problem.runs == problem.context.run[row])[0])
+    at = problem.linearise(problem.start, problem.common_start)
+    usual = np.zeros((int(problem.is_limited.sum()), at.local.shape[2]))
+    usual[np.arange(len(usual)), np.flatnonzero(problem.is_limited)] = 1.0 / (0.01 * problem.largest_error)
+    columns = np.concatenate([at.local[run], usual])
+    residual = np.concatenate([at.residual[run], np.zeros(len(usual))])
+    first = int(np.flatnonzero(np.flatnonzero(problem.context.run == problem.runs[run]) == row)[0])
+    others = np.ones(len(residual), dtype=bool)
+    others[3 * first : 3 * first + 3] = False
+
+    def remainder(rows):
+        solution = np.linalg.lstsq(columns[rows], residual[rows], rcond=1e-9)[0]
+        return float(np.sum((residual[rows] - columns[rows] @ solution) ** 2))
+
+    (reading,) = gross_readings(problem)
+    assert reading.row == row
+    assert reading.chi_square == pytest.approx(remainder(np.ones_like(others)) - remainder(others), rel=1e-4)
+
+
+def test_the_sentence_says_run_row_ball_pose_and_size(virtual_campaigns):
+    campaign = virtual_campaigns.on_machine("trunnion", 5)[0]
+    row = int(second_run(campaign)[5])
+    spoiled = wrong.with_wrong_reading(campaign, row, "Y", 0.5)
+    (sentence,) = gross_doubts(spoiled)
+    target = campaign.probings.target[row]
+    assert sentence.startswith(f"run 2: sequence 6, ball {target} at ")
+    assert " is off by +0.5 mm in y: no number of this run holds" in sentence
+    assert gross_doubts(campaign) == ()
+    method = campaign_method(spoiled)
+    (reading,) = method.identify(spoiled, Model("samba")).gross
+    assert gross_sentence(reading, method.nouns.target) == sentence

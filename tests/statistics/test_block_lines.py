@@ -1,0 +1,155 @@
+"""Lines of blocks of days: dense matrices of numpy, generalised least squares of statsmodels, rates with dependence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import statsmodels.api as sm
+from scipy import signal, stats
+
+from monitor.exceptions import DataError
+from monitor.statistics import backtest, predict, trend
+from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
+
+
+def first_order(rng, count, n, r):
+    """Stationary first-order series (count, n) of unit variance."""
+    steps = rng.normal(size=(count, n))
+    steps[:, 1:] *= np.sqrt(1.0 - r * r)
+    return signal.lfilter([1.0], [1.0, -r], steps, axis=1)
+
+
+def cut(values, t):
+    """Blocks of many series (c, n) over the same days."""
+    place = block_of(t, int(block_count(len(t))), t[0], t[-1])
+    place = np.unique(place, return_inverse=True)[1]
+    counts = np.bincount(place).astype(float)
+    sums = np.zeros((len(values), len(counts)))
+    np.add.at(sums.T, place, values.T)
+    shape = (len(values), 1)
+    return Blocks(
+        np.tile(counts, shape), np.tile(np.bincount(place, t) / counts, shape), sums / counts,
+        np.full(len(values), float(len(t))),
+    )  # fmt: skip
+
+
+def rate(values, t, cycle=None):
+    lines = block_lines(cut(values, t), cycle=cycle)
+    return float((2.0 * stats.t.sf(np.abs(lines.slope / lines.u_slope), lines.dof) < 0.05).mean())
+
+
+@pytest.mark.parametrize(("n", "cycle"), [(7, None), (16, None), (40, None), (90, 365.25)])
+def test_covariance_is_that_of_dense_matrices(n, cycle):
+    rng = np.random.default_rng(n)
+    t = 7.0 * np.arange(n)
+    blocks = cut(first_order(rng, 1, n, 0.6), t)
+    lines = block_lines(blocks, cycle=cycle)
+    weight, time, value = blocks.weight[0], blocks.time[0], blocks.value[0]
+    away = time - lines.at[0]
+    phase = 2.0 * np.pi * away / 365.25
+    columns = [np.ones_like(time), away] + ([np.cos(phase), np.sin(phase)] if cycle else [])
+    assert lines.cyclic[0] == (cycle is not None)
+    root = np.sqrt(weight)
+    x, y = root[:, np.newaxis] * np.column_stack(columns), root * value
+    # The correlation lies between two of the table, whose variances are interpolated: here those of the two themselves.
+    table = np.linspace(0.0, 0.95, 20)
+    place = min(int(lines.allowed[0] / 0.05 + 1e-9), 18)
+    share = (lines.allowed[0] - table[place]) / 0.05
+    pinv = np.linalg.pinv(x)
+    residual = y - x @ (pinv @ y)
+    m = np.eye(len(y)) - x @ pinv
+    lag = np.abs(np.subtract.outer(np.arange(len(y)), np.arange(len(y))))
+    slope_part = trace = dof = 0.0
+    for r, part in ((table[place], 1.0 - share), (table[place + 1], share)):
+        shape = r**lag
+        slope_part += part * (pinv @ shape @ pinv.T)[1, 1]
+        trace += part * np.trace(m @ shape)
+        dof += part * np.trace(m @ shape) ** 2 / np.trace(m @ shape @ m @ shape)
+    assert lines.slope[0] == pytest.approx((pinv @ y)[1], rel=1e-9)
+    assert lines.covariance[0, 1, 1] == pytest.approx(residual @ residual / trace * slope_part, rel=1e-9)
+    assert lines.dof[0] == pytest.approx(dof, rel=1e-9)
+
+
+def test_line_without_resemblance_is_weighted_least_squares_of_statsmodels():
+    rng = np.random.default_rng(5)
+    t = np.arange(12.0)
+    y = rng.normal(size=12)
+    lines = block_lines(cut(y[np.newaxis], t))
+    plain = sm.OLS(y, sm.add_constant(t)).fit()
+    assert lines.slope[0] == pytest.approx(plain.params[1], rel=1e-10)
+    assert lines.u_slope[0] / lines.widening[0] == pytest.approx(plain.bse[1], rel=1e-10)
+
+
+def test_slope_of_long_series_has_the_uncertainty_of_generalised_least_squares():
+    rng = np.random.default_rng(6)
+    n, r = 250, 0.6
+    t = np.arange(float(n))
+    series = first_order(rng, 400, n, r)
+    stated = np.median(block_lines(cut(series, t)).u_slope)
+    lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    right = sm.GLS(series[0], sm.add_constant(t), sigma=r**lag).fit()
+    exact = np.sqrt(right.normalized_cov_params[1, 1])
+    # Twice as wide as of independent days, and by the margin for what is not known of the correlation a fifth more.
+    assert exact < stated < 1.35 * exact
+
+
+# All of the grid: docs/trials-statistics.md.
+@pytest.mark.parametrize("n", [4, 6, 12, 40])
+@pytest.mark.parametrize(("r", "component"), [(0.0, 0.0), (0.0, 2.0), (0.6, 1.0), (0.8, 1.0), (0.8, 2.0)])
+def test_false_alarms_of_a_slope_with_days_that_resemble_each_other(n, r, component, rate_at_most):
+    rng = np.random.default_rng([n, int(10 * r), int(component)])
+    values = component * first_order(rng, 2000, n, r) + rng.normal(size=(2000, n, 4)).mean(axis=2)
+    assert rate_at_most(round(2000 * rate(values, np.arange(float(n)))), 2000, 0.075)
+
+
+@pytest.mark.parametrize("n", [52, 156])
+def test_a_yearly_cycle_is_no_drift(n, rate_at_most):
+    rng = np.random.default_rng(n)
+    t = 7.0 * np.arange(n)
+    wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, 365.0, (1000, 1))) / 365.25)
+    values = wave + 0.5 * rng.normal(size=(1000, n))
+    assert rate_at_most(round(1000 * rate(values, t, 365.25)), 1000, 0.05)
+
+
+def test_campaigns_of_days_count_once():
+    rng = np.random.default_rng(8)
+    t = (np.arange(4)[:, np.newaxis] * 180.0 + np.arange(5.0)).ravel()
+    values = (rng.normal(size=(1000, 4, 1)) + 0.3 * rng.normal(size=(1000, 4, 5))).reshape(1000, -1)
+    assert rate(values, t) < 0.05
+    # As of independent days it would be called in every third history.
+    plain = [stats.linregress(t, series).pvalue < 0.05 for series in values[:300]]
+    assert np.mean(plain) > 0.3
+    with pytest.raises(DataError, match="the 10 days lie in 2 groups far apart, which cannot tell a trend"):
+        trend(values[0, :10], t[:10])
+
+
+def test_many_series_are_those_one_by_one_and_blocks_without_days_are_left_out():
+    rng = np.random.default_rng(9)
+    weight = rng.integers(0, 4, (30, 12)).astype(float)
+    time = np.sort(rng.uniform(0.0, 900.0, (30, 12)), axis=1)
+    value = rng.normal(size=(30, 12))
+    days = weight.sum(axis=1)
+    together = block_lines(Blocks(weight, time, value, days), cycle=365.25)
+    for row in range(30):
+        full = weight[row] > 0.0
+        alone = block_lines(
+            Blocks(weight[[row]][:, full], time[[row]][:, full], value[[row]][:, full], days[[row]]),
+            cycle=365.25,
+        )
+        assert together.cyclic[row] == alone.cyclic[0]
+        for name in ("slope", "u_slope", "dof", "allowed"):
+            np.testing.assert_allclose(getattr(together, name)[row], getattr(alone, name)[0], rtol=1e-8)
+
+
+def test_backtest_beside_a_wave_is_that_of_each_day_by_itself():
+    rng = np.random.default_rng(3)
+    day = np.repeat(np.arange(70), 2)
+    t = 7.0 * day + np.tile([0.0, 0.1], 70)
+    y = rng.normal(size=140) + rng.normal(size=70)[day] + np.cos(2.0 * np.pi * t / 365.25)
+    result = backtest(y, t, days=day, cycle=365.25)
+    for target in (5, 30, 50, 69):
+        past = day < target
+        line = trend(y[past], t[past], days=day[past], cycle=365.25, robust=False)
+        predicted, _, u = predict(line, t[day == target][:1])
+        assert result.z[target - 5] == pytest.approx((y[day == target][0] - predicted[0]) / u[0], rel=1e-9)
+    assert line.resemblance.cyclic

@@ -1,0 +1,82 @@
+"""Coverage factors of sums of parts: against closed forms, and against plain draws that share no code with them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from monitor.uncertainty import BudgetLine, Estimated, ellipsoid_factor, region_factors, single_factor
+from monitor.uncertainty.stein import stein_eigenvalues
+
+
+def equal(m: int, rho: float) -> np.ndarray:
+    return (1.0 - rho) * np.eye(m) + rho * np.ones((m, m))
+
+
+def rank_one(m: int, variance: float) -> np.ndarray:
+    matrix = np.zeros((m, m))
+    matrix[0, 0] = variance
+    return matrix
+
+
+def test_closed_forms_are_used_where_there_are_some() -> None:
+    readings = BudgetLine("readings", equal(5, 0.4), 20.0)
+    assert region_factors([readings]).k_p == pytest.approx(ellipsoid_factor(5, dof=20.0))
+    known = BudgetLine("readings", equal(5, 0.4), math.inf)
+    assert region_factors([known]).k_p == pytest.approx(math.sqrt(stats.chi2(5).ppf(0.95)))
+    size = BudgetLine("readings", equal(5, 0.4), 20.0, Estimated.SCALE)
+    assert region_factors([size]).k_p == pytest.approx(math.sqrt(5.0 * stats.f(5, 20).ppf(0.95)))
+    one = region_factors([BudgetLine("readings", np.eye(1), 7.0)])
+    assert one.k_p == pytest.approx(single_factor(dof=7.0))
+    assert (one.k_q, one.trials) == (pytest.approx(stats.t(7).ppf(0.975)), 0)
+
+
+def test_k_q_of_one_estimated_size_is_that_of_the_multivariate_t() -> None:
+    rng = np.random.default_rng(7)
+    e = rng.standard_normal((1_000_000, 4)) @ np.linalg.cholesky(equal(4, 0.5)).T
+    largest = np.abs(e).max(axis=1) / np.sqrt(rng.chisquare(9.0, len(e)) / 9.0)
+    factors = region_factors([BudgetLine("readings", equal(4, 0.5), 9.0, Estimated.SCALE)])
+    assert factors.k_q == pytest.approx(float(np.quantile(largest, 0.95)), abs=5 * factors.k_q_error + 0.01)
+
+
+def test_the_truth_is_held_in_95_percent_with_a_bar_that_dominates_one_direction() -> None:
+    m, nu, rng = 6, 9, np.random.default_rng(14)
+    bar, held = rank_one(m, 9.0), []
+    for _ in range(30):
+        estimated = np.cov(rng.standard_normal((nu + 1, m)), rowvar=False)
+        factors = region_factors(
+            [BudgetLine("readings", estimated, float(nu)), BudgetLine("bar", bar, math.inf)], most_groups=2
+        )
+        e = rng.standard_normal((1000, m))
+        e[:, 0] += 3.0 * rng.standard_normal(1000)
+        covariance = estimated + bar
+        distances = np.sqrt(np.sum(e * np.linalg.solve(covariance, e.T).T, axis=1))
+        largest = np.max(np.abs(e) / np.sqrt(np.diag(covariance)), axis=1)
+        held.append((np.mean(distances <= factors.k_p), np.mean(largest <= factors.k_q)))
+    mean, error = np.mean(held, axis=0), np.std(held, axis=0) / math.sqrt(len(held))
+    assert np.all(np.abs(mean - 0.955) < 0.015 + 3.0 * error), (mean, error)
+
+
+def test_too_few_degrees_of_freedom_bound_no_ellipsoid_but_every_interval() -> None:
+    runs = np.random.default_rng(3).standard_normal((9, 13))
+    factors = region_factors([BudgetLine("readings", np.cov(runs, rowvar=False), 8.0)])
+    assert math.isinf(factors.k_p)
+    assert 3.0 < factors.k_q < stats.t(8).ppf(1.0 - 0.025 / 13) + 0.3
+
+
+def test_the_same_seed_gives_the_same_factors() -> None:
+    lines = [BudgetLine("readings", equal(3, 0.2), 12.0), BudgetLine("bar", rank_one(3, 2.0), math.inf)]
+    assert region_factors(lines) == region_factors(lines)
+    assert region_factors(lines, seed=1).k_q != region_factors(lines, seed=2).k_q
+
+
+def test_stein_draws_the_eigenvalues_of_few_runs_together() -> None:
+    runs = np.random.default_rng(5).standard_normal((20, 10))
+    values = np.linalg.eigvalsh(runs.T @ runs)[::-1]
+    corrected = stein_eigenvalues(values, 20.0)
+    assert np.all(np.diff(corrected) <= 0.0)
+    assert corrected[0] / corrected[-1] < 0.3 * values[0] / values[-1]
+    assert corrected.mean() == pytest.approx(1.0, abs=0.25)

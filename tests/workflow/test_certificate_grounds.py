@@ -1,0 +1,174 @@
+"""A certificate is refused on grounds that nobody answers for; those that are accepted are printed with the reason."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pypdf
+import pytest
+
+from monitor.cli import main
+from monitor.exceptions import InputError, RefusedResultError
+from monitor.methods import campaign_method
+from monitor.methods.chain.problem import solve_problem
+from monitor.readers import doubts, read_campaign
+from monitor.records import Campaign
+from monitor.reporting.certificate.grounds import GroundKind
+from monitor.store import Database, import_campaign, load_certificate
+from monitor.workflow.certificate.grounds import LARGEST_GAIN, MOST_TIMES, accepted_grounds, grounds_of
+from monitor.workflow.certificate.issue import issue
+from monitor.workflow.certificate.remaking import remake
+from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
+from monitor.workflow.models import resolve
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+DAY = date(2026, 3, 12)
+WHY = "Kugelstab nachgemessen & in Ordnung"
+
+
+@pytest.fixture(scope="module")
+def five_days() -> Campaign:
+    campaign = read_campaign(EXAMPLES / "five-days")
+    assert isinstance(campaign, Campaign)
+    return campaign
+
+
+def grounds(campaign: Campaign, run: int = 20):
+    with Database(":memory:") as db:
+        return grounds_of(campaign, resolve(db, None, campaign.method), [run])
+
+
+def with_bar(campaign: Campaign, more_mm: float) -> Campaign:
+    bar = campaign.artefact.scale_bar
+    longer = replace(bar, length=bar.length + more_mm)
+    return replace(campaign, artefact=replace(campaign.artefact, scale_bar=longer))
+
+
+@pytest.mark.parametrize(
+    "example",
+    ["five-days", "nothing-hidden", "cold-cold", "hot-cold", "tilting-table", "free-form-pins", "l-shape",
+     "tracked-robot", "hidden-b-indexing", "hidden-loose-ball", "hidden-reversal-x", "hidden-spindle-growth"],
+)  # fmt: skip
+def test_no_example_is_refused(example: str) -> None:
+    campaign = read_campaign(EXAMPLES / example)
+    assert grounds(campaign, campaign.runs[-1].run) == ()
+
+
+def test_a_bar_typed_one_millimetre_wrong(five_days: Campaign) -> None:
+    wrong = with_bar(five_days, 1.0)
+    found = {ground.kind: ground for ground in grounds(wrong)}
+    assert set(found) == {GroundKind.SCALE_BAR, GroundKind.IMPLAUSIBLE}
+    # All lengths of the run grow with the bar: 1 mm on its length, in µm/m, on the gain of the genuine bar.
+    genuine = campaign_method(five_days).identify(five_days).runs[-1]
+    gain = dict(zip(campaign_method(five_days).identify(five_days).parameters, genuine.estimate, strict=True))
+    worst = max(
+        (ground for ground in grounds(wrong) if ground.kind is GroundKind.IMPLAUSIBLE),
+        key=lambda each: each.size,
+    )
+    length = five_days.artefact.scale_bar.length
+    expected = 1e6 * ((1.0 + gain[worst.subject]) * (length + 1.0) / length - 1.0)
+    assert abs(worst.size) == pytest.approx(abs(expected), rel=0.02)
+    assert worst.limit == pytest.approx(1e6 * LARGEST_GAIN)
+    assert found[GroundKind.SCALE_BAR].size == pytest.approx(1.0, abs=1e-5)
+    (note,) = [sentence for sentence in doubts(wrong) if "scale bar" in sentence]
+    assert note.endswith("are declared 304.9892 mm apart: check length_mm and nominal_mm")
+    # What a declaration in whole millimetres leaves is no ground.
+    assert GroundKind.SCALE_BAR not in {ground.kind for ground in grounds(with_bar(five_days, 0.45))}
+
+
+def test_residuals_far_beyond_the_statements(five_days: Campaign) -> None:
+    sharper = replace(five_days, probe=replace(five_days.probe, standard_uncertainty=1e-3 / 36.0))
+    (ground,) = [each for each in grounds(sharper) if each.kind is GroundKind.LACK_OF_FIT]
+    # The independent computation: squares of the residuals of the run over their expectation.
+    problem = campaign_method(sharper).problem_of(sharper)
+    solution = solve_problem(problem)
+    rows = problem.context.run == 20
+    squares = np.sum(problem.vectors(solution.local, solution.common)[rows] ** 2) * (36.0 / 1e-3) ** 2
+    unknowns = np.linalg.matrix_rank(np.linalg.qr(solution.last.local[-1])[1], tol=1e-6)
+    freedom = 3 * int(rows.sum()) + 1 - unknowns
+    assert ground.size == pytest.approx(np.sqrt(squares / freedom), rel=1e-3)
+    assert ground.size > ground.limit == MOST_TIMES
+
+
+def test_a_gross_reading_of_any_run(five_days: Campaign) -> None:
+    readings = dict(five_days.probings.readings)
+    row = int(np.flatnonzero(five_days.probings.run == 2)[7])
+    readings["Z"] = readings["Z"].copy()
+    readings["Z"][row] -= 0.5
+    wrong = replace(five_days, probings=replace(five_days.probings, readings=readings))
+    (ground,) = grounds(wrong)
+    assert (ground.kind, ground.run) == (GroundKind.GROSS_READINGS, 2)
+    assert ground.subject == f"8 ({five_days.probings.target[row]})"
+    assert ground.size == pytest.approx(500.0, abs=5.0)
+
+
+def test_no_temperature_where_a_bar_gives_the_length(five_days: Campaign) -> None:
+    runs = tuple(
+        replace(run, conditions={name: x for name, x in run.conditions.items() if not name.endswith("degC")})
+        for run in five_days.runs
+    )
+    cold = replace(five_days, runs=runs)
+    assert [ground.kind for ground in grounds(cold)] == [GroundKind.TEMPERATURE]
+    tilting = read_campaign(EXAMPLES / "tilting-table")
+    bare = replace(tilting, runs=tuple(replace(run, conditions={}) for run in tilting.runs))
+    assert grounds(bare, 1) == ()
+
+
+def test_every_ground_is_accepted_by_its_name_and_none_that_is_absent(five_days: Campaign) -> None:
+    found = grounds(with_bar(five_days, 1.0))
+    with pytest.raises(RefusedResultError, match="--accept scale-bar=REASON") as refused:
+        accepted_grounds(found, {GroundKind.IMPLAUSIBLE: "measured twice"})
+    assert "implausible" not in str(refused.value)
+    with pytest.raises(InputError, match="--accept lack-of-fit: there is nothing to accept"):
+        accepted_grounds(found, dict.fromkeys(GroundKind, "all"))
+
+
+def test_the_reason_is_printed_stored_and_made_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "bar"
+    shutil.copytree(EXAMPLES / "five-days", folder)
+    text = (folder / "campaign.toml").read_text(encoding="utf-8")
+    length = float(re.search(r"length_mm = ([\d.]+)", text)[1])
+    text = text.replace(f"length_mm = {length}", f"length_mm = {length + 1.0}")
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    german, path = EXAMPLES / "laboratory-de.toml", tmp_path / "db.duckdb"
+    words = [
+        "--db",
+        str(path),
+        "certificate",
+        "issue",
+        "five-days",
+        "--run",
+        "20",
+        "--laboratory",
+        str(german),
+    ]
+    with Database(path) as db:
+        import_campaign(db, read_campaign(folder))
+        db.close()
+    assert main([*words, "--out", str(tmp_path)]) == 2
+    message = capsys.readouterr().err
+    assert "the certificate is refused:" in message
+    assert (
+        "scale-bar: run 20: the calibrated length of the scale bar S1-S2 differs from the declared" in message
+    )
+    assert "--accept implausible=REASON" in message
+    with Database(path) as db:
+        request = CertificateRequest(
+            "five-days", 20, laboratory=german, out=tmp_path, issued_on=DAY,
+            accept={GroundKind.SCALE_BAR: WHY, GroundKind.IMPLAUSIBLE: "bekannt"},
+        )  # fmt: skip
+        answer = issue(db, request)
+        printed = " ".join(pypdf.PdfReader(answer.file).pages[0].extract_text().split())
+        assert "Überschrittene Grenzen und warum anerkannt" in printed
+        assert f"Vom Laboratorium anerkannt: {WHY}" in printed
+        assert "um 1 mm (Grenze 0,5 mm)" in printed
+        stored = load_certificate(db, answer.certificate.number).record
+        assert [entry["reason"] for entry in stored["accepted"]] == ["bekannt", WHY]
+        assert remake(db, RemakeRequest(answer.certificate.number)).identical
