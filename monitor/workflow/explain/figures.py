@@ -82,13 +82,16 @@ def explanation_figures(answer: MachineExplanation, explanation: Explanation, fo
         return []
     best = missing[0].effect
     noise_um = MICROMETRE.to_display(explanation.comparison.stated_uncertainty)
-    files = save_figure(_ranked(missing, answer.answer), folder, "missing-effects")
+    title = f"The model lacks {_drawn_name(missing[0])}" if missing[0].shape_unknown else answer.answer
+    files = save_figure(_ranked(missing, title), folder, "missing-effects")
     files += save_figure(_falling(missing, noise_um), folder, "error-falling")
     files += _unknown_shapes(missing, folder)
-    files += _failing(explanation, best, folder)
+    files += _failing(explanation, best, _drawn_name(missing[0]), folder)
     prediction = _predicted(explanation, best)
     if prediction is not None:
-        figure = predicted_against_measured(*prediction, title=f"{best} predicts what the model leaves")
+        figure = predicted_against_measured(
+            *prediction, title=f"{_drawn_name(missing[0])} predicts what the model leaves"
+        )
         files += save_figure(figure, folder, "predicted-against-measured")
     return files
 
@@ -101,13 +104,18 @@ def _ranked(missing: Sequence[MachineMissing], title: str) -> Figure:
     notes: list[str] = []
     for effect in missing:
         rivals = effect.indistinguishable_from[:MOST_RIVALS]
-        names += [effect.effect, *rivals]
+        names += [_drawn_name(effect), *rivals]
         peaks += [effect.peak_um] * (1 + len(rivals))
         groups += [effect.rank] * (1 + len(rivals))
         notes += [_size(effect.amplitude, effect.u, effect.unit)]
         notes += ["not ruled out"] * len(rivals)
     effects = RankedEffects(names, peaks, groups, notes)
     return ranked_effects(effects, title=title, value_name="peak displacement / µm")
+
+
+def _drawn_name(effect: MachineMissing) -> str:
+    """The name of an effect where there is little room: the parts of an unknown shape are left out."""
+    return f"{effect.effect.partition(':')[0]}, shape unknown" if effect.shape_unknown else effect.effect
 
 
 def _unknown_shapes(missing: Sequence[MachineMissing], folder: Path) -> list[str]:
@@ -131,7 +139,7 @@ def _unknown_shapes(missing: Sequence[MachineMissing], folder: Path) -> list[str
     return files
 
 
-def _failing(explanation: Explanation, effect: str, folder: Path) -> list[str]:
+def _failing(explanation: Explanation, effect: str, shown: str, folder: Path) -> list[str]:
     """Draw where the model fails, and the residual against what drives the effect, before and after it is added."""
     files = []
     final, before = explanation.final, explanation.comparison.vectors
@@ -141,7 +149,7 @@ def _failing(explanation: Explanation, effect: str, folder: Path) -> list[str]:
     if against is not None:
         figure = residual_against_driver(
             DrivenResiduals(against.at, against.before, against.groups, after_um=against.after),
-            title=f"{effect} is missing: the residual along {against.along} follows it",
+            title=f"{shown} is missing: the residual along {against.along} follows it",
             driver_name=against.driver,
             residual_name=f"residual along {against.along} / µm",
         )
@@ -164,7 +172,7 @@ def _not_a_number_for_none(values: list[float | None]) -> list[float]:
 def _falling(missing: Sequence[MachineMissing], noise_um: float) -> Figure:
     rms = [missing[0].rms_before_um, *(effect.rms_after_um for effect in missing)]
     held_out = [missing[0].heldout_before_um, *(effect.heldout_after_um for effect in missing)]
-    names = ["as it is", *(f"+ {effect.effect}" for effect in missing)]
+    names = ["as it is", *(f"+ {_drawn_name(effect)}" for effect in missing)]
     steps = ErrorSteps(names, rms, _not_a_number_for_none(held_out), noise_um, NOISE_NAME)
     return error_falling(steps, title=f"The error falls from {rms[0]:.2f} to {rms[-1]:.2f} µm")
 

@@ -75,10 +75,9 @@ def _missing_sentences(missing: Sequence[MachineMissing], verdict: Verdict) -> l
     first = missing[0]
     sentences = [f"The model lacks {first.effect}: {first.description.meaning}."]
     if first.shape_unknown:
-        sentences.append(
-            f"The catalogue does not have its shape; {first.nearest_shape} comes nearest. Further effects stand beside "
-            "it whatever its shape is."
-        )
+        sentences.append(f"The catalogue does not have its shape; {first.nearest_shape} comes nearest.")
+        if len(missing) > 1:
+            sentences.append("The other effects hold whatever its shape is.")
     if first.varies_from_run_to_run:
         sentences.append("It varies from run to run and no recorded column follows it.")
     if first.indistinguishable_from:
