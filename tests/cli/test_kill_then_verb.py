@@ -114,6 +114,8 @@ def _broken_by_an_earlier_version(path: Path, folder: Path, environment: dict[st
     with duckdb.connect(str(path)) as connection:
         connection.execute("DELETE FROM schema_migration WHERE number >= 10")
         connection.execute("DROP TABLE campaign_runs")
+        connection.execute("DROP VIEW v_machine_models")
+        connection.execute("DROP TABLE machine_model")
         for name, table, column in (
             ("run_of_campaign", "run", "campaign_id"),
             ("identification_of_campaign", "identification", "campaign_id"),

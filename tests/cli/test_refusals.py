@@ -25,7 +25,7 @@ WRONG = [
     (["identify", "[red]x[/red]"], "there is no campaign '[red]x[/red]'"),
     (["identify", "five-days", "--run", "99"], "campaign five-days has no run 99; it has 1, 2, 3"),
     (["identify", "five-days", "--run", "-1"], "campaign five-days has no run -1"),
-    (["identify", "--run", "30"], "campaign five-days has no run 30"),
+    (["identify", "--run", "30"], "--run 30 is a run of one campaign: name it"),
     (["identify", "five-days", "--model", "nope"], "there is no model 'nope'; there are "),
     (["identify", "five-days", "--model", "samba@x"], "after @ comes the number of a version, for example samba@1"),
     (["identify", "five-days", "--model", "samba@9"], "model 'samba' has no version 9"),

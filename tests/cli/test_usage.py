@@ -71,7 +71,7 @@ def test_version(typed: Any) -> None:
         (["certificate"], "required: issue|show|verify|amend|withdraw"),
         (["certificate", "bogus"], "invalid choice: 'bogus'"),
         (["certificate", "issue", "five-days", "--run", "x", "--laboratory", "y"], "invalid int value: 'x'"),
-        (["model"], "required: list|show|add|remove|history"),
+        (["model"], "required: list|show|add|remove|use|history"),
         (["model", "add", "EXX:reversal"], "required: --to"),
         (["uncertainty", "five-days", "--seed", "1.5"], "invalid int value: '1.5'"),
         (["simulate", "x", "--peak", "much"], "invalid float value: 'much'"),

@@ -83,8 +83,8 @@ def test_17025_7_8_4_1_d_results_as_found_and_as_left(db: Database, adjusted: Pa
     assert f"{'Ergebnisse' if german else 'Results'}, {left.state}" in text
     assert DONE in text
     assert sorted(pages.attachments) == [
-        "certificate.dcc.xml", "certificate.json", "covariance-1.csv", "covariance-2.csv", "results-1.csv",
-        "results-2.csv",
+        "certificate.dcc.xml", "certificate.json", "covariance-1.csv", "covariance-2.csv",
+        "machine-frame-1.csv", "machine-frame-2.csv", "results-1.csv", "results-2.csv",
     ]  # fmt: skip
     assert remake(db, RemakeRequest(made.certificate.number)).identical is True
     # An amendment is of the same runs in the same states unless it says otherwise.

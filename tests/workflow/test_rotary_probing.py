@@ -65,7 +65,9 @@ def test_table_4_compensation_moves_what_was_compensated(db):
     (pair,) = trends(db, "TILT-500")["agreement"]
     assert pair["kind"] == "event"
     assert pair["campaigns"] == ["tilting-table", "tilting-table-compensated"]
-    assert set(pair["disagree"]) == COMPENSATED
+    # EA0C moved too, by 9.6 µrad; four runs before and one after it let U of the difference be 10.7 (Student, 3).
+    assert set(pair["disagree"]) == COMPENSATED - {"EA0C"}
+    assert 0.8 < pair["parameters"]["EA0C"]["e_n"] < 1.0
     assert len(pair["parameters"]) == 8
 
 
