@@ -78,7 +78,7 @@ def test_the_missing_effect_is_named_drawn_and_added(db: mm.Database, tmp_path: 
     pictures = answer.plot()
     assert "missing-effects.svg" in pictures.names
     assert {path.name for path in pictures.save(tmp_path / "drawn")} == set(pictures)
-    assert answer._repr_html_().count("<svg") == 1
+    assert campaign.compare()._repr_html_().count("<svg") == 1
     assert "The model lacks EZC1:const@warmup" in repr(answer)
     added = campaign.add("EZC1:const@warmup", "warm")
     before, after = (version.heldout_rms_um for version in added.history)

@@ -176,6 +176,7 @@ def test_the_search_finds_nothing_in_the_log_of_2023_07() -> None:
     assert missing(example("mount-mmt-2023-07")) == []
 
 
+@pytest.mark.all_seeds
 def test_flexure_of_the_equatorial_mount_comes_first() -> None:
     first = missing(example(GEM))[0]
     assert first[0] == FLEXURE
