@@ -1,8 +1,8 @@
 """Long-term health database for machine tools and coordinate measuring machines.
 
 The rooms, from the lowest: ``machine``, ``readers``, ``statistics``, ``store`` and ``reporting`` import the ground
-alone (``exceptions``, ``units``, ``records``, ``documents``); above them stand ``effects``, ``methods``,
-``uncertainty`` and ``discovery``, ``workflow``, and the faces ``cli`` and ``api``.
+alone (``exceptions``, ``units``, ``records``, ``documents``, ``refusal``, ``sources``); above them stand
+``effects``, ``methods``, ``uncertainty`` and ``discovery``, ``workflow``, and the faces ``cli`` and ``api``.
 
 People in Python type ``import monitor as mm`` and find the names of ``monitor.api`` here.
 """
