@@ -42,7 +42,7 @@ def summary(comparison: MachineComparison | CurveComparison) -> None:
     )
     repeats = (
         "no repeats"
-        if curve is not None and curve.repeatability is None
+        if comparison.repeatability is None
         else f"repeatability {number(comparison.repeatability)} {unit}"
     )
     model = f"{comparison.campaign}, model {comparison.model}{base}"
