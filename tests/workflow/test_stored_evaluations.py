@@ -146,9 +146,7 @@ def test_a_result_of_another_version_or_an_altered_one_is_no_source(db: Database
     assert stored_uncertainty(db, campaign, 20, model) is None
 
 
-def test_a_certificate_of_a_stored_result_loads_no_compiler(
-    db: Database, tmp_path: Path
-) -> None:
+def test_a_certificate_of_a_stored_result_loads_no_compiler(db: Database, tmp_path: Path) -> None:
     """What takes a second to load, and would be loaded unseen by one import at the top of a file."""
     uncertainty(db, UncertaintyRequest("five-days", 20, method="guf"))
     path = db.path
