@@ -36,24 +36,35 @@ def main_table(content: object) -> pd.DataFrame:
         return table_of(content)  # type: ignore[arg-type]
     if hasattr(content, "guf"):
         return _uncertainties(content)
-    parts = inlined_parts(content)
     for name in MAIN_ROWS:
-        rows = next((value for part in parts if (value := getattr(part, name, None)) is not None), None)
-        if isinstance(rows, Mapping) and rows:
-            records = {key: _scalars(record) for key, record in rows.items()}
-            if all(records.values()):
-                return _with_units(pd.DataFrame.from_dict(records, orient="index"))
-        if isinstance(rows, tuple) and rows and dataclasses.is_dataclass(rows[0]):
-            return _with_units(pd.DataFrame([_scalars(record) for record in rows]))
-        if rows == ():
-            return pd.DataFrame()
-    groups = next((value for part in parts if isinstance(value := getattr(part, "by", None), Mapping)), None)
-    if groups is not None:
-        parts_by = ((kind, name, part) for kind, group in groups.items() for name, part in group.items())
+        frame = _frame_of(_field(content, name))
+        if frame is not None:
+            return _with_units(frame)
+    groups = _field(content, "by")
+    if isinstance(groups, Mapping):
+        parts = ((kind, name, part) for kind, group in groups.items() for name, part in group.items())
         return _with_units(
-            pd.DataFrame([{"by": kind, "of": name, **_scalars(part)} for kind, name, part in parts_by])
+            pd.DataFrame([{"by": kind, "of": name, **_scalars(part)} for kind, name, part in parts])
         )
     raise InputError(f"{type(content).__name__} is no list of rows; its fields are attributes, or to_dict()")
+
+
+def _field(content: object, name: str) -> object:
+    """Return a field of an answer or of a record that is inlined in it; None where there is none."""
+    values = (getattr(part, name, None) for part in inlined_parts(content))
+    return next((value for value in values if value is not None), None)
+
+
+def _frame_of(rows: object) -> pd.DataFrame | None:
+    """Return records, by name or in a row, as a table; None where these are none."""
+    import pandas as pd
+
+    if isinstance(rows, Mapping) and rows:
+        records = {key: _scalars(record) for key, record in rows.items()}
+        return pd.DataFrame.from_dict(records, orient="index") if all(records.values()) else None
+    if isinstance(rows, tuple) and (not rows or dataclasses.is_dataclass(rows[0])):
+        return pd.DataFrame([_scalars(record) for record in rows])
+    return None
 
 
 def table_of(answer: TableAnswer) -> pd.DataFrame:

@@ -39,12 +39,7 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
         output.say(note)
     for why in dict.fromkeys(refusal.why for run in runs for refusal in run.refused):
         output.say(f"no number: {why}")
-    for taken in answer.taken_up or ():
-        if taken.by:
-            output.say(f"{taken.parameter} has no number of its own: {_doing_the_same(taken.by)}")
-    unseen = [taken.parameter for taken in answer.taken_up or () if not taken.by]
-    if unseen:
-        output.say(f"such readings see nothing of {', '.join(unseen)}")
+    _taken_up(answer)
     for name, estimate in answer.added.items():
         output.say(
             f"{name}: {output.rounded(estimate.value, estimate.u)} ± {output.two_digits(estimate.u)} "
@@ -54,6 +49,16 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
             output.say(f"   {reversal_words(answer.reversal_values[name])}")
     for refusal in answer.added_refused:
         output.say(f"no number: {', '.join(refusal.parameters)}: {refusal.why}")
+
+
+def _taken_up(answer: IdentifyAnswer) -> None:
+    """The errors that have no number of their own."""
+    for taken in answer.taken_up or ():
+        if taken.by:
+            output.say(f"{taken.parameter} has no number of its own: {_doing_the_same(taken.by)}")
+    unseen = [taken.parameter for taken in answer.taken_up or () if not taken.by]
+    if unseen:
+        output.say(f"such readings see nothing of {', '.join(unseen)}")
 
 
 def _doing_the_same(names: tuple[str, ...]) -> str:

@@ -123,7 +123,7 @@ def test_refusals(worn):
         use_model(worn, UseModelRequest("with-backlash", "X", WHY))
     with pytest.raises(NotFoundError, match="there is no model 'none'"):
         use_model(worn, UseModelRequest("none", "V", WHY))
-    with pytest.raises(EffectError):
+    with pytest.raises(EffectError, match="EQQ"):
         add_effect(worn, AddEffectRequest("EQQ:reversal", "samba", "wrong"))
 
 
