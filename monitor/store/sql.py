@@ -43,7 +43,8 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
         except duckdb.Error as fault:
             raise InputError(f"this is no SQL that DuckDB understands: {fault}") from fault
         if len(statements) != 1:
-            raise InputError(f"type one query; these are {len(statements)}")
+            count = f"these are {len(statements)}" if statements else "there is none"
+            raise InputError(f"type one query, such as SELECT * FROM v_machines; {count}")
         # EXPLAIN ANALYZE would run what it explains.
         if statements[0].type != duckdb.StatementType.SELECT:
             raise InputError(
