@@ -109,7 +109,7 @@ def test_parameter_over_time(runs: int, size: float) -> None:
     figure = parameter_over_time(
         RunsOverTime(days, values, np.full(runs, 0.5 * size), "µrad"),
         title=LONG, limit=12.0 * size, changes=[days[runs // 2]],
-        events={days[0]: "crash of the spindle into the fixture on the table", days[-1]: "repair of the spindle bearing"},
+        events={days[0]: "crash of the spindle into the fixture", days[-1]: "repair of the spindle bearing"},
         line=(days, values, np.full(runs, 0.3 * size)) if runs > 2 else None,
     )  # fmt: skip
     assert faults(figure) == []
