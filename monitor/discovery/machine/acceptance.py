@@ -15,10 +15,14 @@ from monitor.discovery.machine.refine import refine
 from monitor.discovery.machine.run_evidence import p_value_against_runs
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.variants import with_drivers
-from monitor.discovery.search.acceptance import Acceptance, lowers_held_out_error
+from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.amplitudes import amplitudes
+from monitor.discovery.search.candidate import Candidate
 from monitor.discovery.search.evidence import BEYOND, STANDS_OUT, Evidence, Pool
+from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.remainder import Remainder, Remainders
+from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
 from monitor.discovery.search.sign_flips import p_value_by_flips
 from monitor.records import Array
@@ -34,12 +38,18 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self._families = family_count(scene)
         self._poses = poses_of_rows(scene.fit)
         self._flexible = FlexibleErrors(scene, drivers)
-        self._latest: tuple[object, Array, Array, tuple[ChainCandidate, ...]] | None = None
+        self._in_any_shape: dict[str, Remainders] = {}
+        self._accepted: Memory[bool] = Memory()
+        self._refined: Memory[ChainCandidate] = Memory()
+        self._errors: Memory[tuple[float | None, float | None]] = Memory()
 
     def accepts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect stands out with every pose as one observation and from how its size scatters from run to
         run, is of a plausible size, and lowers the error on runs left out (blocks of poses where there is one run; true
         where it has few) and that at poses left out of every run."""
+        return self._accepted.answer(others, candidate, lambda: self._is_accepted(others, candidate))
+
+    def _is_accepted(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         limit = self.rate
         if not self._survives(others, candidate) or not self._is_plausible(others, candidate):
             return False
@@ -49,38 +59,42 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
                 return False
         if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
             return False
-        return lowers_held_out_error(self.scene, others, candidate) and self._predicts_poses(
-            others, candidate
-        )
+        return self._predicts(others, candidate)
 
     def _survives(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect stands out beside the errors of others in whatever shape they have."""
         named = [other for other in others if error_of(other) != error_of(candidate)]
         if not named:
             return True
-        basis, residual = self._beside(others, named)
-        columns = orthonormal(without(basis, candidate.columns))
+        beside = self._beside(others, candidate)
+        residual = beside.residual
+        columns = orthonormal(without(beside.basis, candidate.columns))
         explained = float(np.sum((columns.T @ residual) ** 2))
         size = columns.shape[1]
-        dof = self.scene.degrees_of_freedom - basis.shape[1] - size
+        dof = beside.degrees_of_freedom - size
         rest = float(residual @ residual) - explained
         if size == 0 or dof < 1 or rest <= 0.0:
             return False
         p_value = float(special.fdtrc(size, dof, explained / size / (rest / dof)))
         return p_value * candidate.variant.tries * candidate.variant.odds * self._families <= self.rate
 
-    def _beside(
-        self, others: Sequence[ChainCandidate], named: Sequence[ChainCandidate]
-    ) -> tuple[Array, Array]:
-        """The span (M, r) of others, ``named`` ones in any shape, and the residual (M,) without it."""
-        key = (tuple(id(other) for other in others), tuple(id(other) for other in named))
-        if self._latest is None or self._latest[0] != key:
-            columns = np.concatenate([self.scene.columns(others), self._flexible.columns(named)], axis=1)
-            basis = orthonormal(columns)
-            residual = without(basis, self.scene.residual[:, None])[:, 0]
-            # The others are kept too: an identity is only that of an object that exists.
-            self._latest = (key, basis, residual, (*others, *named))
-        return self._latest[1], self._latest[2]
+    def _beside(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> Remainder:
+        """What others leave, in any shape those that are other errors than a candidate."""
+        mine = error_of(candidate)
+        symbol = mine if any(error_of(other) == mine for other in others) else ""
+        if symbol not in self._in_any_shape:
+            scene, flexible = self.scene, self._flexible
+
+            def columns(selected: Sequence[Candidate[object]]) -> Array:
+                named = [
+                    other
+                    for other in selected
+                    if isinstance(other, ChainCandidate) and error_of(other) != symbol
+                ]
+                return np.concatenate([scene.columns(selected), flexible.columns(named)], axis=1)
+
+            self._in_any_shape[symbol] = Remainders(scene.residual, scene.degrees_of_freedom, columns)
+        return self._in_any_shape[symbol].beside(others)
 
     def _is_plausible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect beside others is no larger than a machine could have."""
@@ -90,13 +104,22 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         sure = np.maximum(np.abs(sizes) - STANDS_OUT * spread, 0.0)
         return float(np.linalg.norm(sure)) <= BEYOND * candidate.largest
 
-    def _predicts_poses(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
-        """Whether an effect beside others lowers the error at poses left out of every run; true where there are too
-        few poses."""
+    def _predicts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        """Whether an effect beside others lowers the error on runs left out (blocks of poses where there is one run)
+        and that at poses left out of every run; true where there are too few."""
         columns = self.scene.columns(others)
-        before = self.scene.held_out_error_by_poses(columns)
-        after = self.scene.held_out_error_by_poses(np.concatenate([columns, candidate.columns], axis=1))
-        return before is None or after is None or after < before
+        before = self._errors.answer(others, None, lambda: self._held_out(columns))
+        more = np.concatenate([columns, candidate.columns], axis=1)
+        return all(
+            without is None or (error := held_out(more)) is None or error < without
+            for without, held_out in zip(
+                before, (self.scene.held_out_error, self.scene.held_out_error_by_poses), strict=True
+            )
+        )
+
+    def _held_out(self, columns: Array) -> tuple[float | None, float | None]:
+        """The errors by runs and by poses with ``columns`` (M, c)."""
+        return self.scene.held_out_error(columns), self.scene.held_out_error_by_poses(columns)
 
     def stands_among(
         self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
@@ -111,4 +134,8 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
 
     def at_best_value(self, selected: Sequence[ChainCandidate], index: int) -> ChainCandidate:
         """The selected candidate at an index with its time constant, pitch or order at the best value."""
-        return refine(self.scene, selected, index).candidate
+        return self._refined.answer(
+            except_for(selected, index),
+            selected[index],
+            lambda: refine(self.scene, selected, index).candidate,
+        )

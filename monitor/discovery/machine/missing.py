@@ -19,7 +19,6 @@ from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.missing import Missing, Rival
-from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects.drivers import EachRun
@@ -214,7 +213,7 @@ def _p_and_q(
 
 def _rms(scene: ChainScene, candidates: Sequence[ChainCandidate]) -> float:
     """Root mean square in mm of all coordinates with candidates in the model."""
-    residual = without(orthonormal(scene.columns(candidates)), scene.residual[:, None])
+    residual = scene.remainders.beside(candidates).residual
     return scene.fit.sigma * float(np.sqrt(np.sum(residual**2) / scene.fit.readings))
 
 

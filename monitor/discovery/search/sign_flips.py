@@ -18,7 +18,6 @@ import numpy.typing as npt
 
 from monitor.discovery.search.candidate import Candidate
 from monitor.discovery.search.evidence import SMALLEST_REMAINDER, Evidence, Pool
-from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scene import CandidateT, Scene
 from monitor.records import Array
 
@@ -54,9 +53,9 @@ def p_value_by_flips(
     runs = int(run[-1]) + 1
     if runs < FEWEST_RUNS:
         return None
-    basis = orthonormal(scene.columns(others))
-    residual = without(basis, scene.residual[:, None])[:, 0]
-    total, dof = float(residual @ residual), scene.degrees_of_freedom - basis.shape[1]
+    beside = scene.remainders.beside(others)
+    basis, residual, dof = beside.basis, beside.residual, beside.degrees_of_freedom
+    total = float(residual @ residual)
     if dof < 1 or total <= 0.0:
         return 1.0
     ends = np.searchsorted(run, np.arange(runs + 1))
