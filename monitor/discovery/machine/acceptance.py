@@ -17,11 +17,9 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.variants import with_drivers
 from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.amplitudes import amplitudes
-from monitor.discovery.search.candidate import Candidate
-from monitor.discovery.search.evidence import BEYOND, STANDS_OUT, Evidence, Pool
+from monitor.discovery.search.evidence import BEYOND, STANDS_OUT, Evidence, Pool, weigh_beside
 from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.projection import orthonormal, without
-from monitor.discovery.search.remainder import Remainder, Remainders
 from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
 from monitor.discovery.search.sign_flips import p_value_by_flips
@@ -38,9 +36,11 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self._families = family_count(scene)
         self._poses = poses_of_rows(scene.fit)
         self._flexible = FlexibleErrors(scene, drivers)
-        self._in_any_shape: dict[str, Remainders] = {}
+        self._weighed: Memory[float] = Memory()
         self._accepted: Memory[bool] = Memory()
         self._refined: Memory[ChainCandidate] = Memory()
+        self._pool: Pool[ChainCandidate] | None = None
+        self._flipped: Memory[float | None] = Memory()
         self._errors: Memory[tuple[float | None, float | None]] = Memory()
 
     def accepts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
@@ -62,11 +62,11 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         return self._predicts(others, candidate)
 
     def _survives(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
-        """Whether an effect stands out beside the errors of others in whatever shape they have."""
-        named = [other for other in others if error_of(other) != error_of(candidate)]
+        """Whether an effect stands out beside the larger errors among others in whatever shape they have."""
+        named = self._larger_errors(others, candidate)
         if not named:
             return True
-        beside = self._beside(others, candidate)
+        beside = self.scene.remainders.beside([*others, *self._flexible.competitors(named)])
         residual = beside.residual
         columns = orthonormal(without(beside.basis, candidate.columns))
         explained = float(np.sum((columns.T @ residual) ** 2))
@@ -78,23 +78,24 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         p_value = float(special.fdtrc(size, dof, explained / size / (rest / dof)))
         return p_value * candidate.variant.tries * candidate.variant.odds * self._families <= self.rate
 
-    def _beside(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> Remainder:
-        """What others leave, in any shape those that are other errors than a candidate."""
-        mine = error_of(candidate)
-        symbol = mine if any(error_of(other) == mine for other in others) else ""
-        if symbol not in self._in_any_shape:
-            scene, flexible = self.scene, self._flexible
+    def _larger_errors(
+        self, others: Sequence[ChainCandidate], candidate: ChainCandidate
+    ) -> list[ChainCandidate]:
+        """The effects of other errors that explain more beside all than a candidate does: of two effects the larger one
+        is named first, and its shape may be the cause of the other, not the other way round."""
+        own = self._explained(others, candidate)
+        return [
+            other
+            for index, other in enumerate(others)
+            if error_of(other) != error_of(candidate)
+            and self._explained([*except_for(others, index), candidate], other) >= own
+        ]
 
-            def columns(selected: Sequence[Candidate[object]]) -> Array:
-                named = [
-                    other
-                    for other in selected
-                    if isinstance(other, ChainCandidate) and error_of(other) != symbol
-                ]
-                return np.concatenate([scene.columns(selected), flexible.columns(named)], axis=1)
-
-            self._in_any_shape[symbol] = Remainders(scene.residual, scene.degrees_of_freedom, columns)
-        return self._in_any_shape[symbol].beside(others)
+    def _explained(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> float:
+        """The sum of squares that a candidate explains beside others."""
+        return self._weighed.answer(
+            others, candidate, lambda: weigh_beside(self.scene, [candidate], others)[0].explained
+        )
 
     def _is_plausible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect beside others is no larger than a machine could have."""
@@ -125,7 +126,13 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
     ) -> bool:
         """Whether an effect stands out under sign flips of whole runs, where there are enough of them."""
-        p_value = p_value_by_flips(self.scene, pool, others, evidence, self.scene.run)
+        if pool is not self._pool:
+            self._pool, self._flipped = pool, Memory()
+        p_value = self._flipped.answer(
+            others,
+            evidence.candidate,
+            lambda: p_value_by_flips(self.scene, pool, others, evidence, self.scene.run),
+        )
         return p_value is None or p_value <= self.rate
 
     def alternatives(self, candidate: ChainCandidate) -> Sequence[ChainCandidate]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from monitor.discovery.machine.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.compare import ChainComparison, compare
-from monitor.discovery.machine.correlation import Correlation
+from monitor.discovery.machine.correlation import Correlation, caution
 from monitor.discovery.machine.cures import Mistake
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
@@ -39,7 +39,7 @@ from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
-MOST_ROUNDS = 6
+MOST_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -154,12 +154,13 @@ def _search(
     """Search effects and suspects in turn, each under the others and the ``suspects`` that ``first`` leaves out, until
     nothing changes."""
     gross = suspects
-    correlation: Correlation | None = None
+    noise = _Noise()
+    earlier: list[Suspects] = []
     unfitted: list[str] = []
     for _ in range(MOST_ROUNDS):
         out, single = suspects.left_out(problem), suspects.effects(problem)
         current = first if suspects.same_as(gross) else fit(with_effects(problem, single), out, first)
-        current = current.with_correlation(correlation)
+        current = current.with_correlation(noise.correlation)
         able = [variant for variant in variants if variant.family not in unfitted]
         scene, result = search_chain(scene_of(current, able), drivers, rate)
         refined = refine_all(scene, result.candidates)
@@ -171,20 +172,49 @@ def _search(
                 finding.candidate.family for finding in refined if finding.candidate.effect in unable
             ]
             continue
-        effects = [finding.candidate.effect for finding in refined]
         # What all runs share and what the effects explain is no noise of neighbours.
-        before, correlation = correlation, _correlation(under)
-        if correlation != before:
+        search = noise.settled(
+            _correlation(under),
+            _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted))),
+        )
+        if search is None:
             continue
         # Readings are judged under the present effects, again from the start: what looked bad without them may be good.
-        begin = under
+        begin = search.under
         if not suspects.same_as(gross):
-            begin = fit(with_effects(problem, effects), gross.left_out(problem), current)
-        more = find_suspects(begin, problem, effects, gross, able, scene if begin is current else None)
-        if more.same_as(suspects):
-            break
+            begin = fit(with_effects(problem, search.effects), gross.left_out(problem), current)
+        same_scene = search.scene if begin is search.scene.fit else None
+        more = find_suspects(begin, problem, search.effects, gross, able, same_scene)
+        earlier.append(suspects)
+        # Suspects that had their turn come again in a circle: what was found under the last ones stands.
+        if any(more.same_as(before) for before in earlier):
+            return search
         suspects = more
+        noise = _Noise(noise.correlation)
     return _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted)))
+
+
+class _Noise:
+    """The correlation of neighbours under which effects are searched, from round to round.
+
+    Effects that are found under one correlation may leave another, and so on in a circle: then the most cautious of
+    them counts.
+    """
+
+    def __init__(self, correlation: Correlation | None = None) -> None:
+        self.correlation = correlation
+        self._searches: dict[Correlation | None, _Search] = {}
+
+    def settled(self, following: Correlation | None, search: _Search) -> _Search | None:
+        """The search that counts, where the one under the present correlation leaves this or one that had its turn;
+        None where the ``following`` correlation has its turn."""
+        self._searches[self.correlation] = search
+        if following != self.correlation and following not in self._searches:
+            self.correlation = following
+            return None
+        turns = list(self._searches)
+        self.correlation = max(turns[turns.index(following) :], key=caution)
+        return self._searches[self.correlation]
 
 
 def _correlation(under: Fit) -> Correlation | None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -69,6 +69,7 @@ class PoseFold:
         return int(np.sum(np.any(self.predicted != 0.0, axis=2)))
 
 
+@lru_cache(maxsize=2)
 def pose_folds(fit: Fit) -> tuple[PoseFold, ...]:
     """The poses of a plan dealt out to ten folds; empty where there are too few poses."""
     problem = fit.problem
