@@ -17,13 +17,23 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.variants import with_drivers
 from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.amplitudes import amplitudes
-from monitor.discovery.search.evidence import BEYOND, STANDS_OUT, Evidence, Pool, weigh_beside
+from monitor.discovery.search.evidence import (
+    BEYOND,
+    STANDS_OUT,
+    Evidence,
+    Pool,
+    best_of_families,
+    weigh_beside,
+)
 from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
 from monitor.discovery.search.sign_flips import p_value_by_flips
 from monitor.records import Array
+
+# So many effects within the shape of another are named at most.
+MOST_NAMED = 5
 
 
 class ChainAcceptance(Acceptance[ChainCandidate]):
@@ -51,7 +61,8 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
 
     def _is_accepted(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         limit = self.rate
-        if not self._survives(others, candidate) or not self._is_plausible(others, candidate):
+        named = self._larger_errors(others, candidate)
+        if not self._survives(others, candidate, named) or not self._is_plausible(others, candidate):
             return False
         if self._poses is not None:
             by_poses = p_value_by_poses(candidate, self.scene, others, self._poses)
@@ -61,9 +72,30 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
             return False
         return self._predicts(others, candidate)
 
-    def _survives(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
-        """Whether an effect stands out beside the larger errors among others in whatever shape they have."""
-        named = self._larger_errors(others, candidate)
+    def within_shapes(self, selected: Sequence[ChainCandidate]) -> list[tuple[str, ...]]:
+        """For each selected effect the families that stand out beside all selected ones, but not beside its error in
+        any shape."""
+        pool = Pool(tuple(candidate for candidate in self.scene.candidates if candidate.visible))
+        families = {candidate.family for candidate in selected}
+        within: list[list[str]] = [[] for _ in selected]
+        for evidence in best_of_families(weigh_beside(self.scene, pool, selected)):
+            candidate = evidence.candidate
+            if evidence.p_value * self._families > self.rate or candidate.family in families:
+                continue
+            for index, named in enumerate(selected):
+                other_error = error_of(named) != error_of(candidate)
+                if other_error and not self._survives(selected, candidate, [named]):
+                    within[index].append(candidate.family)
+                    break
+        return [tuple(names[:MOST_NAMED]) for names in within]
+
+    def _survives(
+        self,
+        others: Sequence[ChainCandidate],
+        candidate: ChainCandidate,
+        named: Sequence[ChainCandidate],
+    ) -> bool:
+        """Whether an effect stands out beside others, the ``named`` ones in whatever shape they have."""
         if not named:
             return True
         beside = self.scene.remainders.beside([*others, *self._flexible.competitors(named)])
