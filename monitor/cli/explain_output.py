@@ -125,8 +125,8 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
         output.say(f"   {searched.what} {output.rounded(searched.value, searched.u)}{u}{unit}")
     if effect.travelled_periods is not None:
         output.say(
-            f"   the axis turned {effect.travelled_periods:.2f} of its period: over a part of a turn an offset, a tilt or "
-            "flexure looks alike"
+            f"   the axis turned {effect.travelled_periods:.2f} of its period: over a part of a turn an offset, a "
+            "tilt or flexure looks alike"
         )
     if effect.within_its_shape:
         symbol = effect.effect.partition(":")[0]

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 from scipy import special
 
 from monitor.discovery.machine.flexible import FlexibleErrors, error_of
@@ -32,8 +33,19 @@ from monitor.discovery.search.scene import family_count
 from monitor.discovery.search.sign_flips import p_value_by_flips
 from monitor.records import Array
 
+# Readings of one block of a run: some minutes, beyond what neighbours share once their correlation is taken out.
+BLOCK = 15
 # So many effects within the shape of another are named at most.
 MOST_NAMED = 5
+
+
+def blocks_of_runs(scene: ChainScene) -> npt.NDArray[np.int64]:
+    """The block (M,) of every whitened number: some neighbouring readings of one run."""
+    problem = scene.fit.problem
+    runs, rows = scene.fit.solution.last.residual.shape
+    numbers = problem.sigma.shape[1]
+    count = max(rows // (BLOCK * numbers), 1)
+    return np.asarray(scene.run * count + np.tile(np.arange(rows) * count // rows, runs))
 
 
 class ChainAcceptance(Acceptance[ChainCandidate]):
@@ -45,6 +57,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self.rate = rate
         self._families = family_count(scene)
         self._poses = poses_of_rows(scene.fit)
+        self._units = (scene.run, blocks_of_runs(scene))
         self._flexible = FlexibleErrors(scene, drivers)
         self._weighed: Memory[float] = Memory()
         self._accepted: Memory[bool] = Memory()
@@ -163,7 +176,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         p_value = self._flipped.answer(
             others,
             evidence.candidate,
-            lambda: p_value_by_flips(self.scene, pool, others, evidence, self.scene.run),
+            lambda: p_value_by_flips(self.scene, pool, others, evidence, self._units),
         )
         return p_value is None or p_value <= self.rate
 
