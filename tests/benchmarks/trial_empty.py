@@ -51,8 +51,8 @@ NOISES: dict[str, Callable[[np.random.Generator, np.ndarray], np.ndarray]] = {
     "rounded to 1 µm": lambda rng, run: rng.standard_normal((len(run), 3)),
 }
 
-# Scenes are remembered up to so many probings together: 400 MB.
-MOST_ROWS = 12_000
+# Scenes are remembered up to so many probings together: 100 MB a plan.
+MOST_ROWS = 4_000
 
 
 @dataclass

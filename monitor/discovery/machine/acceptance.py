@@ -49,10 +49,14 @@ def blocks_of_runs(scene: ChainScene) -> npt.NDArray[np.int64]:
 
 
 class ChainAcceptance(Acceptance[ChainCandidate]):
-    """The rules of a search on a chain; ``drivers`` are those that the recorded columns allow."""
+    """The rules of a search on a chain; ``drivers`` are those that the recorded columns allow, ``shared`` effects that
+    the scene takes for granted."""
 
-    def __init__(self, scene: ChainScene, drivers: Sequence[str], rate: float) -> None:
+    def __init__(
+        self, scene: ChainScene, drivers: Sequence[str], rate: float, shared: Sequence[ChainCandidate] = ()
+    ) -> None:
         self.scene = scene
+        self.shared = shared
         self.drivers = drivers
         self.rate = rate
         self._families = family_count(scene)
@@ -74,7 +78,10 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
 
     def _is_accepted(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         limit = self.rate
-        named = self._larger_errors(others, candidate)
+        named = [
+            *self._larger_errors(others, candidate),
+            *(shared for shared in self.shared if error_of(shared) != error_of(candidate)),
+        ]
         if not self._survives(others, candidate, named) or not self._is_plausible(others, candidate):
             return False
         if self._poses is not None:

@@ -21,8 +21,10 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
     """Scan a scene; where gears stand out of what it leaves, once more with them; at last with tables instead of
     several shapes. Return the scene with the candidates that were added."""
 
-    def scanned(scene: ChainScene, begin: Sequence[ChainCandidate]) -> ChainScan:
-        return scan(scene, ChainAcceptance(scene, drivers, rate), rate=rate, begin=begin)
+    def scanned(
+        scene: ChainScene, begin: Sequence[ChainCandidate], shared: Sequence[ChainCandidate] = ()
+    ) -> ChainScan:
+        return scan(scene, ChainAcceptance(scene, drivers, rate, shared), rate=rate, begin=begin)
 
     gears: set[str] = set()
     selected: Sequence[ChainCandidate] = ()
