@@ -7,19 +7,20 @@ residual, the base parameters are taken out again (they are linear to parts in a
 of the catalogue is asked as ``explain`` asks it, under the correlation of neighbours that the noise itself shows.
 What is left out of ``explain`` can add no effect of the catalogue, only free shapes; those are counted by
 ``trial_unknown.py``. Seeds go round over all kinds until ``--seconds`` of processor time are used.
-Prints exact (Clopper-Pearson) intervals.
+Stopped early, it prints what it has, with exact (Clopper-Pearson) intervals.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -111,6 +112,23 @@ class Plan:
         return [finding.candidate.family for finding in result.findings]
 
 
+def campaigns(options: argparse.Namespace) -> Iterator[tuple[int, str, list[str]]]:
+    """Runs, noise and named effects of one empty campaign after another."""
+    begin = time.process_time()
+    plans = {count: Plan(*unknown.PLANS[count]) for count in options.runs}
+    for seed in range(options.seeds):
+        for count, plan in plans.items():
+            for name, noise in NOISES.items():
+                if options.only not in name:
+                    continue
+                if time.process_time() - begin > options.seconds:
+                    return
+                sizes = 1e-3 * noise(np.random.default_rng((30000 + seed, count)), plan.run)
+                if name.startswith("rounded"):
+                    sizes = np.round(plan.readings + sizes, 3) - plan.readings
+                yield count, name, plan.effects(sizes)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seeds", type=int, default=300, help="campaigns of every noise and plan, at most")
@@ -118,24 +136,16 @@ def main() -> None:
     parser.add_argument("--runs", type=int, nargs="+", default=[1, 2, 4, 7, 20, 60])
     parser.add_argument("--only", default="", help="noises whose name contains this")
     options = parser.parse_args()
-    begin = time.process_time()
-    plans = {count: Plan(*unknown.PLANS[count]) for count in options.runs}
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     tried: Counter[tuple[int, str]] = Counter()
     false: Counter[tuple[int, str]] = Counter()
-    named: dict[tuple[int, str], Any] = {}
-    for seed in range(options.seeds):
-        for count, plan in plans.items():
-            for name, noise in NOISES.items():
-                if options.only not in name or time.process_time() - begin > options.seconds:
-                    continue
-                sizes = 1e-3 * noise(np.random.default_rng((30000 + seed, count)), plan.run)
-                if name.startswith("rounded"):
-                    sizes = np.round(plan.readings + sizes, 3) - plan.readings
-                effects = plan.effects(sizes)
-                tried[count, name] += 1
-                if effects:
-                    false[count, name] += 1
-                    named.setdefault((count, name), []).append(effects[0])
+    named: dict[tuple[int, str], list[str]] = {}
+    with contextlib.suppress(KeyboardInterrupt):
+        for count, name, effects in campaigns(options):
+            tried[count, name] += 1
+            if effects:
+                false[count, name] += 1
+                named.setdefault((count, name), []).append(effects[0])
     print("| noise | runs | false effects | named |")
     print("| --- | --- | --- | --- |")
     for count in options.runs:
