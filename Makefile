@@ -45,6 +45,7 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@$(PYTEST) $(PARALLEL) --all-seeds --timeout 3600
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_unknown.py --seeds 3 --empties 60
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_empty.py --seeds 300 --seconds 1200
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_days.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_dependence.py

@@ -114,10 +114,23 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
     if effect.reversal_value is not None:
         output.say(f"   {reversal_words(effect.reversal_value)}")
     searched = effect.searched
-    if searched is not None:
+    if searched is not None and searched.u is None:
+        limit = (
+            "" if searched.at_least is None else f": only that it is longer than {searched.at_least:.2g} min"
+        )
+        output.say(f"   {searched.what} not determined by these data{limit}")
+    elif searched is not None:
         u = "" if searched.u is None else f" ± {output.two_digits(searched.u)}"
         unit = "" if searched.unit == "1" else f" {searched.unit}"
         output.say(f"   {searched.what} {output.rounded(searched.value, searched.u)}{u}{unit}")
+    if effect.travelled_periods is not None:
+        output.say(
+            f"   the axis turned {effect.travelled_periods:.2f} of its period: over a part of a turn an offset, a "
+            "tilt or flexure looks alike"
+        )
+    if effect.within_its_shape:
+        symbol = effect.effect.partition(":")[0]
+        output.say(f"   not separable from the shape of {symbol}: {', '.join(effect.within_its_shape)}")
     um = output.micrometres
     poses = ""
     if effect.heldout_poses_after_um is not None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -62,7 +63,13 @@ class PoseFold:
     rows: npt.NDArray[np.int64]
     predicted: Array
 
+    @cached_property
+    def count(self) -> int:
+        """The count of numbers that are predicted."""
+        return int(np.sum(np.any(self.predicted != 0.0, axis=2)))
 
+
+@lru_cache(maxsize=2)
 def pose_folds(fit: Fit) -> tuple[PoseFold, ...]:
     """The poses of a plan dealt out to ten folds; empty where there are too few poses."""
     problem = fit.problem
@@ -106,15 +113,18 @@ def held_out_by_poses(residual: Array, columns: Array, folds: Sequence[PoseFold]
     basis = orthonormal(columns)
     remainder = without(basis, residual.reshape(-1, 1)).reshape(residual.shape)
     shared = basis.reshape(*residual.shape, -1)
-    squares, number = 0.0, 0.0
+    number = sum(fold.count for fold in folds)
+    if not number:
+        return None
+    grams, ontos, parts = [], [], []
+    runs = np.arange(len(residual))[:, None]
     for fold in folds:
-        left_out = np.take_along_axis(remainder, fold.rows, axis=1)
-        own = np.take_along_axis(shared, fold.rows[..., None], axis=1)
-        alone = (fold.predicted @ left_out[..., None])[..., 0]
-        reaction = fold.predicted @ own
-        gram = np.eye(own.shape[2]) - np.einsum("rmc,rmd->cd", own, reaction)
-        onto = np.einsum("rmc,rm->c", reaction, left_out)
-        error = alone + reaction @ (np.linalg.pinv(gram, rcond=PREDICTED, hermitian=True) @ onto)
-        squares += float(np.sum(error**2))
-        number += float(np.sum(np.any(fold.predicted != 0.0, axis=2)))
-    return float(np.sqrt(squares / number)) if number else None
+        left_out, own = remainder[runs, fold.rows], shared[runs, fold.rows]
+        reaction = (fold.predicted @ own).reshape(left_out.size, -1)
+        grams.append(np.eye(own.shape[2]) - own.reshape(left_out.size, -1).T @ reaction)
+        ontos.append(reaction.T @ left_out.reshape(-1))
+        parts.append(((fold.predicted @ left_out[..., None]).reshape(-1), reaction))
+    inverses = np.linalg.pinv(np.array(grams), rcond=PREDICTED, hermitian=True)
+    shares = (inverses @ np.array(ontos)[..., None])[..., 0]
+    errors = [alone + reaction @ share for (alone, reaction), share in zip(parts, shares, strict=True)]
+    return float(np.sqrt(sum(float(error @ error) for error in errors) / number))

@@ -16,10 +16,10 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineE
 from monitor.discovery.machine.separate import Separation, separating_poses
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.machine.tables import ChainScan
+from monitor.discovery.machine.variants import part_of_period
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.missing import Missing, Rival
-from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects.drivers import EachRun
@@ -41,6 +41,8 @@ class ChainMissing(Missing):
     of days None with fewer than three days, those of poses are of poses left out of every run. ``separation`` holds the
     poses that would separate the rivals; ``varies`` says that the effect has another size in every run. Where the
     catalogue does not have its shape, ``nearest`` is the entry that comes closest, and ``curve`` the shape.
+    ``travelled_periods`` of a harmonic are less than one where the axis did not turn through its period (else None);
+    ``within_its_shape`` are effects that stand out beside it, but not beside its error in any shape.
     """
 
     held_out_days_before: float | None
@@ -51,6 +53,8 @@ class ChainMissing(Missing):
     varies: bool
     nearest: str | None = None
     curve: Curve | None = None
+    travelled_periods: float | None = None
+    within_its_shape: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -192,6 +196,7 @@ def _missing(
             scene.fit, effect, coefficients, [rival.effect for rival, _ in rivals], surroundings.strokes
         ),
         varies=isinstance(effect.driver, EachRun),
+        travelled_periods=part_of_period(effect, scene.fit.problem.context),
         nearest=candidate.variant.nearest,
         curve=None
         if candidate.variant.nearest is None
@@ -214,7 +219,7 @@ def _p_and_q(
 
 def _rms(scene: ChainScene, candidates: Sequence[ChainCandidate]) -> float:
     """Root mean square in mm of all coordinates with candidates in the model."""
-    residual = without(orthonormal(scene.columns(candidates)), scene.residual[:, None])
+    residual = scene.remainders.beside(candidates).residual
     return scene.fit.sigma * float(np.sqrt(np.sum(residual**2) / scene.fit.readings))
 
 

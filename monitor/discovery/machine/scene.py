@@ -18,6 +18,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.held_out import PoseFold, held_out_by_poses, pose_folds, pose_parts
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
 from monitor.discovery.search.held_out import held_out_rms, held_out_sum
+from monitor.discovery.search.remainder import Remainders
 from monitor.effects import ParsedEffect
 from monitor.exceptions import EffectError
 from monitor.methods.chain.shared_effects import largest_coefficient
@@ -79,6 +80,11 @@ class ChainScene:
     def columns(self, candidates: Sequence[Candidate[object]]) -> Array:
         """The shared columns, then those of the candidates."""
         return np.concatenate([self.shared, *(candidate.columns for candidate in candidates)], axis=1)
+
+    @cached_property
+    def remainders(self) -> Remainders:
+        """What selected effects, beside ``shared``, leave of the residual."""
+        return Remainders(self.residual, self.degrees_of_freedom, self.columns)
 
     def held_out_error(self, columns: Array) -> float | None:
         """Root mean square error in mm of runs left out in turn, of blocks of poses where there is one run."""

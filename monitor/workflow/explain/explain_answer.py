@@ -14,13 +14,17 @@ from monitor.workflow.identify.answer import CurveNoise, Estimate
 
 @dataclass(frozen=True)
 class SearchedValue:
-    """A value that was searched for in the data: a time constant, a pitch, a period; ``u`` is None where unknown."""
+    """A value that was searched for in the data: a time constant, a pitch, a period.
+
+    ``u`` is None where the data do not determine it; ``at_least`` is then what it exceeds at 95 %, if anything.
+    """
 
     what: str
     value: float
     u: float | None
     unit: str
     frequency: float | None = field(default=None, metadata=OMITTED)
+    at_least: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,9 @@ class MachineMissing:
     not have the shape of the effect, ``shape_unknown`` says so, ``nearest_shape`` is the entry that comes closest, and
     ``curve`` the shape in ``unit``, without the constant and the slope that every run has of its own.
     ``reversal_value`` of a play (ISO 230-2) is twice its amplitude: what a backlash compensation is set to.
+    ``travelled_periods`` of a harmonic is the part of its period that the axis turned, where that is no whole one: over
+    a part of a turn an offset, a tilt or flexure looks alike. ``within_its_shape`` are effects that stand out beside it
+    but not beside its error in any shape: they cannot be separated from it.
     """
 
     rank: int
@@ -82,6 +89,8 @@ class MachineMissing:
     curve: tuple[CurvePoint, ...]
     searched: SearchedValue | None = field(default=None, metadata=OMITTED)
     reversal_value: Estimate | None = field(default=None, metadata=OMITTED)
+    travelled_periods: float | None = field(default=None, metadata=OMITTED)
+    within_its_shape: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -196,8 +205,9 @@ class MachineExplanation:
     """The explanation of a machine; ``answer`` is the finding in a few sentences.
 
     ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why;
-    ``held_out`` are the parts left out in turn for the held-out errors. ``not_fitted`` are effects that stood out but
-    could not be fitted, and were skipped. The residual is pictured where something is missing.
+    ``held_out`` are the parts left out in turn for the held-out errors. ``limits_reached`` says where the search ended
+    at a limit and more may be there: ``effects``, ``bad_points``, ``rounds``. ``not_fitted`` are effects that stood out
+    but could not be fitted, and were skipped. The residual is pictured where something is missing.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -214,6 +224,7 @@ class MachineExplanation:
     residual_map: ResidualMap | None
     residual_against: ResidualAgainst | None
     not_fitted: tuple[str, ...] = ()
+    limits_reached: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

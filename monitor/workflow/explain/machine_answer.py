@@ -108,6 +108,8 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         nearest_shape=effect.nearest,
         curve=_curve(effect, unit),
         searched=searched_value(effect),
+        travelled_periods=effect.travelled_periods,
+        within_its_shape=effect.within_its_shape,
         reversal_value=reversal_value(
             effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
         ),
@@ -171,4 +173,5 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         residual_map=residual_map,
         residual_against=residual_against,
         not_fitted=explanation.unfitted,
+        limits_reached=tuple(explanation.limits),
     )
