@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from monitor import __version__
 from monitor.cli.database import check_path
+from monitor.exceptions import did_you_mean
 
 #: Verb: what it does in a few words. The file of the same name in ``monitor.cli.verbs`` has the rest.
 VERBS = {
@@ -33,7 +35,7 @@ VERBS = {
     "plan": "expected uncertainties, blind spots, best next poses",
     "simulate": "a virtual campaign folder, to rehearse",
     "report": "weekly health report of the fleet, HTML and PDF",
-    "certificate": "calibration certificates: issue, show, verify, amend, withdraw",
+    "certificate": "calibration certificates: issue, show, verify, amend, withdraw, template",
     "event": "record what happened to a machine (crash, repair, compensation)",
     "verify": "whether the database is as it was written",
     "audit": "who changed what and when",
@@ -46,13 +48,23 @@ DEFAULT_DATABASE = "monitor.duckdb"
 #: Verbs that make a database where there is none, or need none; for all others a missing file is a mistyped name.
 WITHOUT_DATABASE = ("demo", "import", "restore", "effects", "simulate")
 
+SUBVERBS_WITHOUT_DATABASE = ("template",)
+
 
 class Parser(argparse.ArgumentParser):
     """An argument parser whose refusal is one plain message."""
 
     def error(self, message: str) -> NoReturn:
-        print(f"{self.prog}: {message}; `{self.prog} --help` shows how", file=sys.stderr)
+        print(f"{self.prog}: {message}; {self._hint(message)}`{self.prog} --help` shows how", file=sys.stderr)
         sys.exit(2)
+
+    def _hint(self, message: str) -> str:
+        """Return the nearest option or choice to the one that a message of argparse refuses."""
+        if choice := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)$", message):
+            return did_you_mean(choice[1], re.findall(r"[\w.-]+", choice[2]))
+        if option := re.search(r"unrecognized arguments:.*?(--[\w-]+)", message):
+            return did_you_mean(option[1], self._option_string_actions)
+        return ""
 
 
 def _help() -> str:
@@ -110,7 +122,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         first.print_help()
         sys.exit(2 if arguments else 0)
     if head.verb not in VERBS:
-        first.error(f"there is no verb '{head.verb}'; there are {', '.join(VERBS)}")
+        hint = did_you_mean(head.verb, VERBS)
+        first.error(f"there is no verb '{head.verb}'; {hint}there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
     database = argparse.Namespace(db=head.db)
     try:
@@ -121,7 +134,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         options = parser.parse_args(head.rest, database)
     if not hasattr(options, "run"):
         options.run = run
-    check_path(options.db, may_be_new=head.verb in WITHOUT_DATABASE)
+    needs_none = head.verb in WITHOUT_DATABASE or getattr(options, "what", None) in SUBVERBS_WITHOUT_DATABASE
+    check_path(options.db, may_be_new=needs_none)
     return options
 
 

@@ -6,7 +6,8 @@ import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from monitor.readers.faults import Faults, near, one_of, quoted
+from monitor.exceptions import did_you_mean
+from monitor.readers.faults import Faults, one_of, quoted
 
 #: Longest line, in characters; a row of the examples has 70.
 LONGEST_LINE = 65_536
@@ -60,7 +61,7 @@ def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> 
     for column in required:
         if column not in table.columns:
             unused = [name for name in table.columns if name not in required]
-            hint = near(column, unused).replace("did you mean", "is it")
+            hint = did_you_mean(column, unused).replace("did you mean", "is it")
             message = f"the column is missing; {hint}the header needs {one_of(required)}"
             faults.add(table.file, 1, column, message)
 

@@ -39,6 +39,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
+from monitor.store.database_name import check_database_name
 from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
@@ -121,6 +122,7 @@ __all__ = [
     "certificate_numbers",
     "check_analysis",
     "check_campaigns",
+    "check_database_name",
     "clear_refusals",
     "column_comments",
     "curve_names",

@@ -53,6 +53,7 @@ QUESTIONS = {
         "audit": "keeping:audit",
         "backup": "keeping:backup",
         "campaigns": "intake.campaigns:campaigns",
+        "certificate template": "certificate.template:write_template",
         "certificates": "certificate.states:list_certificates",
         "compare": "explain.compare:compare",
         "digital certificate": "certificate.states:write_digital",

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from monitor.exceptions import CampaignError
+from monitor.exceptions import CampaignError, did_you_mean
 from monitor.readers.csv_table import CsvTable, parse_csv
 from monitor.readers.curve_columns import DATA, NAME, CurveColumns, CurveSettings, read_columns
-from monitor.readers.faults import Faults, near, one_of, quoted
+from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.files import LARGEST_CSV, LARGEST_TOML, decode, read_bytes
 from monitor.readers.registry import Reader
 from monitor.readers.toml_table import Table, parse_toml
@@ -167,7 +167,7 @@ def _check_settings(top: Table, settings: CurveSettings, table: CsvTable) -> boo
     sound = settings.response is not None
     for key, name in named:
         if name is not None and name not in table.columns:
-            hint = near(name, table.columns)
+            hint = did_you_mean(name, table.columns)
             section.fault(key, f"{DATA} has no column {quoted(name)}; {hint}it has {one_of(table.columns)}")
             sound = False
     both = set(settings.groups) & set(settings.inputs)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from monitor.exceptions import CampaignError
+from monitor.exceptions import CampaignError, did_you_mean
 from monitor.readers import probings_file, runs_file
 from monitor.readers.artefact_file import read_artefact, read_probe
 from monitor.readers.csv_table import CsvTable, parse_csv
-from monitor.readers.faults import Faults, near, one_of, quoted
+from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.files import LARGEST_CSV, LARGEST_TOML, decode, read_bytes
 from monitor.readers.machine_file import MachinePart, read_machine
 from monitor.readers.method_rules import MethodRules, Plan
@@ -156,7 +156,7 @@ def _rules(top: Table, method: str | None) -> MethodRules | None:
         names = [*rules, CURVE]
         top.fault(
             "method",
-            f"method {quoted(method)} is not known; {near(method, names)}the methods are {one_of(names)}",
+            f"method {quoted(method)} is not known; {did_you_mean(method, names)}the methods are {one_of(names)}",
         )
     return rules.get(method)
 

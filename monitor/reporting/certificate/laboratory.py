@@ -6,6 +6,7 @@ Nothing is filled in: a key that is absent stays None, and the certificate that 
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from typing import Any
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.record import NotApplicable, Party, Person
+from monitor.reporting.resources import report_text
 from monitor.reporting.texts import languages
 
 #: Every section and its keys.
@@ -36,6 +38,21 @@ SECTIONS: Mapping[str, tuple[str, ...]] = {
         "opinions",
     ),
     "authorised_by": ("name", "function"),
+}
+#: Items of a certificate whose parts are the keys of one section, and of those that are one key.
+_SECTION_OF = {
+    "laboratory": "laboratory",
+    "customer": "customer",
+    "item": "item",
+    "authorised_by": "authorised_by",
+}
+_PARTS = frozenset({"name", "address", "contact", "function", "description", "identification", "condition"})
+_KEY_OF = {
+    "place": "[item] place",
+    "received_on": "[item] received_on",
+    "method": "[method] document",
+    "traceability": "[traceability] statement",
+    **{key: f"[statements] {key}" for key in SECTIONS["statements"]},
 }
 #: The keys that may be answered by ``{ not_applicable = "..." }``.
 MAY_NOT_APPLY = frozenset(
@@ -125,6 +142,33 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         authorised_by=people,
         **{key: answers.get(f"statements.{key}") for key in SECTIONS["statements"]},
     )
+
+
+def key_of(name: str, part: str) -> str:
+    """The key of the laboratory's file that answers an item of a certificate or a ``part`` of it; empty: none does.
+
+    ``name`` is that of a field of ``CertificateRecord``: ``key_of("customer", "contact")`` is ``[customer] contact``.
+    """
+    word = re.split(r"[ :]", part)[0]
+    if name == "references":
+        return "[traceability] probe" if "probe" in part else "[traceability] scale_bar"
+    section = _SECTION_OF.get(name)
+    if section is None:
+        return "" if name == "method" and word != "document" else _KEY_OF.get(name, "")
+    title = f"[[{section}]]" if section == "authorised_by" else f"[{section}]"
+    if not part:
+        return f"{title} {', '.join(key for key in SECTIONS[section] if key in _PARTS)}"
+    return f"{title} {word}" if word in SECTIONS[section] else ""
+
+
+def template(language: str) -> str:
+    """A laboratory's file with every key and no answer yet, its comments in a language that certificates have.
+
+    Raises InputError for another.
+    """
+    if language not in languages():
+        raise InputError(f"there is no template in {language!r}; there are {', '.join(languages())}")
+    return report_text(f"laboratory.{language}.toml")
 
 
 def _answers(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
