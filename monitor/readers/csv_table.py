@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from monitor.exceptions import did_you_mean
 from monitor.readers.faults import Faults, one_of, quoted
+from monitor.readers.spreadsheet import plain_csv
 
 #: Longest line, in characters; a row of the examples has 70.
 LONGEST_LINE = 65_536
@@ -32,11 +33,14 @@ class CsvTable:
 
 
 def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
-    """Parse RFC 4180 with one line a row. None where the header cannot be used; the faults are noted."""
+    """Parse RFC 4180 with one line a row, or what a spreadsheet of a country with decimal commas writes.
+
+    None where the header cannot be used; the faults are noted.
+    """
     if text.count("\n") > MOST_LINES:
         faults.add(file, None, None, f"the file has more than {MOST_LINES} lines; split the campaign")
         return None
-    lines = text.split("\n")
+    lines = plain_csv(text).split("\n")
     while lines and not lines[-1].strip("\r"):
         lines.pop()
     longest = max(range(len(lines)), key=lambda index: len(lines[index]), default=None)

@@ -86,6 +86,7 @@ from monitor.store.selections import StoredSelection, find_selection, list_selec
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
+from monitor.store.workbook import export_workbook
 
 __all__ = [
     "NOTE",
@@ -128,6 +129,7 @@ __all__ = [
     "curve_names",
     "described_machines",
     "export_tables",
+    "export_workbook",
     "find_certificate",
     "find_selection",
     "fleet_sums",
