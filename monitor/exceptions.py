@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,6 +9,9 @@ from dataclasses import dataclass
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return a hint ("did you mean 'x_mm'? ") where a name that exists is close, else nothing; case does not count."""
+    # Loaded here, on the way to a refusal: every start of the command waits for this file.
+    import difflib
+
     by_folded = {candidate.casefold(): candidate for candidate in names}
     close = difflib.get_close_matches(name[:100].casefold(), list(by_folded), n=1, cutoff=0.7)
     return f"did you mean '{by_folded[close[0]]}'? " if close else ""

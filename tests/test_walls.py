@@ -67,6 +67,7 @@ KEEPERS: dict[str, set[str]] = {
     "dask": {"uncertainty"},
     "distributed": {"uncertainty"},
     "rich": {"cli"},
+    "shtab": {"cli"},
     "openpyxl": {"store", "readers"},
 }
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from datetime import datetime
+from zoneinfo import ZoneInfo
 
+from monitor.cli.configuration import configuration
 from monitor.exceptions import InputError
 
 # Other forms of ISO 8601 that Python reads (20260305, 2026-W10-4) a reader may take for another day.
@@ -15,7 +17,8 @@ _MOMENT = re.compile(
 
 
 def moment(text: str, option: str) -> datetime:
-    """Return the moment with its offset; a day is its beginning, without an offset it is the time of this computer.
+    """Return the moment with its offset; a day is its beginning, without an offset it is the time of the
+    configuration's zone, else of this computer.
 
     Raises InputError, which names the forms that are read.
     """
@@ -30,4 +33,7 @@ def moment(text: str, option: str) -> datetime:
         raise InputError(
             f"{option} {text}: write a day or a time as 2026-03-05, 2026-03-05 07:00 or 2026-03-05T07:00:00-05:00"
         ) from error
-    return read if read.tzinfo is not None else read.astimezone()
+    if read.tzinfo is not None:
+        return read
+    zone = configuration().time_zone
+    return read.astimezone() if zone is None else read.replace(tzinfo=ZoneInfo(zone))

@@ -42,11 +42,13 @@ VERBS = {
     "backup": "a second file with everything, checked",
     "restore": "a database from a backup",
     "sql": "a query of your own, which may only read",
-    "export": "all tables as CSV or Parquet files",
+    "export": "tables as CSV or Parquet files, or as one workbook of Excel",
+    "config": "the configuration of this place: show, check, init",
+    "completion": "completion of verbs and options by the tab key, for bash, zsh or fish",
 }
 DEFAULT_DATABASE = "monitor.duckdb"
 #: Verbs that make a database where there is none, or need none; for all others a missing file is a mistyped name.
-WITHOUT_DATABASE = ("demo", "import", "restore", "effects", "simulate")
+WITHOUT_DATABASE = ("demo", "import", "restore", "effects", "simulate", "config", "completion")
 
 SUBVERBS_WITHOUT_DATABASE = ("template",)
 
@@ -83,6 +85,9 @@ def common(parser: argparse.ArgumentParser, *, database: bool = True) -> None:
     parser.add_argument(
         "--json", action="store_true", help="one JSON document on standard output, nothing else"
     )
+    parser.add_argument(
+        "--quiet", action="store_true", help="nothing but messages of what went wrong, and the exit status"
+    )
 
 
 def described(summary: str, example: str) -> dict[str, Any]:
@@ -107,12 +112,10 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         usage="monitor [--db PATH] VERB ...",
     )
-    default = os.environ.get("MONITOR_DB") or DEFAULT_DATABASE
     first.add_argument(
         "--db",
         metavar="PATH",
-        default=default,
-        help=f"the database file (else $MONITOR_DB, else {DEFAULT_DATABASE})",
+        help=f"the database file (else $MONITOR_DB, else that of the configuration, else {DEFAULT_DATABASE})",
     )
     first.add_argument("--version", action="version", version=f"monitor {__version__}")
     first.add_argument("verb", nargs="?", metavar="VERB", help=argparse.SUPPRESS)
@@ -125,7 +128,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         hint = did_you_mean(head.verb, VERBS)
         first.error(f"there is no verb '{head.verb}'; {hint}there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
-    database = argparse.Namespace(db=head.db)
+    database = argparse.Namespace(db=_default_database(head.verb) if head.db is None else head.db)
     try:
         # People write options before, between and behind the other words.
         options = parser.parse_intermixed_args(head.rest, database)
@@ -136,6 +139,25 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         options.run = run
     needs_none = head.verb in WITHOUT_DATABASE or getattr(options, "what", None) in SUBVERBS_WITHOUT_DATABASE
     check_path(options.db, may_be_new=needs_none)
+    return options
+
+
+def _default_database(verb: str) -> str:
+    """The database where none is typed: of the environment, of the configuration, or the usual one."""
+    named = os.environ.get("MONITOR_DB")
+    if named or verb in ("config", "completion"):
+        return named or DEFAULT_DATABASE
+    from monitor.cli.configuration import configuration
+
+    configured = configuration().database
+    return DEFAULT_DATABASE if configured is None else str(configured)
+
+
+def verb_options(verb: str) -> Callable[[argparse.ArgumentParser], None]:
+    """Return what adds the options of a verb to a parser."""
+    options: Callable[[argparse.ArgumentParser], None] = importlib.import_module(
+        f"monitor.cli.verbs.{verb}_"
+    ).options
     return options
 
 

@@ -7,6 +7,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
+from monitor.cli.configuration import configuration
 from monitor.cli.database import opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
@@ -119,7 +120,9 @@ def options(parser: ArgumentParser) -> None:
             "monitor certificate template --language de --out laboratory.toml",
         ),
     )
-    templated.add_argument("--language", default="en", metavar="de|en", help="of the file (default en)")
+    templated.add_argument(
+        "--language", metavar="de|en", help="of the file (default: that of the configuration, else en)"
+    )
     templated.add_argument(
         "--out", type=Path, default=Path("laboratory.toml"), metavar="FILE", help="default: laboratory.toml"
     )
@@ -217,7 +220,9 @@ def _verify(options: Namespace) -> int:
 
 
 def _template(options: Namespace) -> int:
-    answer = write_template(TemplateRequest(options.out, options.language))
+    answer = write_template(
+        TemplateRequest(options.out, options.language or configuration().language or "en")
+    )
     if options.json:
         output.document(answer)
     else:
