@@ -6,7 +6,6 @@ Nothing is filled in: a key that is absent stays None, and the certificate that 
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,51 +14,20 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import NotApplicable, Party, Person
+from monitor.reporting.certificate.laboratory_keys import SECTIONS
+from monitor.reporting.certificate.mark import read_mark
+from monitor.reporting.certificate.record import Accreditation, NotApplicable, Party, Person, Standard
+from monitor.reporting.certificate.samples import sample_faults
 from monitor.reporting.resources import report_text
 from monitor.reporting.texts import languages
 
-#: Every section and its keys.
-SECTIONS: Mapping[str, tuple[str, ...]] = {
-    "laboratory": ("name", "address", "contact", "accreditation", "country", "language"),
-    "customer": ("name", "address", "contact"),
-    "item": ("description", "identification", "condition", "place", "received_on"),
-    "method": ("document",),
-    "traceability": ("statement", "probe", "scale_bar"),
-    "statements": (
-        "title",
-        "sampling",
-        "relates_only",
-        "deviations",
-        "external_results",
-        "reproduction",
-        "adjustment",
-        "conformity",
-        "opinions",
-    ),
-    "authorised_by": ("name", "function"),
-}
-#: Items of a certificate whose parts are the keys of one section, and of those that are one key.
-_SECTION_OF = {
-    "laboratory": "laboratory",
-    "customer": "customer",
-    "item": "item",
-    "authorised_by": "authorised_by",
-}
-_PARTS = frozenset({"name", "address", "contact", "function", "description", "identification", "condition"})
-_KEY_OF = {
-    "place": "[item] place",
-    "received_on": "[item] received_on",
-    "method": "[method] document",
-    "traceability": "[traceability] statement",
-    **{key: f"[statements] {key}" for key in SECTIONS["statements"]},
-}
 #: The keys that may be answered by ``{ not_applicable = "..." }``.
 MAY_NOT_APPLY = frozenset(
     {
         "item.received_on",
         "traceability.probe",
         "traceability.scale_bar",
+        "standards.valid_until",
         "statements.sampling",
         "statements.deviations",
         "statements.external_results",
@@ -77,7 +45,8 @@ class LaboratoryFile:
     """The answers of a laboratory, None where it gave none.
 
     ``item_*`` replace what the campaign says of the machine; ``probe`` and ``scale_bar`` are the certificates
-    of those standards where the campaign names none.
+    of those standards where the campaign names none. ``mark`` is the laboratory's picture as a data address;
+    ``temperature`` what was measured of machine and standard, by its key.
     """
 
     laboratory: Party | None
@@ -104,6 +73,10 @@ class LaboratoryFile:
     authorised_by: tuple[Person, ...] | None
     country: str | None = None
     language: str | None = None
+    accredited: Accreditation | None = None
+    mark: str | None = None
+    standards: tuple[Standard, ...] | None = None
+    temperature: Mapping[str, float | str] | None = None
 
 
 def read_laboratory(path: str | Path) -> LaboratoryFile:
@@ -121,6 +94,9 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         raise InputError(f"{file} is not TOML: {error}") from error
     faults: list[str] = []
     answers = _answers(tables, faults)
+    mark = read_mark(file, answers.get("laboratory.mark"), faults)
+    _check_temperature(answers, faults)
+    faults += sample_faults(answers)
     if faults:
         raise InputError("\n  ".join([f"{file} was refused:", *faults]))
     people = answers.get("authorised_by")
@@ -140,25 +116,19 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         probe=answers.get("traceability.probe"),
         scale_bar=answers.get("traceability.scale_bar"),
         authorised_by=people,
+        accredited=(
+            Accreditation(answers.get("accreditation.body"), answers.get("accreditation.number"))
+            if "accreditation" in tables
+            else None
+        ),
+        mark=mark,
+        standards=answers.get("standards"),
+        temperature={
+            key: answers[name] for key in SECTIONS["temperature"] if (name := f"temperature.{key}") in answers
+        }
+        or None,
         **{key: answers.get(f"statements.{key}") for key in SECTIONS["statements"]},
     )
-
-
-def key_of(name: str, part: str) -> str:
-    """The key of the laboratory's file that answers an item of a certificate or a ``part`` of it; empty: none does.
-
-    ``name`` is that of a field of ``CertificateRecord``: ``key_of("customer", "contact")`` is ``[customer] contact``.
-    """
-    word = re.split(r"[ :]", part)[0]
-    if name == "references":
-        return "[traceability] probe" if "probe" in part else "[traceability] scale_bar"
-    section = _SECTION_OF.get(name)
-    if section is None:
-        return "" if name == "method" and word != "document" else _KEY_OF.get(name, "")
-    title = f"[[{section}]]" if section == "authorised_by" else f"[{section}]"
-    if not part:
-        return f"{title} {', '.join(key for key in SECTIONS[section] if key in _PARTS)}"
-    return f"{title} {word}" if word in SECTIONS[section] else ""
 
 
 def template(language: str) -> str:
@@ -177,13 +147,14 @@ def _answers(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
     for section, content in tables.items():
         if section not in SECTIONS:
             faults.append(f"there is no section [{section}]; there are {', '.join(SECTIONS)}")
-        elif section == "authorised_by":
-            if not isinstance(content, list) or not all(isinstance(person, dict) for person in content):
-                faults.append("authorised_by is a list of persons: begin each with [[authorised_by]]")
+        elif section in _LISTS:
+            if not isinstance(content, list) or not all(isinstance(entry, dict) for entry in content):
+                faults.append(f"{section} is a list of {_LISTS[section][0]}: begin each with [[{section}]]")
                 continue
-            people = [_section(section, person, faults) for person in content]
+            entries = [_section(section, entry, faults) for entry in content]
             answers[section] = tuple(
-                Person(person.get(f"{section}.name"), person.get(f"{section}.function")) for person in people
+                _LISTS[section][1](*(entry.get(f"{section}.{key}") for key in SECTIONS[section]))
+                for entry in entries
             )
         elif isinstance(content, dict):
             answers |= _section(section, content, faults)
@@ -236,6 +207,18 @@ def _text_or_left_out(value: Any) -> _Checked:
     return _text(value)
 
 
+def _temperature(value: Any) -> _Checked:
+    if isinstance(value, int | float) and not isinstance(value, bool) and -50.0 <= value <= 100.0:
+        return float(value), ""
+    return None, f"is a temperature in °C between -50 and 100, without quotes, but is {value!r}"
+
+
+def _uncertainty(value: Any) -> _Checked:
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value <= 50.0:
+        return float(value), ""
+    return None, f"is an expanded uncertainty (k = 2) in °C above 0, without quotes, but is {value!r}"
+
+
 def _address(value: Any) -> _Checked:
     if isinstance(value, list) and all(isinstance(line, str) for line in value):
         return tuple(value), ""
@@ -264,7 +247,32 @@ _RULES: Mapping[str, Callable[[Any], _Checked]] = {
     "laboratory.language": _language,
     "laboratory.accreditation": _text_or_left_out,
     "laboratory.country": _text_or_left_out,
+    "standards.issued_on": _day,
+    "standards.valid_until": _day,
+    "temperature.machine_degC": _temperature,
+    "temperature.machine_U_degC": _uncertainty,
+    "temperature.standard_degC": _temperature,
+    "temperature.standard_U_degC": _uncertainty,
 }
+
+
+#: Sections that are lists: what an entry is called, and what it becomes.
+_LISTS: Mapping[str, tuple[str, Callable[..., Any]]] = {
+    "authorised_by": ("persons", Person),
+    "standards": ("standards", Standard),
+}
+
+
+def _check_temperature(answers: Mapping[str, Any], faults: list[str]) -> None:
+    """Note what is missing of the temperatures, where any is stated: one without its uncertainty says too little."""
+    if not any(name.startswith("temperature.") for name in answers):
+        return
+    faults += [
+        f"[temperature] has {key} missing: a temperature is stated with its expanded uncertainty, both of machine and "
+        'standard, and with the reference (for example "results refer to 20 °C")'
+        for key in SECTIONS["temperature"]
+        if f"temperature.{key}" not in answers
+    ]
 
 
 def _shown(value: object) -> str:
