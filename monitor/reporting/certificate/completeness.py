@@ -144,6 +144,7 @@ def _gaps(value: object) -> list[str]:
 
 
 def gaps_of_text(text: str) -> list[str]:
+    """What is missing of a text: all of it (``""``), or that it says nothing; empty where it says something."""
     if not text.strip():
         return [""]
     said = text.strip().casefold()
