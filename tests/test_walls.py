@@ -67,6 +67,8 @@ KEEPERS: dict[str, set[str]] = {
     "dask": {"uncertainty"},
     "distributed": {"uncertainty"},
     "rich": {"cli"},
+    "shtab": {"cli"},
+    "openpyxl": {"store", "readers"},
 }
 
 # Packed folder -> the rooms that may look into it.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import getpass
 from collections.abc import Sequence
 from contextlib import suppress
@@ -15,7 +14,7 @@ from monitor.api.answer import Answer
 from monitor.api.asking import Ask, drawn
 from monitor.api.campaign import Campaign
 from monitor.api.tables import main_table, table_of
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError, NotFoundError, did_you_mean
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,10 +51,19 @@ class Database:
         self._store.close()
 
     def add(self, *folders: str | Path) -> Answer[ImportAnswer]:
-        """Import campaign folders, all or nothing each. Raises CampaignError with every fault of a folder."""
+        """Import campaign folders, all or nothing each.
+
+        Raises CampaignError with every fault of a folder; of several InputError with all that were refused, once the
+        others are imported.
+        """
         if not folders:
             raise InputError("name a campaign folder or more")
-        return Answer(self._ask("import", folders=[Path(folder) for folder in folders]))
+        answer = self._ask("import", folders=[Path(folder) for folder in folders])
+        if answer.refused:
+            whys = "\n".join(refused.why for refused in answer.refused)
+            imported = ", ".join(folder.campaign for folder in answer.imported) or "none"
+            raise InputError(f"{whys}\nImported or unchanged: {imported}")
+        return Answer(answer)
 
     def machines(self) -> pd.DataFrame:
         """Return the machines: topology, manufacturer, number of campaigns, latest run."""
@@ -102,7 +110,8 @@ class Database:
         from monitor.workflow.contract import QUESTIONS
 
         if question not in QUESTIONS:
-            raise InputError(f"there is no question '{question}'; there are {', '.join(QUESTIONS)}")
+            hint = did_you_mean(question, QUESTIONS)
+            raise InputError(f"there is no question '{question}'; {hint}there are {', '.join(QUESTIONS)}")
         return Answer(self._ask(question, **options))
 
     def __repr__(self) -> str:
@@ -114,11 +123,8 @@ class Database:
 
 
 def _no_campaign(name: str, names: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name, names, n=1)
-    if near:
-        return f"there is no campaign '{name}'; did you mean '{near[0]}'?"
     listed = ", ".join(names) if names else "none yet: add(FOLDER) imports one"
-    return f"there is no campaign '{name}'; there are {listed}"
+    return f"there is no campaign '{name}'; {did_you_mean(name, names)}there are {listed}"
 
 
 def open(path: str | Path, *, new: bool = False, read_only: bool = False) -> Database:

@@ -28,6 +28,11 @@ def check_path(path: str, *, may_be_new: bool) -> None:
     """
     if not path.strip() or path.startswith(":memory:"):
         raise InputError(f"--db '{path}' names no file; name one, for example --db monitor.duckdb")
+    if not may_be_new and not Path(path).exists():
+        # Loaded here, on the way to a refusal: `monitor --help` answers without a database engine.
+        from monitor.store import check_database_name
+
+        check_database_name(path)
     if not may_be_new and Path(path).parent.is_dir() and not Path(path).exists():
         raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from monitor.cli.behind import add_behind, further_sources
+from monitor.cli.configuration import configuration
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
@@ -22,7 +23,10 @@ PIN = "MONITOR_TOKEN_PIN"
 def add_issuing(parser: ArgumentParser) -> None:
     """The options of a certificate that is to be issued."""
     parser.add_argument(
-        "--laboratory", type=Path, required=True, metavar="FILE", help="what the laboratory states"
+        "--laboratory",
+        type=Path,
+        metavar="FILE",
+        help="what the laboratory states (else that of the configuration)",
     )
     parser.add_argument(
         "--as-left", type=int, metavar="N",
@@ -121,7 +125,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
 
         axes = read_linear_axes(options.linear_axes)
     return {
-        "laboratory": options.laboratory,
+        "laboratory": _laboratory(options.laboratory),
         "as_left": options.as_left,
         "out": options.out,
         "number": options.number,
@@ -138,6 +142,15 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "key": _key(options),
         "accept": dict(options.accept),
     }
+
+
+def _laboratory(typed: Path | None) -> Path:
+    stated = typed or configuration().laboratory
+    if stated is None:
+        raise InputError(
+            "--laboratory FILE says what the laboratory states; `monitor certificate template` writes one to fill in"
+        )
+    return stated
 
 
 def _process(texts: list[str]) -> dict[str, float]:

@@ -39,6 +39,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
+from monitor.store.database_name import check_database_name
 from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
@@ -85,6 +86,7 @@ from monitor.store.selections import StoredSelection, find_selection, list_selec
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
+from monitor.store.workbook import export_workbook
 
 __all__ = [
     "NOTE",
@@ -121,11 +123,13 @@ __all__ = [
     "certificate_numbers",
     "check_analysis",
     "check_campaigns",
+    "check_database_name",
     "clear_refusals",
     "column_comments",
     "curve_names",
     "described_machines",
     "export_tables",
+    "export_workbook",
     "find_certificate",
     "find_selection",
     "fleet_sums",

@@ -19,6 +19,7 @@ import duckdb
 from monitor import __version__
 from monitor.exceptions import StoreError
 from monitor.store.connection import Database, utc_now
+from monitor.store.database_name import check_database_name
 
 _MANIFEST_END = ".manifest.json"
 
@@ -44,6 +45,7 @@ def take_backup(db: Database, target: str | Path) -> Backup:
     Raises StoreError where the target exists or cannot be written, or the copy differs from the original.
     """
     target = Path(target)
+    check_database_name(str(target))
     _refuse_existing(target)
     partial = target.with_name(target.name + ".partial")
     _remove(partial)
@@ -82,6 +84,7 @@ def restore(source: str | Path, target: str | Path) -> Backup:
     Raises StoreError without a manifest, where a byte differs from it, or where this software cannot open it.
     """
     source, target = Path(source), Path(target)
+    check_database_name(str(target))
     if not source.is_file():
         raise StoreError(f"there is no backup {source}")
     if not _manifest(source).is_file():

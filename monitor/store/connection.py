@@ -24,6 +24,7 @@ import pandas as pd
 
 from monitor.exceptions import StoreError
 from monitor.store import migrations
+from monitor.store.database_name import check_database_name
 
 Parameters = Sequence[Any] | Mapping[str, Any]
 Record = TypeVar("Record")
@@ -58,6 +59,7 @@ class Database:
         self.actor = actor
         self._lock = threading.RLock()
         self._in_transaction = False
+        check_database_name(self.path)
         self._connection = _connect(self.path, read_only, threads)
         try:
             self._fit()

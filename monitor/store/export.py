@@ -7,34 +7,47 @@ are text, and bytes are left out; Parquet has everything.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 import duckdb
 
-from monitor.exceptions import InputError, StoreError
+from monitor.exceptions import InputError, NotFoundError, StoreError, did_you_mean
+from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database
 
 _OPTIONS = {"csv": "FORMAT csv, HEADER", "parquet": "FORMAT parquet, COMPRESSION zstd"}
 
 
 def export_tables(
-    db: Database, folder: str | Path, form: Literal["csv", "parquet"] = "csv"
+    db: Database,
+    folder: str | Path,
+    form: Literal["csv", "parquet"] = "csv",
+    *,
+    tables: Sequence[str] | None = None,
+    machine: str | None = None,
 ) -> tuple[Path, ...]:
     """Write all tables, views and imported files into a new or empty folder; the files written.
 
-    Raises InputError for another form or a folder that is not empty, StoreError where it cannot be written.
+    With ``tables`` those alone; with ``machine`` the rows of one machine of those that name it. Imported files come
+    with a whole export only. Raises InputError for another form or a folder that is not empty, NotFoundError for a
+    table or machine that is not there, StoreError where it cannot be written.
     """
     if form not in _OPTIONS:
         raise InputError(f"a database is exported as csv or parquet, not {form!r}")
     folder = Path(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} is not an empty folder; name a new one")
+    if machine is not None:
+        check_machine(db, machine)
+    chosen = _chosen(db, tables, machine)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        written = [_copy(db, name, folder, form) for name in _names(db)]
+        written = [_copy(db, name, folder, form, machine) for name in chosen]
         written.append(_columns(db, folder))
-        written += _source_files(db, folder)
+        if tables is None and machine is None:
+            written += _source_files(db, folder)
     except (OSError, duckdb.IOException) as fault:
         raise StoreError(f"the export to {folder} could not be written: {fault}") from fault
     return tuple(written)
@@ -50,7 +63,31 @@ def _names(db: Database) -> list[str]:
     ]
 
 
-def _copy(db: Database, name: str, folder: Path, form: str) -> Path:
+def _chosen(db: Database, tables: Sequence[str] | None, machine: str | None) -> list[str]:
+    """The tables that are asked for; of one machine without names every view that has a machine."""
+    names = _names(db)
+    if tables is None and machine is not None:
+        return [name for name in names if name.startswith("v_") and _has_machine(db, name)]
+    chosen = [name if name in names else f"v_{name}" for name in (names if tables is None else tables)]
+    for asked, name in zip(tables or names, chosen, strict=True):
+        if name not in names:
+            raise NotFoundError(
+                f"there is no table {asked!r}; {did_you_mean(asked, names)}there are {', '.join(names)}"
+            )
+    return chosen
+
+
+def _has_machine(db: Database, name: str) -> bool:
+    return bool(
+        db.rows(
+            "SELECT 1 FROM duckdb_columns() WHERE database_name = current_database() AND table_name = ? "
+            "AND column_name = 'machine'",
+            [name],
+        )
+    )
+
+
+def _copy(db: Database, name: str, folder: Path, form: str, machine: str | None) -> Path:
     path = folder / f"{name}.{form}"
     columns = []
     for column, kind in db.rows(
@@ -63,9 +100,12 @@ def _copy(db: Database, name: str, folder: Path, form: str) -> Path:
         columns.append(
             f'to_json("{column}") AS "{column}"' if form == "csv" and "MAP" in kind else f'"{column}"'
         )
-    # The names come from the catalogue; the path is the only text of the user's.
+    # The names come from the catalogue; path and machine, which COPY cannot bind, are quoted.
     literal = str(path).replace("'", "''")
-    db.execute(f"COPY (SELECT {', '.join(columns)} FROM \"{name}\") TO '{literal}' ({_OPTIONS[form]})")
+    where = ""
+    if machine is not None and _has_machine(db, name):
+        where = " WHERE machine = '{}'".format(machine.replace("'", "''"))
+    db.execute(f"COPY (SELECT {', '.join(columns)} FROM \"{name}\"{where}) TO '{literal}' ({_OPTIONS[form]})")
     return path
 
 

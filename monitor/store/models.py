@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from monitor import __version__
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError, NotFoundError, did_you_mean
 from monitor.store import audit
 from monitor.store.connection import Database, utc_now
 
@@ -100,7 +100,7 @@ def load_model(db: Database, name: str, version: int | None = None) -> StoredMod
     existing = (
         f"there are {', '.join(names)}" if names else "there is none yet; `monitor identify` makes the first"
     )
-    raise NotFoundError(f"there is no model {name!r}; {existing}")
+    raise NotFoundError(f"there is no model {name!r}; {did_you_mean(name, names)}{existing}")
 
 
 def model_history(db: Database, name: str, version: int | None = None) -> tuple[StoredModel, ...]:

@@ -11,6 +11,7 @@ from monitor.store import (
     AuditEntry,
     Database,
     export_tables,
+    export_workbook,
     last_entries,
     restore,
     take_backup,
@@ -112,10 +113,20 @@ def restore_backup(request: RestoreRequest) -> RestoreAnswer:
 
 @dataclass(frozen=True)
 class ExportRequest:
-    """A new or empty folder for the tables, and their format."""
+    """A new or empty folder for the tables, and their format; a workbook (xlsx) may be named itself.
+
+    ``tables`` are the names of the tables that are wanted (default: all, of a workbook those for people), ``machine``
+    is the only machine whose rows are written.
+    """
 
     folder: Path
-    format: Literal["csv", "parquet"] = "csv"
+    format: Literal["csv", "parquet", "xlsx"] = "csv"
+    tables: tuple[str, ...] | None = None
+    machine: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.tables is not None and not all(name.strip() for name in self.tables):
+            raise InputError("--tables: write names with commas between them, such as parameters,runs")
 
 
 @dataclass(frozen=True)
@@ -126,5 +137,10 @@ class ExportAnswer:
 
 
 def export(db: Database, request: ExportRequest) -> ExportAnswer:
-    """Write all tables as files. Raises InputError for a folder that is not empty, StoreError."""
-    return ExportAnswer(export_tables(db, request.folder, request.format))
+    """Write tables as files or a workbook. Raises InputError for what exists already, NotFoundError, StoreError."""
+    if request.format == "xlsx":
+        file = request.folder if request.folder.suffix.lower() == ".xlsx" else request.folder / "monitor.xlsx"
+        return ExportAnswer((export_workbook(db, file, request.tables, request.machine),))
+    return ExportAnswer(
+        export_tables(db, request.folder, request.format, tables=request.tables, machine=request.machine)
+    )

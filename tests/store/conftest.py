@@ -21,7 +21,7 @@ from monitor.records import (
     ScaleBar,
     SourceFile,
 )
-from monitor.store import Database, StoredIdentification, StoredRun
+from monitor.store import Database, StoredIdentification, StoredRun, import_campaign, save_identification
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 
 #: As a controller prints them, among them degrees whose radians do not divide back to the same double.
@@ -135,3 +135,13 @@ def db(path: Path) -> Iterator[Database]:
     """An open, empty database."""
     with Database(path, actor="the test") as database:
         yield database
+
+
+@pytest.fixture
+def filled(
+    db: Database, campaign: Campaign, make_identification: Callable[..., StoredIdentification]
+) -> Database:
+    """A database with a campaign and its identification."""
+    import_campaign(db, campaign)
+    save_identification(db, make_identification(campaign))
+    return db

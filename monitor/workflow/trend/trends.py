@@ -9,7 +9,7 @@ from datetime import UTC
 import numpy as np
 
 from monitor.documents import to_document
-from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
 from monitor.store import (
@@ -106,8 +106,9 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
     history = selected_campaigns(history, request.campaigns)
     if request.parameter is not None and len(history.run) and request.parameter not in history.parameters:
         every = _history(db, replace(request, parameter=None, volumetric_limit_um=None)).parameters
+        hint = did_you_mean(request.parameter, every)
         raise NotFoundError(
-            f"machine {machine} has no parameter {request.parameter!r}; it has {', '.join(every) or 'none yet'}"
+            f"machine {machine} has no parameter {request.parameter!r}; {hint}it has {', '.join(every) or 'none yet'}"
         )
     return history
 
