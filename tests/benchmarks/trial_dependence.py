@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
+
 import numpy as np
 from scipy import signal, stats
 
@@ -23,7 +26,7 @@ from monitor.statistics import (
     t_squared_chart,
     welch_anova,
 )
-from monitor.statistics.before_after import before_after
+from monitor.statistics.before_after import OtherDays, before_after
 from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
 
 SEED = 20261122
@@ -197,19 +200,30 @@ def charts(rng: np.random.Generator) -> None:
         rows,
     )
     rows = []
-    for r in (0.0, 0.5, 0.8):
-        hits = np.zeros(4)
-        for _ in range(100):
-            series = first_order(rng, 5, 130, r).T
-            before, after = series[:30], series[30:]
-            for place, correlated in ((0, True), (2, False)):
-                single = t_squared_chart(after, before, arl=370.0, correlated=correlated)
-                path = mewma_chart(after, before, rng=rng, arl=200.0, correlated=correlated)
-                hits[place : place + 2] += [len(single.alarms) > 0, len(path.alarms) > 0]
-        rows.append([r, *(hits / 100.0).tolist()])
+    for p in (2, 5, 10):
+        for r in (0.0, 0.3, 0.5, 0.8):
+            hits = np.zeros(5)
+            for _ in range(200):
+                series = first_order(rng, p, 130, r).T
+                before, after = series[:30], series[30:]
+                for place, correlated in ((0, True), (2, False)):
+                    single = t_squared_chart(after, before, arl=370.0, correlated=correlated)
+                    path = mewma_chart(after, before, rng=rng, arl=200.0, correlated=correlated)
+                    hits[place : place + 2] += [len(single.alarms) > 0, len(path.alarms) > 0]
+                shifted = after[:30] + 3.0 * np.eye(p)[0]
+                hits[4] += len(t_squared_chart(shifted, before, arl=370.0, correlated=True).alarms) > 0
+            rows.append([p, r, *(hits / 200.0).tolist()])
     table(
-        "Charts of five parameters with an alarm within 100 points, nominal 0.24 and 0.39",
-        ["r", "T²", "MEWMA", "T², independent", "MEWMA, independent"],
+        "Charts of several parameters with an alarm within 100 points, nominal 0.24 and 0.39",
+        [
+            "parameters",
+            "r",
+            "T²",
+            "MEWMA",
+            "T², independent",
+            "MEWMA, independent",
+            "T²: 3 sd of one in 30 points",
+        ],
         rows,
     )
 
@@ -256,37 +270,92 @@ def _called(
     return float(np.mean([bool(found.changes or found.trends) for found in together]))
 
 
+#: Machines of a cell of that table.
+MACHINES = 2000
+#: Days of runs before and after, and those of the machine's other campaigns.
+EVENTS = (
+    ((4,), (4,), ()),
+    ((10,), (10,), ()),
+    ((4,), (4,), ((4,) * 3,)),
+    ((4,), (4,), ((4,) * 5,) * 2),
+    ((4,), (4,), ((4,),) * 6),
+    ((10,), (2,), ((4,) * 8,)),
+    ((4,) * 2, (4,), ()),
+    ((4,) * 2, (4,), ((4,) * 6,)),
+    ((4,) * 5, (4,) * 5, ()),
+    ((4,) * 5, (4,) * 5, ((4,) * 5,) * 4),
+    ((4,) * 5, (4,) * 5, ((4,) * 5,) * 10),
+    ((4,) * 5, (4,) * 2, ()),
+    ((1,) * 3, (1,) * 3, ()),
+    ((2, 6, 4), (8, 3), ()),
+)
+
+
+def _campaign(
+    rng: np.random.Generator, runs: tuple[int, ...], days: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    index = np.repeat(np.arange(len(runs)), runs)
+    return days[index] + rng.normal(size=len(index)), index
+
+
+def _differences(
+    days_of: Callable[[int], np.ndarray], case: tuple, rng: np.random.Generator, shift: float
+) -> str:  # type: ignore[type-arg]
+    """Shares of machines whose difference is called and not decided."""
+    before, after, rest = case
+    called = undecided = 0
+    for _ in range(MACHINES):
+        (x, of_x), (y, of_y) = (_campaign(rng, runs, days_of(len(runs))) for runs in (before, after))
+        columns = [_campaign(rng, runs, days_of(len(runs))) for runs in rest]
+        others = None
+        if rest:
+            others = OtherDays(
+                np.concatenate([values for values, _ in columns]),
+                np.concatenate([100 * i + of_day for i, (_, of_day) in enumerate(columns)]),
+                np.zeros(sum(len(values) for values, _ in columns)),
+                np.concatenate([np.full(len(values), i) for i, (values, _) in enumerate(columns)]),
+            )
+        agree = before_after(x, y + shift, of_x, of_y, others).agree
+        called, undecided = called + (agree is False), undecided + (agree is None)
+    return "not decided" if undecided == MACHINES else f"{called / MACHINES:.3f}"
+
+
 def events(rng: np.random.Generator) -> None:
     """Changes called between two campaigns."""
     rows: list[list[object]] = []
-    for before, after in (
-        ((1, 4), (1, 4)),
-        ((1, 10), (1, 10)),
-        ((5, 4), (5, 4)),
-        ((5, 4), (2, 4)),
-        ((3, 1), (3, 1)),
-    ):
-        for component in (0.0, 1.0, 2.0):
-            u = np.sqrt(sum((component**2 + 1.0 / runs) / days for days, runs in (before, after)))
-            calls = np.zeros(2)
-            for _ in range(300):
-                sides = []
-                for days, runs in (before, after):
-                    values = component * rng.normal(size=(days, 1)) + rng.normal(size=(days, runs))
-                    sides.append((values.ravel(), np.repeat(np.arange(days), runs)))
-                (x, of_x), (y, of_y) = sides
-                calls += [not before_after(x, y + shift * u, of_x, of_y).agree for shift in (0.0, 3.5)]
-            rows.append(
-                [
-                    f"{before[0]} of {before[1]}",
-                    f"{after[0]} of {after[1]}",
-                    component,
-                    *(calls / 300.0).tolist(),
-                ]
-            )
+
+    def text(runs: tuple[int, ...]) -> str:
+        same = len(set(runs)) == 1
+        return f"{len(runs)} of {runs[0]}" if same else f"{len(runs)} of {', '.join(map(str, runs))}"
+
+    for case in EVENTS:
+        before, after, rest = case
+        row: list[object] = [
+            text(before),
+            text(after),
+            f"{len(rest)} campaigns: {text(rest[0])}" if rest else "none",
+        ]
+        for component in (0.0, 0.5, 1.0, 2.0, 3.0):
+            row.append(_differences(lambda n, c=component: c * rng.normal(size=n), case, rng, 0.0))  # type: ignore[misc]
+        u = np.sqrt(sum((1.0 + np.mean(1.0 / np.array(runs))) / len(runs) for runs in (before, after)))
+        row += [_differences(lambda n: rng.normal(size=n), case, rng, factor * u) for factor in (3.5, 7.0)]
+        row.append(_differences(lambda n: first_order(rng, 1, n, 0.6)[0], case, rng, 0.0))
+        row.append(_differences(lambda n: rng.standard_t(3, n) / np.sqrt(3.0), case, rng, 0.0))
+        row.append(_differences(lambda n: 0.7 * rng.normal(size=n) + 0.7 * rng.normal(), case, rng, 0.0))
+        rows.append(row)
     table(
-        "Before and after an event: called where nothing changed, and where it did by 3.5 standard deviations",
-        ["days of runs before", "after", "day component", "no change", "3.5 u"],
+        "Before and after an event: called where nothing changed, and where it did, in its standard deviations",
+        [
+            "days of runs before",
+            "after",
+            "the machine's other days",
+            *(f"days differ by {c:g}" for c in (0.0, 0.5, 1.0, 2.0, 3.0)),
+            "days 1, changed by 3.5",
+            "changed by 7",
+            "days AR 0.6",
+            "days Student, 3",
+            "campaigns differ by 0.7 too",
+        ],
         rows,
     )
 
@@ -325,5 +394,7 @@ def means(rng: np.random.Generator) -> None:
 
 
 if __name__ == "__main__":
-    for trial in (slopes, means, events, charts, forecasts, changes):
+    every = (slopes, means, events, charts, forecasts, changes)
+    # Names choose some of them: ``trial_dependence.py slopes events``.
+    for trial in [trial for trial in every if trial.__name__ in sys.argv[1:]] or every:
         trial(np.random.default_rng(SEED))

@@ -110,7 +110,8 @@ class DatedChange:
 class StepAtEvent:
     """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
 
-    ``scatter_of`` says by what the uncertainty is: ``days`` or, where they are too few, ``runs``.
+    ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
+    then it is not decided whether it is a step.
     """
 
     at: str
