@@ -320,6 +320,9 @@ def _resemblance(answer: TrendAnswer) -> Iterator[str]:
             f"{name}: autocorrelation between days {widest.correlation:.2g}, up to {widest.allowed_for:.2g} is allowed "
             f"for: the slope's interval is {widest.widening:.2g} times as wide as with independent days"
         )
+    names = dict.fromkeys(drift.temperature for drift in stated.values() if drift.temperature)
+    if names:
+        yield f"what goes with {', '.join(names)} is allowed for beside the slopes"
     seasons = {drift.season for drift in stated.values()}
     if Season.NOT_TOLD in seasons:
         yield "the history does not cover the year: a drift is not told from what the season does"

@@ -36,9 +36,10 @@ REFUTED = 2.0
 #: many exceedances, looked at after each block, had this probability at the level. Most searches end with the first.
 HOPELESS, FIRST_BLOCK, BLOCK = 1e-6, 100, 500
 #: Values with heavy tails gain more by a change than normal ones. Where the kurtosis of what the best change leaves is
-#: above this (that of normal values is 3), the series without a change are simulated with Student's distribution of so
-#: many degrees of freedom: without it 2.5 to 3.5 % are called at 1 % (docs/trials-statistics.md).
-TAILED, TAIL_FREEDOM = 3.6, 4.0
+#: above that of normal values, 3, by so many times its scatter, the root of 24/n, the series without a change are
+#: simulated with Student's distribution of so many degrees of freedom: without it 2.5 to 3.5 % are called at 1 %, with a
+#: lower limit a step of ten in five days of thirteen parameters is missed (docs/trials-statistics.md).
+TAILED, TAIL_FREEDOM = 1.5, 4.0
 
 
 @dataclass(frozen=True)
@@ -297,7 +298,7 @@ class Scanner:
         unexplained = np.maximum(total - explained, 1e-15 * total + 1e-300)[:, 0]
         best_candidate = int((unexplained * likeliest.weight).argmin())
         column = self.columns[:, best_candidate]
-        tailed = _kurtosis(likeliest, weighted, self.root * column) > TAILED
+        tailed = _kurtosis(likeliest, weighted, self.root * column) > 3.0 + TAILED * np.sqrt(24.0 / len(y))
         p = 0.0
         for family, index in self._not_refuted(best[:, 0], numbers):
             members = list(self.families[family])

@@ -17,6 +17,7 @@ from monitor.statistics import (
     brown_forsythe,
     correlated_reference,
     cusum_chart,
+    dependence,
     ewma_chart,
     find_changes,
     individuals_chart,
@@ -50,8 +51,10 @@ def first_order(rng: np.random.Generator, count: int, n: int, r: float) -> np.nd
     return np.asarray(signal.lfilter([1.0], [1.0, -r], steps, axis=1))
 
 
-def slope_rate(values: np.ndarray, t: np.ndarray, cycle: float | None = YEAR) -> float:
-    """Share of series (c, n) of day means whose slope is called at 5 %."""
+def slope_rate(
+    values: np.ndarray, t: np.ndarray, cycle: float | None = YEAR, beside: np.ndarray | None = None
+) -> float:
+    """Share of series (c, n) of day means whose slope is called at 5 %; ``beside`` (c, n) is fitted beside it."""
     place = np.unique(block_of(t, int(block_count(len(t))), t[0], t[-1]), return_inverse=True)[1]
     counts = np.bincount(place).astype(float)
     sums = np.zeros((len(values), len(counts)))
@@ -59,8 +62,13 @@ def slope_rate(values: np.ndarray, t: np.ndarray, cycle: float | None = YEAR) ->
     shape = (len(values), 1)
     times = np.bincount(place, t) / counts
     days = np.full(len(values), float(len(t)))
+    column = None
+    if beside is not None:
+        column = np.zeros((len(values), len(counts)))
+        np.add.at(column.T, place, beside.T)
+        column = (column / counts)[:, :, np.newaxis]
     lines = block_lines(
-        Blocks(np.tile(counts, shape), np.tile(times, shape), sums / counts, days), cycle=cycle
+        Blocks(np.tile(counts, shape), np.tile(times, shape), sums / counts, days, column), cycle=cycle
     )
     return float((2.0 * stats.t.sf(np.abs(lines.slope / lines.u_slope), lines.dof) < 0.05).mean())
 
@@ -122,9 +130,12 @@ def slopes(rng: np.random.Generator) -> None:
             warmth = wave + 0.5 * first_order(rng, 2000, n, 0.7)
             tails = rng.standard_t(3, (2000, n)) / np.sqrt(3.0)
             cases = (noise + 0.5 * wave, noise + wave, noise + 2.0 * wave, noise + warmth, noise + tails)
-            rows.append(
-                [n, gap, r, *(slope_rate(case, t) for case in cases), slope_rate(noise + wave, t, None)]
-            )
+            u = np.sqrt(1.25 / ((t - t.mean()) ** 2).sum())
+            rows.append([
+                n, gap, r, *(slope_rate(case, t) for case in cases), slope_rate(noise + wave, t, None),
+                slope_rate(noise + 2.0 * warmth, t, beside=warmth),
+                slope_rate(noise + 2.0 * warmth + 8.0 * u * t, t, beside=warmth),
+            ])  # fmt: skip
     table(
         "Slopes called at 5 % with a yearly cycle, in scatters of a run",
         [
@@ -137,6 +148,8 @@ def slopes(rng: np.random.Generator) -> None:
             "temperature",
             "Student, 3",
             "1, no cycle in the null",
+            "2, temperature recorded",
+            "the same, drift of 8 u",
         ],
         rows,
     )
@@ -360,6 +373,48 @@ def events(rng: np.random.Generator) -> None:
     )
 
 
+#: Histories of a cell.
+DEPENDENCES = 150
+
+
+def conditions(rng: np.random.Generator) -> None:
+    """Dependences called on a temperature that has nothing to do with the values, and on one that has."""
+    rows: list[list[object]] = []
+    for n, gap in ((6, 1.0), (10, 7.0), (20, 7.0), (52, 7.0), (104, 7.0)):
+        day = np.repeat(np.arange(n), 3)
+        t = gap * day + np.tile([0.0, 0.1, 0.2], n)
+        for r in (0.0, 0.6, 0.8):
+            called = np.zeros(4)
+            for _ in range(DEPENDENCES):
+                season = np.cos(2.0 * np.pi * (gap * np.arange(n) + rng.uniform(0.0, YEAR)) / YEAR)
+                degrees = (2.0 * season + first_order(rng, 1, n, 0.7)[0])[day] + np.tile([-0.3, 0.0, 0.3], n)
+                y = first_order(rng, 1, n, r)[0][day] + rng.normal(size=3 * n)
+                within = rng.normal(size=3 * n)
+                for place, (values, channel) in enumerate(
+                    ((y, degrees), (y, within), (y + 0.6 * degrees, degrees))
+                ):
+                    fit = dependence(values, t, {"degC": channel}, days=day)
+                    called[place] += fit.coefficients[0].p_value < 0.05
+                if n * gap >= 300.0:
+                    wave = dependence(y, t, {}, cycles={"year": YEAR}, days=day).cycles[0]
+                    called[3] += wave.p_value < 0.05
+            rates = (called / DEPENDENCES).tolist()
+            rows.append([n, gap, r, *rates[:3], rates[3] if n * gap >= 300.0 else ""])
+    table(
+        "Dependences and yearly cycles called at 5 % where there are none, day component 1",
+        [
+            "days",
+            "every (days)",
+            "r",
+            "on weather",
+            "on what varies within days",
+            "0.6 a kelvin",
+            "yearly cycle",
+        ],
+        rows,
+    )
+
+
 def means(rng: np.random.Generator) -> None:
     """Equal means called where the groups scatter differently."""
     rows: list[list[object]] = []
@@ -394,7 +449,7 @@ def means(rng: np.random.Generator) -> None:
 
 
 if __name__ == "__main__":
-    every = (slopes, means, events, charts, forecasts, changes)
+    every = (slopes, means, events, conditions, charts, forecasts, changes)
     # Names choose some of them: ``trial_dependence.py slopes events``.
     for trial in [trial for trial in every if trial.__name__ in sys.argv[1:]] or every:
         trial(np.random.default_rng(SEED))
