@@ -37,8 +37,8 @@ REFUTED = 2.0
 HOPELESS, FIRST_BLOCK, BLOCK = 1e-6, 100, 500
 #: Values with heavy tails gain more by a change than normal ones. Where the kurtosis of what the best change leaves is
 #: above that of normal values, 3, by so many times its scatter, the root of 24/n, the series without a change are
-#: simulated with Student's distribution of so many degrees of freedom: without it 2.5 to 3.5 % are called at 1 %, with a
-#: lower limit a step of ten in five days of thirteen parameters is missed (docs/trials-statistics.md).
+#: simulated with Student's distribution of so many degrees of freedom: without it 2.5 to 3.5 % are called at 1 %, with
+#: a lower limit a step of ten in five days of thirteen parameters is missed (docs/trials-statistics.md).
 TAILED, TAIL_FREEDOM = 1.5, 4.0
 
 

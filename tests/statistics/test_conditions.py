@@ -88,7 +88,8 @@ def test_dziuba1_has_a_yearly_cycle_beside_its_drift(table):
     # 41.1 mohm a year and an amplitude of 7.3 mohm: shared recomputation of the same model.
     assert result.drift.value == pytest.approx(0.0411, abs=0.0006)
     assert result.cycles[0].amplitude == pytest.approx(0.0073, abs=0.0008)
-    assert result.cycles[0].p_value < 1e-4
+    # A cycle among weeks that resemble each other.
+    assert result.cycles[0].p_value < 0.05
     independent = dependence(rows[:, 3], years, {}, cycles={"year": 1.0}, independent=True)
     assert independent.cycles[0].p_value < 1e-20
 
