@@ -146,14 +146,11 @@ def _change(name: str, change: DatedChange) -> str:
 
 def _event_step(name: str, step: StepAtEvent) -> str:
     size = f"{output.rounded(step.size, step.u)} {step.unit} (u = {output.two_digits(step.u)} {step.unit})"
-    by = (
-        ""
-        if step.scatter_of == "days"
-        else "; by the scatter of the runs, too few days to know how days differ"
-    )
+    event = f"the event of {_minute(step.at)} UTC, {step.kind}: {step.description}"
+    if step.scatter_of == "days":
+        return f"{name} stepped by {size} at {event} (p = {output.probability(step.p_value)})"
     return (
-        f"{name} stepped by {size} at the event of {_minute(step.at)} UTC, {step.kind}: {step.description} "
-        f"(p = {output.probability(step.p_value)}{by})"
+        f"{name} differs by {size} before and after {event}; u is of the runs alone, {agreement.NOT_DECIDED}"
     )
 
 
@@ -323,6 +320,9 @@ def _resemblance(answer: TrendAnswer) -> Iterator[str]:
             f"{name}: autocorrelation between days {widest.correlation:.2g}, up to {widest.allowed_for:.2g} is allowed "
             f"for: the slope's interval is {widest.widening:.2g} times as wide as with independent days"
         )
+    names = dict.fromkeys(drift.temperature for drift in stated.values() if drift.temperature)
+    if names:
+        yield f"what goes with {', '.join(names)} is allowed for beside the slopes"
     seasons = {drift.season for drift in stated.values()}
     if Season.NOT_TOLD in seasons:
         yield "the history does not cover the year: a drift is not told from what the season does"

@@ -56,6 +56,7 @@ def save_identification(db: Database, identification: StoredIdentification) -> i
         for run in identification.runs:
             _insert_run(db, number, run)
         _insert_values(db, number, identification)
+        _insert_frames(db, number, identification)
         identified_values.insert_values(db, number, identification)
         _insert_residuals(db, number, identification.runs)
         audit.record(
@@ -119,6 +120,9 @@ def identification_by_number(db: Database, number: int) -> StoredIdentification:
         tuple(parameters),
         tuple(Unit(name, factor) for name, factor in zip(units, factors, strict=True)),
         _runs(db, number, len(parameters)),
+        dict(
+            db.rows("SELECT parameter, refers_to FROM parameter_frame WHERE identification_id = ?", [number])
+        ),
     )
 
 
@@ -180,6 +184,14 @@ def _insert_run(db: Database, number: int, run: StoredRun) -> None:
 def _insert_values(db: Database, number: int, identification: StoredIdentification) -> None:
     incoming = _values(identification)
     db.insert("INSERT INTO parameter_value SELECT ?, * FROM incoming", incoming, [number])
+
+
+def _insert_frames(db: Database, number: int, identification: StoredIdentification) -> None:
+    if identification.refers_to:
+        names = np.array(list(identification.refers_to), dtype=object)
+        words = np.array(list(identification.refers_to.values()), dtype=object)
+        incoming = {"parameter": names, "refers_to": words}
+        db.insert("INSERT INTO parameter_frame SELECT ?, * FROM incoming", incoming, [number])
 
 
 def _values(identification: StoredIdentification) -> dict[str, Any]:

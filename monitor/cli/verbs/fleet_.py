@@ -48,6 +48,12 @@ def run(options: Namespace) -> int:
     for attention, count in answer.attention.items():
         if count:
             output.say(f"{count} of {answer.rows}: {attention}")
+    widest = max((row.slope_widening for row in answer.table if row.slope_widening), default=1.0)
+    if widest > 1.0:
+        output.say(
+            "slopes allow for days that resemble each other: their intervals are up to "
+            f"{widest:.2g} times as wide as with independent days"
+        )
     if answer.not_identified:
         names = ", ".join(answer.not_identified[:MOST_NAMED]) + ", ..." * (
             len(answer.not_identified) > MOST_NAMED

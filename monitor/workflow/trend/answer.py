@@ -56,8 +56,8 @@ class DriftStatement:
 
     ``robust_slope_per_year`` by Theil and Sen, ``monotone_p`` by Mann and Kendall; ``between_days`` and
     ``within_days`` are standard deviations about the line. ``resemblance`` says how the slope's interval allows for
-    days
-    that resemble each other, ``season`` whether a wave of a year is allowed for.
+    days that resemble each other, ``season`` whether a wave of a year is allowed for, ``temperature`` names the
+    recorded one that is fitted beside the line.
     """
 
     slope_per_year: float | None = None
@@ -72,6 +72,7 @@ class DriftStatement:
     within_days: float | None = None
     resemblance: DayResemblance | None = None
     season: Season | None = None
+    temperature: str | None = field(default=None, metadata=OMITTED)
     since: str | None
     n: int
     days: int
@@ -110,7 +111,8 @@ class DatedChange:
 class StepAtEvent:
     """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
 
-    ``scatter_of`` says by what the uncertainty is: ``days`` or, where they are too few, ``runs``.
+    ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
+    then it is not decided whether it is a step.
     """
 
     at: str
