@@ -41,17 +41,37 @@ def pose_parts(fit: Fit) -> npt.NDArray[np.int64] | None:
     unknowns = int(fit.solution.rank.sum()) + len(fit.problem.added_names)
     if len(problem.runs) != 1 or fit.readings < READINGS_AN_UNKNOWN * unknowns:
         return None
-    positions = problem.context.positions
-    pose = np.concatenate([[0], np.cumsum(np.any(np.diff(positions, axis=0) != 0.0, axis=1))])
+    parts = pose_blocks(fit)
+    return None if parts.max() < 0 else parts
+
+
+def pose_blocks(fit: Fit) -> npt.NDArray[np.int64]:
+    """The part (M,) of every whitened number, where blocks of neighbouring poses are dealt out to ten parts: -1 for
+    calibrated quantities and padding, and for all numbers where there are too few poses."""
+    pose = poses_of(fit)
     poses = int(pose[-1]) + 1
     blocks = min(BLOCKS, poses)
     if blocks < 2 * PARTS:
-        return None
+        return np.full(fit.solution.last.residual.size, -1, dtype=np.int64)
     part = np.random.default_rng(SEED).permutation(np.arange(blocks) % PARTS)
-    numbers = np.repeat(part[pose * blocks // poses], problem.sigma.shape[1])
-    parts = np.full(fit.solution.last.residual.size, -1, dtype=np.int64)
-    parts[: len(numbers)] = numbers
-    return parts
+    return of_numbers(fit, part[pose * blocks // poses])
+
+
+def poses_of(fit: Fit) -> npt.NDArray[np.int64]:
+    """The pose (n,) of every row: rows of one run after another at which no axis moved."""
+    context = fit.problem.context
+    moved = np.any(np.diff(context.positions, axis=0) != 0.0, axis=1) | (np.diff(context.run) != 0)
+    return np.concatenate([[0], np.cumsum(moved)])
+
+
+def of_numbers(fit: Fit, rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Labels (n,) of rows as those (M,) of their whitened numbers, -1 for calibrated quantities and padding."""
+    problem = fit.problem
+    numbers = np.repeat(rows + 1.0, problem.sigma.shape[1]).reshape(problem.sigma.shape)
+    padded = problem.padded(numbers).astype(np.int64) - 1
+    labels = np.full(fit.solution.last.residual.shape, -1, dtype=np.int64)
+    labels[:, : padded.shape[1]] = padded
+    return labels.reshape(-1)
 
 
 @dataclass(frozen=True)
