@@ -132,9 +132,7 @@ class _Pursuit:
 
     def new(self, columns: Array) -> Array:
         """An orthonormal basis of what columns (M, c) have beside what is selected."""
-        beside = without(self.basis, columns)
-        # Once more: what is nearly inside leaves rounding that is not.
-        return orthonormal(without(self.basis, beside)[:, np.linalg.norm(beside, axis=0) > 0.0])
+        return orthonormal(without(self.basis, columns))
 
     def columns(self, texts: Sequence[str]) -> Array:
         """Columns (M, c) of effects."""
@@ -189,7 +187,9 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
     scene = scene_of(fit, _protecting(fit, variants))
     always = scene.columns([candidate for candidate in scene.candidates if candidate.visible])
     low = columns_of(fit, [f"{joint.term}:{harmonics_text(LOW)}" for joint in joints])
-    lines = _high_lines(_Pursuit(fit, np.concatenate([always, low], axis=1), pose), joints, rate)
+    # With the low orders of all joints too, the strongest ones, nothing of them leaks into the others.
+    high = _Pursuit(fit, np.concatenate([always, low], axis=1), pose)
+    lines = _high_lines(high, joints, rate)
     if all(joint.clusters(lines[joint.index]) == 0 for joint in joints):
         return ()
     pursuit = _Pursuit(fit, always, pose)
@@ -201,7 +201,7 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
         for joint in joints
         if joint.clusters(lines[joint.index]) > 1
     }
-    curves = _with_tables(fit, always, joints, lines, curves)
+    curves = _with_tables(high, always, joints, lines, curves)
     chain = fit.problem.context.chain
     orders = float(sum(len(joint.orders) for joint in joints))
     return tuple(
@@ -288,42 +288,43 @@ def _add_low_lines(
     pursuit: _Pursuit, joints: Sequence[_Joint], lines: dict[int, list[float]], rate: float
 ) -> None:
     """Add the low orders that stand out beside the others to ``lines``, the most certain first."""
-    remaining = {
-        (joint.index, order): pursuit.columns([f"{joint.term}:{harmonics_text([order])}"])
-        for joint in joints
-        for order in LOW
-    }
-    count = len(remaining)
+    keys = [(joint.index, order) for joint in joints for order in LOW]
+    columns = pursuit.columns(
+        [f"{joint.term}:{harmonics_text([order])}" for joint in joints for order in LOW]
+    )
+    rest = without(pursuit.basis, columns)
+    remaining = {key: slice(2 * number, 2 * number + 2) for number, key in enumerate(keys)}
     while remaining:
-        new = {key: pursuit.new(columns) for key, columns in remaining.items()}
-        p_values = {key: pursuit.p_value(columns) for key, columns in new.items()}
+        new = {key: orthonormal(rest[:, part]) for key, part in remaining.items()}
+        p_values = {key: pursuit.p_value(own) for key, own in new.items()}
         best = min(p_values, key=lambda key: p_values[key])
-        if p_values[best] * count > rate or pursuit.held_out(new[best]) >= pursuit.held_out():
+        if p_values[best] * len(keys) > rate or pursuit.held_out(new[best]) >= pursuit.held_out():
             break
         pursuit.take(new[best])
+        rest = without(new[best], rest)
         del remaining[best]
         lines[best[0]].append(best[1])
 
 
 def _with_tables(
-    fit: Fit, always: Array, joints: Sequence[_Joint], lines: dict[int, list[float]], curves: dict[int, str]
+    whole: _Pursuit, always: Array, joints: Sequence[_Joint], lines: dict[int, list[float]], curves: dict[int, str]
 ) -> dict[int, str]:
-    """The curves with a table over the travel instead of lines, for joints where blocks left out prefer it."""
-    curves = dict(curves)
+    """The curves with a table over the travel instead of lines, for joints where blocks left out prefer it; ``whole`` has
+    the lines and the low orders of all joints."""
+    curves, fit = dict(curves), whole.fit
     poses = len(joints[0].position)
     counts = [count for count in NODES if POSES_A_NODE * count <= poses]
-    for joint in joints:
+    lacking = [joint for joint in joints if _lacks_shape(whole, joint)] if counts else []
+    for joint in lacking:
         others = [
             f"{other.term}:{harmonics_text(lines[other.index])}"
             for other in joints
             if other is not joint and lines[other.index]
         ]
-        pursuit = _Pursuit(fit, np.concatenate([always, columns_of(fit, others)], axis=1), poses_of(fit))
+        pursuit = _Pursuit(fit, np.concatenate([always, columns_of(fit, others)], axis=1), whole.pose)
         own = pursuit.new(
             pursuit.columns([f"{joint.term}:{harmonics_text({*lines[joint.index], *LOW})}"])
         )
-        if not counts or not _lacks_shape(pursuit, joint, own):
-            continue
         best = pursuit.held_out(own)
         reading = fit.problem.context.chain.joints[joint.index].sign * joint.position / DEGREE.factor
         for count in counts:
@@ -336,16 +337,13 @@ def _with_tables(
     return curves
 
 
-def _lacks_shape(pursuit: _Pursuit, joint: _Joint, own: Array) -> bool:
-    """Whether hats over the travel of a joint stand out from its ``own`` lines (M, c)."""
-    before = pursuit.residual
-    pursuit.residual = before - own @ (own.T @ before)
-    turn = pursuit.turns(joint)
-    pursuit.residual = before
+def _lacks_shape(whole: _Pursuit, joint: _Joint) -> bool:
+    """Whether hats over the travel of a joint stand out from all lines."""
+    turn = whole.turns(joint)
     nodes = np.linspace(joint.position.min(), joint.position.max(), NODES[0])
     hats = np.stack([np.interp(joint.position, nodes, hat) for hat in np.eye(NODES[0])], axis=1)
     # What every pose says of the turn weighs as much as the way that it moves the reflectors.
-    weight = np.bincount(pursuit.pose, weights=np.sum(joint.way**2, axis=1))
+    weight = np.bincount(whole.pose, weights=np.sum(joint.way**2, axis=1))
     scale = np.sqrt(np.where(weight > 0.0, weight, 1.0))
     span = orthonormal(hats * scale[:, None])
     turn = turn / scale
