@@ -16,7 +16,9 @@ from monitor.discovery.machine.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.compare import ChainComparison, compare
 from monitor.discovery.machine.correlation import Correlation
 from monitor.discovery.machine.cures import Mistake
+from monitor.discovery.machine.curve_findings import with_curves
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
+from monitor.discovery.machine.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.poses import poses_of_rows
 from monitor.discovery.machine.refine import Refined, refine_all
@@ -117,9 +119,18 @@ def explain(
         first = fit(foreseen, certain.left_out(foreseen) if gross else None)
     surroundings = surroundings_of(campaign, foreseen)
     variants = _variants(campaign, foreseen, surroundings.drivers)
-    search = _search(first, foreseen, variants, surroundings.drivers, rate, certain)
+    curves = joint_curves(first, variants, rate)
+    under_curves, begin = foreseen, first
+    if curves:
+        under_curves = with_effects(foreseen, [curve.effect for curve in curves])
+        begin = fit(under_curves, first.left_out if gross else None, first)
+    search = _search(begin, under_curves, variants, surroundings.drivers, rate, certain)
     suspects = search.suspects
-    missing = missing_effects(search.scene, search.result, search.refined, surroundings)
+    findings = search.scene, search.result, search.refined
+    if curves:
+        base = first if suspects.same_as(certain) else fit(foreseen, suspects.left_out(foreseen), first)
+        findings = with_curves(base, curves, *findings)
+    missing = missing_effects(*findings, surroundings)
     if suspects.varying:
         effects = [*suspects.move_effects(foreseen), *search.effects]
         steady, _ = fit_those_possible(foreseen, effects, search.under.left_out, first)

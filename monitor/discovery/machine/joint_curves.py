@@ -211,6 +211,12 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
     )
 
 
+def all_curves_were_searched(fit: Fit) -> bool:
+    """Whether every joint of a chain could have shown a curve of several lines or a table."""
+    pose = poses_of(fit)
+    return bool(pose.max() + 1 >= FEWEST_POSES) and len(_joints(fit, pose)) == len(fit.problem.context.chain.joints)
+
+
 def _joints(fit: Fit, pose: npt.NDArray[np.int64]) -> list[_Joint]:
     """The rotary joints that were at many positions."""
     problem = fit.problem
