@@ -22,6 +22,7 @@ from monitor.discovery.machine.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.poses import poses_of_rows
 from monitor.discovery.machine.refine import Refined, refine_all
+from monitor.discovery.machine.robot_search import search_beside_curves
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
 from monitor.discovery.machine.steps import Step, find_steps
@@ -124,7 +125,7 @@ def explain(
     if curves:
         under_curves = with_effects(foreseen, [curve.effect for curve in curves])
         begin = fit(under_curves, first.left_out if gross else None, first)
-    search = _search(begin, under_curves, variants, surroundings.drivers, rate, certain)
+    search = _search(begin, under_curves, variants, surroundings.drivers, rate, certain, beside_curves=bool(curves))
     suspects = search.suspects
     findings = search.scene, search.result, search.refined
     if curves:
@@ -161,6 +162,8 @@ def _search(
     drivers: Sequence[str],
     rate: float,
     suspects: Suspects,
+    *,
+    beside_curves: bool = False,
 ) -> _Search:
     """Search effects and suspects in turn, each under the others and the ``suspects`` that ``first`` leaves out, until
     nothing changes."""
@@ -172,7 +175,10 @@ def _search(
         current = first if suspects.same_as(gross) else fit(with_effects(problem, single), out, first)
         current = current.with_correlation(correlation)
         able = [variant for variant in variants if variant.family not in unfitted]
-        scene, result = search_chain(scene_of(current, able), drivers, rate)
+        if beside_curves:
+            scene, result = search_beside_curves(current, able, rate)
+        else:
+            scene, result = search_chain(scene_of(current, able), drivers, rate)
         refined = refine_all(scene, result.candidates)
         under, unable = fit_those_possible(
             current.problem, [finding.candidate.effect for finding in refined], out, current

@@ -109,7 +109,7 @@ class _Blocks:
         return total
 
 
-class _Pursuit:
+class Pursuit:
     """The lines selected so far: an orthonormal basis of them and all that protects, and what it leaves of the residual.
 
     Rows stand in the order of their blocks of poses; ``order`` (M,) says which whitened number each is.
@@ -184,15 +184,15 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
     joints = _joints(fit, pose) if pose.max() + 1 >= FEWEST_POSES else []
     if not joints:
         return ()
-    scene = scene_of(fit, _protecting(fit, variants))
+    scene = scene_of(fit, protecting(fit, variants))
     always = scene.columns([candidate for candidate in scene.candidates if candidate.visible])
     low = columns_of(fit, [f"{joint.term}:{harmonics_text(LOW)}" for joint in joints])
     # With the low orders of all joints too, the strongest ones, nothing of them leaks into the others.
-    high = _Pursuit(fit, np.concatenate([always, low], axis=1), pose)
+    high = Pursuit(fit, np.concatenate([always, low], axis=1), pose)
     lines = _high_lines(high, joints, rate)
     if all(joint.clusters(lines[joint.index]) == 0 for joint in joints):
         return ()
-    pursuit = _Pursuit(fit, always, pose)
+    pursuit = Pursuit(fit, always, pose)
     texts = [f"{joint.term}:{harmonics_text(own)}" for joint in joints if (own := lines[joint.index])]
     pursuit.take(pursuit.new(pursuit.columns(texts)))
     _add_low_lines(pursuit, joints, lines, rate)
@@ -236,7 +236,7 @@ def _joints(fit: Fit, pose: npt.NDArray[np.int64]) -> list[_Joint]:
     return joints
 
 
-def _protecting(fit: Fit, variants: Sequence[ChainVariant]) -> list[ChainVariant]:
+def protecting(fit: Fit, variants: Sequence[ChainVariant]) -> list[ChainVariant]:
     """What is taken out before lines are looked for: the catalogue without what repeats with a turn."""
     session = float(fit.problem.context.day_time.max())
     families: dict[str, ChainVariant] = {}
@@ -260,7 +260,7 @@ def _protecting(fit: Fit, variants: Sequence[ChainVariant]) -> list[ChainVariant
     return list(families.values())
 
 
-def _high_lines(pursuit: _Pursuit, joints: Sequence[_Joint], rate: float) -> dict[int, list[float]]:
+def _high_lines(pursuit: Pursuit, joints: Sequence[_Joint], rate: float) -> dict[int, list[float]]:
     """The orders above the low ones that stand out, by joint; ``pursuit`` goes on with them."""
     lines: dict[int, list[float]] = {joint.index: [] for joint in joints}
     limit = -2.0 * np.log(rate / sum(len(joint.orders) for joint in joints))
@@ -291,7 +291,7 @@ def _high_lines(pursuit: _Pursuit, joints: Sequence[_Joint], rate: float) -> dic
 
 
 def _add_low_lines(
-    pursuit: _Pursuit, joints: Sequence[_Joint], lines: dict[int, list[float]], rate: float
+    pursuit: Pursuit, joints: Sequence[_Joint], lines: dict[int, list[float]], rate: float
 ) -> None:
     """Add the low orders that stand out beside the others to ``lines``, the most certain first."""
     keys = [(joint.index, order) for joint in joints for order in LOW]
@@ -313,7 +313,7 @@ def _add_low_lines(
 
 
 def _with_tables(
-    whole: _Pursuit, always: Array, joints: Sequence[_Joint], lines: dict[int, list[float]], curves: dict[int, str]
+    whole: Pursuit, always: Array, joints: Sequence[_Joint], lines: dict[int, list[float]], curves: dict[int, str]
 ) -> dict[int, str]:
     """The curves with a table over the travel instead of lines, for joints where blocks left out prefer it; ``whole`` has
     the lines and the low orders of all joints."""
@@ -327,7 +327,7 @@ def _with_tables(
             for other in joints
             if other is not joint and lines[other.index]
         ]
-        pursuit = _Pursuit(fit, np.concatenate([always, columns_of(fit, others)], axis=1), whole.pose)
+        pursuit = Pursuit(fit, np.concatenate([always, columns_of(fit, others)], axis=1), whole.pose)
         own = pursuit.new(
             pursuit.columns([f"{joint.term}:{harmonics_text({*lines[joint.index], *LOW})}"])
         )
@@ -343,7 +343,7 @@ def _with_tables(
     return curves
 
 
-def _lacks_shape(whole: _Pursuit, joint: _Joint) -> bool:
+def _lacks_shape(whole: Pursuit, joint: _Joint) -> bool:
     """Whether hats over the travel of a joint stand out from all lines."""
     turn = whole.turns(joint)
     nodes = np.linspace(joint.position.min(), joint.position.max(), NODES[0])
