@@ -123,10 +123,14 @@ def _errors(
     for index, joint in enumerate(JOINTS):
         name = str(joint["name"])
         q = float(joint["sign"]) * readings[name]
-        turn = rest[:, index] + scene.softness.get(name, 0.0) * pulls[name] + scene.zeros.get(name, 0.0) * late
+        turn = (
+            rest[:, index] + scene.softness.get(name, 0.0) * pulls[name] + scene.zeros.get(name, 0.0) * late
+        )
         for line in scene.curves.get(name, ()):
             turn = turn + line.amplitude * np.cos(line.order * q - line.phase)
-        motion[name] = np.concatenate([np.zeros((len(q), 3)), turn[:, None] * np.array(joint["axis"])], axis=1)
+        motion[name] = np.concatenate(
+            [np.zeros((len(q), 3)), turn[:, None] * np.array(joint["axis"])], axis=1
+        )
         where[name] = np.tile(location[name], (len(q), 1))
         where[name][:, :3] += scene.growth * late[:, None] * np.array(joint["offset"])
     return where, motion
@@ -159,7 +163,12 @@ def measure(
         if fixed_every and pose % fixed_every == 0:
             rows += [(pose, name, np.array(at), np.array(at)) for name, at in FIXED.items()]
         rows += [
-            (pose, name, point(noisy[pose : pose + 1], np.array(at))[0], point(exact[pose : pose + 1], np.array(at))[0])
+            (
+                pose,
+                name,
+                point(noisy[pose : pose + 1], np.array(at))[0],
+                point(exact[pose : pose + 1], np.array(at))[0],
+            )
             for name, at in REFLECTORS.items()
         ]
     pose_of = np.array([pose for pose, *_ in rows])

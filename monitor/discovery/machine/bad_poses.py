@@ -67,9 +67,7 @@ def bad_poses(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     return points
 
 
-def _point(
-    fit: Fit, rows: list[int], white: Array, chi_square: float, numbers: int, tests: int
-) -> BadPoint:
+def _point(fit: Fit, rows: list[int], white: Array, chi_square: float, numbers: int, tests: int) -> BadPoint:
     context, first = fit.problem.context, rows[0]
     targets = ", ".join(dict.fromkeys(str(context.target[row]) for row in rows))
     p_value = float(scipy.special.chdtrc(numbers, chi_square)) * tests

@@ -18,7 +18,11 @@ from monitor.discovery.search.scene import family_count
 
 
 def with_curves(
-    base: Fit, curves: Sequence[ChainVariant], scene: ChainScene, result: ChainScan, refined: Sequence[Refined]
+    base: Fit,
+    curves: Sequence[ChainVariant],
+    scene: ChainScene,
+    result: ChainScan,
+    refined: Sequence[Refined],
 ) -> tuple[ChainScene, ChainScan, list[Refined]]:
     """The findings of a search and the ``curves`` under which it went, together under ``base``, a fit with neither.
 

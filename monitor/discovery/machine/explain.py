@@ -125,7 +125,9 @@ def explain(
     if curves:
         under_curves = with_effects(foreseen, [curve.effect for curve in curves])
         begin = fit(under_curves, first.left_out if gross else None, first)
-    search = _search(begin, under_curves, variants, surroundings.drivers, rate, certain, beside_curves=bool(curves))
+    search = _search(
+        begin, under_curves, variants, surroundings.drivers, rate, certain, beside_curves=bool(curves)
+    )
     suspects = search.suspects
     findings = search.scene, search.result, search.refined
     if curves:

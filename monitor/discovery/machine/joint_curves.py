@@ -205,7 +205,9 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
     chain = fit.problem.context.chain
     orders = float(sum(len(joint.orders) for joint in joints))
     return tuple(
-        Variant(f"{joint.term}:curve", parse_effect(f"{joint.term}:{curves[joint.index]}", chain), int(orders))
+        Variant(
+            f"{joint.term}:curve", parse_effect(f"{joint.term}:{curves[joint.index]}", chain), int(orders)
+        )
         for joint in joints
         if joint.index in curves
     )
@@ -214,7 +216,9 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
 def all_curves_were_searched(fit: Fit) -> bool:
     """Whether every joint of a chain could have shown a curve of several lines or a table."""
     pose = poses_of(fit)
-    return bool(pose.max() + 1 >= FEWEST_POSES) and len(_joints(fit, pose)) == len(fit.problem.context.chain.joints)
+    return bool(pose.max() + 1 >= FEWEST_POSES) and len(_joints(fit, pose)) == len(
+        fit.problem.context.chain.joints
+    )
 
 
 def _joints(fit: Fit, pose: npt.NDArray[np.int64]) -> list[_Joint]:
@@ -279,7 +283,9 @@ def _high_lines(pursuit: Pursuit, joints: Sequence[_Joint], rate: float) -> dict
         selected = [(joint, order) for power, joint, order in strongest if power > least]
         if not selected:
             break
-        new = pursuit.new(pursuit.columns([f"{joint.term}:harmonics({order:g})" for joint, order in selected]))
+        new = pursuit.new(
+            pursuit.columns([f"{joint.term}:harmonics({order:g})" for joint, order in selected])
+        )
         after = pursuit.held_out(new)
         if after >= error:
             break
@@ -313,7 +319,11 @@ def _add_low_lines(
 
 
 def _with_tables(
-    whole: Pursuit, always: Array, joints: Sequence[_Joint], lines: dict[int, list[float]], curves: dict[int, str]
+    whole: Pursuit,
+    always: Array,
+    joints: Sequence[_Joint],
+    lines: dict[int, list[float]],
+    curves: dict[int, str],
 ) -> dict[int, str]:
     """The curves with a table over the travel instead of lines, for joints where blocks left out prefer it; ``whole`` has
     the lines and the low orders of all joints."""
@@ -328,9 +338,7 @@ def _with_tables(
             if other is not joint and lines[other.index]
         ]
         pursuit = Pursuit(fit, np.concatenate([always, columns_of(fit, others)], axis=1), whole.pose)
-        own = pursuit.new(
-            pursuit.columns([f"{joint.term}:{harmonics_text({*lines[joint.index], *LOW})}"])
-        )
+        own = pursuit.new(pursuit.columns([f"{joint.term}:{harmonics_text({*lines[joint.index], *LOW})}"]))
         best = pursuit.held_out(own)
         reading = fit.problem.context.chain.joints[joint.index].sign * joint.position / DEGREE.factor
         for count in counts:

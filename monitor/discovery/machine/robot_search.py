@@ -41,7 +41,9 @@ def search_beside_curves(
     fallen: set[str] = set()
     while len(selected) < MOST_EFFECTS:
         pursuit = _beside(fit, selected)
-        rest = [candidate for candidate in pool if candidate.family not in fallen and candidate not in selected]
+        rest = [
+            candidate for candidate in pool if candidate.family not in fallen and candidate not in selected
+        ]
         best = _best(pursuit, rest, rate / len(pool))
         if best is None:
             break
