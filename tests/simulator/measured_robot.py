@@ -42,7 +42,7 @@ class Scene:
 
     ``softness`` rad per N m by joint; ``curves`` lines by joint; ``zeros`` drift of joint zeros in rad and ``growth``
     strain of the links, both over the session with ``tau`` (part of it); ``shift_mm`` drift of the tracker's frame with
-    the same. ``rest_rad`` standard deviation of the angle at which each joint comes to rest, ``noise_um`` of the tracker.
+    the same. ``rest_rad`` standard deviation of the angle at which each joint rests, ``noise_um`` of the tracker.
     """
 
     softness: Mapping[str, float] = field(default_factory=dict)

@@ -24,8 +24,7 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--of",
         metavar="CAMPAIGN",
-        help="predict the rows of this campaign, measured in the same set-up (default: ten parts of CAMPAIGN, each from "
-        "the others)",
+        help="rows of this campaign, of the same set-up (default: ten parts of CAMPAIGN, each from the others)",
     )
 
 

@@ -28,7 +28,7 @@ def _chi_squares(squares: Array, numbers: int) -> Array:
     """Squares (m,) of vectors of so many numbers, scaled so that most of them are as chi-square says."""
     median = np.median(squares) / scipy.stats.chi2.median(numbers)
     upper = np.quantile(squares, UPPER) / scipy.stats.chi2.ppf(UPPER, numbers)
-    return squares / max(median, upper, 1e-300)
+    return np.asarray(squares / max(median, upper, 1e-300))
 
 
 def _outstanding(chi_square: Array, numbers: int, alpha: float) -> npt.NDArray[np.int64]:

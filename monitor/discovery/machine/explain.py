@@ -43,6 +43,8 @@ from monitor.records import Campaign
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
 MOST_ROUNDS = 6
+# Lines of joint curves that bad poses hid show once these are out; what they show again hides no more.
+MOST_CURVES = 3
 
 
 @dataclass(frozen=True)
@@ -120,14 +122,7 @@ def explain(
         first = fit(foreseen, certain.left_out(foreseen) if gross else None)
     surroundings = surroundings_of(campaign, foreseen)
     variants = _variants(campaign, foreseen, surroundings.drivers)
-    curves = joint_curves(first, variants, rate)
-    under_curves, begin = foreseen, first
-    if curves:
-        under_curves = with_effects(foreseen, [curve.effect for curve in curves])
-        begin = fit(under_curves, first.left_out if gross else None, first)
-    search = _search(
-        begin, under_curves, variants, surroundings.drivers, rate, certain, beside_curves=bool(curves)
-    )
+    curves, search = _search_with_curves(first, foreseen, variants, surroundings.drivers, rate, certain)
     suspects = search.suspects
     findings = search.scene, search.result, search.refined
     if curves:
@@ -157,27 +152,54 @@ def explain(
     )
 
 
+def _search_with_curves(
+    first: Fit,
+    problem: ChainProblem,
+    variants: Sequence[ChainVariant],
+    drivers: Sequence[str],
+    rate: float,
+    gross: Suspects,
+) -> tuple[tuple[ChainVariant, ...], _Search]:
+    """The curves of joints with several lines, and the search under them; once more without the bad poses that it named,
+    as long as these hide lines."""
+    curves = joint_curves(first, variants, rate)
+    if not curves:
+        return (), _search(first, problem, variants, drivers, rate, gross)
+    suspects = gross
+    for _ in range(MOST_CURVES):
+        under_curves = with_effects(problem, [curve.effect for curve in curves])
+        begin = fit(under_curves, suspects.left_out(problem), first)
+        search = _search(begin, under_curves, variants, drivers, rate, gross, suspects)
+        if search.suspects.same_as(suspects):
+            break
+        suspects = search.suspects
+        clean = fit(problem, suspects.left_out(problem), first)
+        before, curves = curves, joint_curves(clean, variants, rate) or curves
+        if curves == before:
+            break
+    return curves, search
+
+
 def _search(
     first: Fit,
     problem: ChainProblem,
     variants: Sequence[ChainVariant],
     drivers: Sequence[str],
     rate: float,
-    suspects: Suspects,
-    *,
-    beside_curves: bool = False,
+    gross: Suspects,
+    beside_curves: Suspects | None = None,
 ) -> _Search:
-    """Search effects and suspects in turn, each under the others and the ``suspects`` that ``first`` leaves out, until
-    nothing changes."""
-    gross = suspects
+    """Search effects and suspects in turn, each under the others and the ``gross`` readings that ``first`` leaves out,
+    until nothing changes; beside the curves of joints it leaves out the suspects so far."""
+    initial = suspects = gross if beside_curves is None else beside_curves
     correlation: Correlation | None = None
     unfitted: list[str] = []
     for _ in range(MOST_ROUNDS):
         out, single = suspects.left_out(problem), suspects.effects(problem)
-        current = first if suspects.same_as(gross) else fit(with_effects(problem, single), out, first)
+        current = first if suspects.same_as(initial) else fit(with_effects(problem, single), out, first)
         current = current.with_correlation(correlation)
         able = [variant for variant in variants if variant.family not in unfitted]
-        if beside_curves:
+        if beside_curves is not None:
             scene, result = search_beside_curves(current, able, rate)
         else:
             scene, result = search_chain(scene_of(current, able), drivers, rate)
@@ -197,7 +219,7 @@ def _search(
             continue
         # Readings are judged under the present effects, again from the start: what looked bad without them may be good.
         begin = under
-        if not suspects.same_as(gross):
+        if beside_curves is None and not suspects.same_as(gross):
             begin = fit(with_effects(problem, effects), gross.left_out(problem), current)
         more = find_suspects(begin, problem, effects, gross, able, scene if begin is current else None)
         if more.same_as(suspects):

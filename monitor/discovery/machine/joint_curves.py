@@ -110,7 +110,7 @@ class _Blocks:
 
 
 class Pursuit:
-    """The lines selected so far: an orthonormal basis of them and all that protects, and what it leaves of the residual.
+    """The lines selected so far: an orthonormal basis of them and all that protects, and what it leaves.
 
     Rows stand in the order of their blocks of poses; ``order`` (M,) says which whitened number each is.
     """
@@ -155,7 +155,7 @@ class Pursuit:
         padded = np.zeros(self.fit.solution.last.residual.size)
         padded[self.order] = self.residual
         rows = in_rows(self.fit, padded)
-        return np.bincount(self.pose, weights=np.sum(joint.way * rows, axis=1))
+        return np.asarray(np.bincount(self.pose, weights=np.sum(joint.way * rows, axis=1)), dtype=float)
 
     def p_value(self, new: Array) -> float:
         """The p-value of new columns, every pose counted as one observation."""
@@ -325,8 +325,8 @@ def _with_tables(
     lines: dict[int, list[float]],
     curves: dict[int, str],
 ) -> dict[int, str]:
-    """The curves with a table over the travel instead of lines, for joints where blocks left out prefer it; ``whole`` has
-    the lines and the low orders of all joints."""
+    """The curves with a table over the travel instead of lines, for joints where blocks left out prefer it; ``whole``
+    has the lines and the low orders of all joints."""
     curves, fit = dict(curves), whole.fit
     poses = len(joints[0].position)
     counts = [count for count in NODES if POSES_A_NODE * count <= poses]

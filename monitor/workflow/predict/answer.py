@@ -22,8 +22,8 @@ class PredictedRow:
 class PredictAnswer:
     """A model fitted to ``campaign`` against rows of the campaign ``of`` that took no part in the fit.
 
-    ``rms_um`` is that of targets that the machine moves, ``resting_rms_um`` that of those beside it (None where there are
-    none), ``fitted_rms_um`` that of the rows of the fit. ``blocks`` is the number of parts that were left out in turn, 1
+    ``rms_um`` is that of targets that the machine moves, ``resting_rms_um`` that of those beside it (None without
+    any), ``fitted_rms_um`` that of the rows of the fit. ``blocks`` parts were left out in turn, 1
     where the rows are another campaign's; ``components`` names the numbers of a row.
     """
 

@@ -1,4 +1,4 @@
-"""A model against rows that took no part in its fit: those of another campaign, or parts of its own left out in turn."""
+"""A model against rows that took no part in its fit: of another campaign, or parts of its own left out in turn."""
 
 from __future__ import annotations
 
