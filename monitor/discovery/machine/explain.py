@@ -160,8 +160,8 @@ def _search_with_curves(
     rate: float,
     gross: Suspects,
 ) -> tuple[tuple[ChainVariant, ...], _Search]:
-    """The curves of joints with several lines, and the search under them; once more without the bad poses that it named,
-    as long as these hide lines."""
+    """The curves of joints with several lines, and the search under them; once more without the bad poses that it
+    named, as long as these hide lines."""
     curves = joint_curves(first, variants, rate)
     if not curves:
         return (), _search(first, problem, variants, drivers, rate, gross)

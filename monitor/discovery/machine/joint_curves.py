@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -121,7 +122,7 @@ class Pursuit:
         blocks = pose_blocks(fit)
         self.order = np.argsort(blocks, kind="stable")[int(np.sum(blocks < 0)) :]
         edges = np.searchsorted(blocks[self.order], np.arange(int(blocks.max()) + 2))
-        self.rows = [slice(first, last) for first, last in zip(edges, edges[1:], strict=False)]
+        self.rows = [slice(first, last) for first, last in pairwise(edges)]
         self.numbered = of_numbers(fit, pose)[self.order]
         self.whole = fit.white.reshape(-1)[self.order]
         self.square = float(self.whole @ self.whole)
