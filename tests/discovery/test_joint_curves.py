@@ -1,10 +1,9 @@
-"""Joint curves of many lines, as measured robots have them, against a simulator that shares no code with the product."""
+"""Joint curves of many lines, as measured robots have them, against a simulator of its own."""
 
 from __future__ import annotations
 
 import importlib
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -127,7 +126,7 @@ def test_blocks_left_out_against_fits_of_all_columns(plain):
 
 def test_rows_of_a_lost_beam_are_refused_with_their_lines(robots, session, tmp_path):
     lost = robots.lose_beam(session, [7, 9])
-    with pytest.raises(CampaignError, match="line 9.*lost the beam(.|\n)*line 11.*leave the row out"):
+    with pytest.raises(CampaignError, match=r"line 9.*lost the beam(.|\n)*line 11.*leave the row out"):
         read_campaign(robots.write_session(tmp_path / "lost", lost))
 
 

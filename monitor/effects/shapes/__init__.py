@@ -41,8 +41,9 @@ def parse_shape(text: str) -> Shape:
     shape: Shape | None = parse(text, __name__, plug_ins("monitor.shapes"))
     if shape is None:
         raise EffectError(
-            f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic9999, harmonics(1,2,121) "
-            "(several at once), cyclic20mm (any pitch), reversal, lag, compliance, table (or table9 for nine nodes, up to table99; table(-100,0,100) for "
+            f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic9999, "
+            "harmonics(1,2,121) (several at once), cyclic20mm (any pitch), reversal, lag, compliance, table (or table9 "
+            "for nine nodes, up to table99; table(-100,0,100) for "
             f"your own nodes) and formula(...){plug_in_patterns('monitor.shapes')}"
         )
     return shape

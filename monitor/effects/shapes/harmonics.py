@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar, Self
 
 import numpy as np
@@ -82,7 +83,7 @@ def parse_orders(text: str) -> tuple[float, ...]:
     if (
         not orders
         or not all(0.0 < order <= HIGHEST for order in orders)
-        or any(first >= second for first, second in zip(orders, orders[1:], strict=False))
+        or any(first >= second for first, second in pairwise(orders))
     ):
         raise EffectError(
             f"the orders of harmonics({text}) must be periods a turn, above 0 and rising, for example "

@@ -63,8 +63,8 @@ def beside(campaign: Campaign, other: Campaign) -> tuple[Campaign, npt.NDArray[n
     for each in (campaign, other):
         if len(each.runs) != 1:
             raise DataError(
-                f"{each.name} has {len(each.runs)} runs, each with a set-up of its own; rows of another campaign can be "
-                "predicted from a single run only (leave --of out to predict parts of the runs from each other)"
+                f"{each.name} has {len(each.runs)} runs, each with a set-up of its own; rows of another campaign can "
+                "be predicted from a single run only (leave --of out to predict parts of the runs from each other)"
             )
     own, more = campaign.probings, other.probings
     if (campaign.machine.id, campaign.method) != (other.machine.id, other.method):
