@@ -44,7 +44,7 @@ from monitor.records import Campaign
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
 MOST_ROUNDS = 6
 # Lines of joint curves that bad poses hid show once these are out; what they show again hides no more.
-MOST_CURVES = 3
+MOST_CURVES = 4
 
 
 @dataclass(frozen=True)
@@ -174,9 +174,7 @@ def _search_with_curves(
             break
         suspects = search.suspects
         clean = fit(problem, suspects.left_out(problem), first)
-        before, curves = curves, joint_curves(clean, variants, rate) or curves
-        if curves == before:
-            break
+        curves = joint_curves(clean, variants, rate) or curves
     return curves, search
 
 
@@ -222,9 +220,10 @@ def _search(
         if beside_curves is None and not suspects.same_as(gross):
             begin = fit(with_effects(problem, effects), gross.left_out(problem), current)
         more = find_suspects(begin, problem, effects, gross, able, scene if begin is current else None)
-        if more.same_as(suspects):
+        settled, suspects = more.same_as(suspects), more
+        if settled or beside_curves is not None:
+            # Beside curves these are pursued anew first: bad poses hide lines.
             break
-        suspects = more
     return _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted)))
 
 
