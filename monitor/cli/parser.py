@@ -29,6 +29,7 @@ VERBS = {
     "uncertainty": "results after JCGM 102, stored",
     "compare": "model against measurement: where it fails",
     "explain": "which physical effect is missing",
+    "predict": "what a fitted model says of rows that took no part in its fit",
     "model": "models and their versions: list, show, add, remove, history",
     "effects": "the catalogue of effects, searchable",
     "map": "volumetric error over the stroke with its uncertainty; compensation tables",

@@ -76,6 +76,7 @@ QUESTIONS = {
         "models": "model.show:list_all_models",
         "plan": "plan.plan:plan",
         "poses": "kinematics:poses",
+        "predict": "predict.predict:predict",
         "readings": "query:readings",
         "remake certificate": "certificate.remaking:remake",
         "remove effect": "model.change:remove_effect",

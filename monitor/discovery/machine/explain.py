@@ -18,14 +18,17 @@ from monitor.discovery.machine.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.compare import ChainComparison, compare
 from monitor.discovery.machine.correlation import Correlation, caution
 from monitor.discovery.machine.cures import Mistake
+from monitor.discovery.machine.curve_findings import with_curves
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
+from monitor.discovery.machine.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.poses import poses_of_rows
 from monitor.discovery.machine.refine import Refined, refine_all
+from monitor.discovery.machine.robot_search import search_beside_curves
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
 from monitor.discovery.machine.steps import Step, find_steps
-from monitor.discovery.machine.surroundings import surroundings_of
+from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
 from monitor.discovery.machine.suspects import MOST_BAD_POINTS, Suspects, find_suspects, with_effects
 from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.machine.variants import (
@@ -43,6 +46,8 @@ from monitor.records import Campaign
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
 MOST_ROUNDS = 4
+# Lines of joint curves that bad poses hid show once these are out; what they show again hides no more.
+MOST_CURVES = 4
 
 
 class Limit(StrEnum):
@@ -143,15 +148,9 @@ def explain(
         first = fit(foreseen, certain.left_out(foreseen) if gross else None)
     surroundings = surroundings_of(campaign, foreseen)
     variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
-    search = _search(first, foreseen, variants, surroundings.drivers, rate, certain)
+    curves, search = _search_with_curves(first, foreseen, variants, surroundings.drivers, rate, certain)
     suspects = search.suspects
-    missing = missing_effects(search.scene, search.result, search.refined, surroundings)
-    if missing:
-        rules = ChainAcceptance(search.scene, surroundings.drivers, rate)
-        within = rules.within_shapes([finding.candidate for finding in search.refined])
-        missing = tuple(
-            replace(effect, within_its_shape=names) for effect, names in zip(missing, within, strict=True)
-        )
+    missing = _missing(first, foreseen, curves, search, surroundings, certain, rate)
     if suspects.varying:
         effects = [*suspects.move_effects(foreseen), *search.effects]
         steady, _ = fit_those_possible(foreseen, effects, search.under.left_out, first)
@@ -176,26 +175,82 @@ def explain(
     )
 
 
+def _missing(
+    first: Fit,
+    problem: ChainProblem,
+    curves: Sequence[ChainVariant],
+    search: _Search,
+    surroundings: Surroundings,
+    certain: Suspects,
+    rate: float,
+) -> tuple[ChainMissing, ...]:
+    """What is reported as missing: the effects of a search, the curves of joints before them."""
+    if curves:
+        suspects = search.suspects
+        base = first if suspects.same_as(certain) else fit(problem, suspects.left_out(problem), first)
+        return missing_effects(
+            *with_curves(base, curves, search.scene, search.result, search.refined), surroundings
+        )
+    missing = missing_effects(search.scene, search.result, search.refined, surroundings)
+    if missing:
+        rules = ChainAcceptance(search.scene, surroundings.drivers, rate)
+        within = rules.within_shapes([finding.candidate for finding in search.refined])
+        missing = tuple(
+            replace(effect, within_its_shape=names) for effect, names in zip(missing, within, strict=True)
+        )
+    return missing
+
+
+def _search_with_curves(
+    first: Fit,
+    problem: ChainProblem,
+    variants: Sequence[ChainVariant],
+    drivers: Sequence[str],
+    rate: float,
+    gross: Suspects,
+) -> tuple[tuple[ChainVariant, ...], _Search]:
+    """The curves of joints with several lines, and the search under them; once more without the bad poses that it
+    named, as long as these hide lines."""
+    curves = joint_curves(first, variants, rate)
+    if not curves:
+        return (), _search(first, problem, variants, drivers, rate, gross)
+    suspects = gross
+    for _ in range(MOST_CURVES):
+        under_curves = with_effects(problem, [curve.effect for curve in curves])
+        begin = fit(under_curves, suspects.left_out(problem), first)
+        search = _search(begin, under_curves, variants, drivers, rate, gross, suspects)
+        if search.suspects.same_as(suspects):
+            break
+        suspects = search.suspects
+        clean = fit(problem, suspects.left_out(problem), first)
+        curves = joint_curves(clean, variants, rate) or curves
+    return curves, search
+
+
 def _search(
     first: Fit,
     problem: ChainProblem,
     variants: Sequence[ChainVariant],
     drivers: Sequence[str],
     rate: float,
-    suspects: Suspects,
+    gross: Suspects,
+    beside_curves: Suspects | None = None,
 ) -> _Search:
-    """Search effects and suspects in turn, each under the others and the ``suspects`` that ``first`` leaves out, until
-    nothing changes."""
-    gross = suspects
+    """Search effects and suspects in turn, each under the others and the ``gross`` readings that ``first`` leaves out,
+    until nothing changes; beside the curves of joints it leaves out the suspects so far."""
+    initial = suspects = gross if beside_curves is None else beside_curves
     noise = _Noise()
     earlier: list[Suspects] = []
     unfitted: list[str] = []
     for _ in range(MOST_ROUNDS):
         out, single = suspects.left_out(problem), suspects.effects(problem)
-        current = first if suspects.same_as(gross) else fit(with_effects(problem, single), out, first)
+        current = first if suspects.same_as(initial) else fit(with_effects(problem, single), out, first)
         current = current.with_correlation(noise.correlation)
         able = [variant for variant in variants if variant.family not in unfitted]
-        scene, result = search_chain(scene_of(current, able), drivers, rate)
+        if beside_curves is not None:
+            scene, result = search_beside_curves(current, able, rate)
+        else:
+            scene, result = search_chain(scene_of(current, able), drivers, rate)
         refined = refine_all(scene, result.candidates)
         under, unable = fit_those_possible(
             current.problem, [finding.candidate.effect for finding in refined], out, current
@@ -214,10 +269,13 @@ def _search(
             continue
         # Readings are judged under the present effects, again from the start: what looked bad without them may be good.
         begin = search.under
-        if not suspects.same_as(gross):
+        if beside_curves is None and not suspects.same_as(gross):
             begin, _ = fit_those_possible(problem, search.effects, gross.left_out(problem), current)
         same_scene = search.scene if begin is search.scene.fit else None
         more = find_suspects(begin, problem, search.effects, gross, able, same_scene)
+        if beside_curves is not None:
+            # The curves are pursued anew first: bad poses hide lines.
+            return replace(search, suspects=more)
         earlier.append(suspects)
         # Suspects that had their turn come again in a circle: what was found under the last ones stands.
         if any(more.same_as(before) for before in earlier):

@@ -28,7 +28,7 @@ FEWEST_POSITIONS = 100
 MOST_PEAKS = 3
 
 
-def _rows(fit: Fit, padded: Array) -> Array:
+def in_rows(fit: Fit, padded: Array) -> Array:
     """Rows (n, d) of numbers that stand run by run (M,)."""
     problem = fit.problem
     count, numbers = problem.sigma.shape
@@ -54,7 +54,7 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     beside = scene.remainders.beside(selected)
     residual = beside.residual
     variance = float(residual @ residual) / max(beside.degrees_of_freedom, 1)
-    rows = _rows(fit, residual)
+    rows = in_rows(fit, residual)
     orders = np.arange(LOWEST, HIGHEST + STEP / 2.0, STEP)
     limit = -2.0 * np.log(rate / (len(orders) * len(joints)))
     variants = []

@@ -156,6 +156,8 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     if searched.unit == "min" and 60.0 * value < SETTLED_READINGS * _between_readings(scene):
         # It has settled before the second reading: the plain effect.
         return Refined(at_rest(scene, candidate), None, np.zeros((len(scene.residual), 0)))
+    if searched.unit == "min" and _counts_readings(scene):
+        return Refined(refined, None, slope)
     return Refined(refined, Searched(searched.name, value, u if u < value else None, searched.unit), slope)
 
 
@@ -209,6 +211,13 @@ def _between_readings(scene: ChainScene) -> float:
     context = scene.fit.problem.context
     steps = np.diff(context.time)[np.diff(context.run) == 0]
     return float(np.median(steps)) if len(steps) else 0.0
+
+
+def _counts_readings(scene: ChainScene) -> bool:
+    """Whether the column of times is no time but the number of the row: no constant in minutes comes from it."""
+    context = scene.fit.problem.context
+    steps = np.diff(context.time)[np.diff(context.run) == 0]
+    return bool(len(steps) and np.all(steps == 1.0))
 
 
 def _uncertainty(scene: ChainScene, candidate: ChainCandidate, slope: Array, others: Array) -> float:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from monitor.discovery.machine.acceptance import ChainAcceptance
 from monitor.discovery.machine.gears import gear_variants
+from monitor.discovery.machine.joint_curves import all_curves_were_searched
 from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.tables import ChainScan, with_tables
@@ -34,7 +35,8 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
         variants = gear_variants(scene, result.candidates, rate)
         new = [variant for variant in variants if variant.effect.text not in gears]
         if not new or len(gears) > MOST_GEARS:
-            scene, result = with_tables(scene, result, scanned)
+            if not all_curves_were_searched(scene.fit):
+                scene, result = with_tables(scene, result, scanned)
             scene, result = with_unknown_shapes(scene, standing_out(scene, result))
             return scene, by_error_taken_away(scene, standing_out(scene, result))
         gears |= {variant.effect.text for variant in new}
