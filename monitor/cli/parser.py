@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from monitor import __version__
-from monitor.cli.database import check_path
+from monitor.cli.database import PATIENCE_S, check_path, seconds_to_wait
 
 #: Verb: what it does in a few words. The file of the same name in ``monitor.cli.verbs`` has the rest.
 VERBS = {
@@ -68,6 +68,10 @@ def common(parser: argparse.ArgumentParser, *, database: bool = True) -> None:
     """Add the options that every verb has."""
     if database:
         parser.add_argument("--db", metavar="PATH", default=argparse.SUPPRESS, help="the database file")
+        parser.add_argument(
+            "--wait", metavar="SECONDS", default=argparse.SUPPRESS,
+            help=f"how long to wait for another process that has the database (default {PATIENCE_S:g})",
+        )  # fmt: skip
     parser.add_argument(
         "--json", action="store_true", help="one JSON document on standard output, nothing else"
     )
@@ -102,6 +106,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         default=default,
         help=f"the database file (else $MONITOR_DB, else {DEFAULT_DATABASE})",
     )
+    first.add_argument(
+        "--wait",
+        metavar="SECONDS",
+        default=os.environ.get("MONITOR_WAIT") or f"{PATIENCE_S:g}",
+        help=f"how long to wait for another process that has the database (else $MONITOR_WAIT, else {PATIENCE_S:g})",
+    )
     first.add_argument("--version", action="version", version=f"monitor {__version__}")
     first.add_argument("verb", nargs="?", metavar="VERB", help=argparse.SUPPRESS)
     first.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
@@ -112,7 +122,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     if head.verb not in VERBS:
         first.error(f"there is no verb '{head.verb}'; there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
-    database = argparse.Namespace(db=head.db)
+    database = argparse.Namespace(db=head.db, wait=head.wait)
     try:
         # People write options before, between and behind the other words.
         options = parser.parse_intermixed_args(head.rest, database)
@@ -121,6 +131,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         options = parser.parse_args(head.rest, database)
     if not hasattr(options, "run"):
         options.run = run
+    options.wait = seconds_to_wait(options.wait)
     check_path(options.db, may_be_new=head.verb in WITHOUT_DATABASE)
     return options
 

@@ -77,12 +77,15 @@ from monitor.store.models import (
     list_models,
     load_model,
     model_history,
+    next_version,
     save_model,
 )
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
+from monitor.store.sharing import SharedDatabase
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
+from monitor.store.turns import Holder, Patience
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
@@ -94,14 +97,17 @@ __all__ = [
     "CampaignRow",
     "Database",
     "FleetSums",
+    "Holder",
     "Imported",
     "MachineDescription",
     "MachineEvent",
     "MachineHistory",
     "MachineModel",
+    "Patience",
     "QueryResult",
     "RecordedRun",
     "RunRow",
+    "SharedDatabase",
     "StoredAnalysis",
     "StoredCertificate",
     "StoredEvent",
@@ -167,6 +173,7 @@ __all__ = [
     "machines_of_method",
     "mark_certificate",
     "model_history",
+    "next_version",
     "not_identified",
     "probing_counts",
     "record_event",

@@ -30,7 +30,8 @@ class VerifyAnswer:
 
 def verify(db: Database) -> VerifyAnswer:
     """Hash everything that is stored anew and compare it with the audit."""
-    verification = verify_audit(db)
+    with db.reading():
+        verification = verify_audit(db)
     return VerifyAnswer(verification.ok, verification.entries, verification.last_sha256, verification.faults)
 
 
@@ -76,7 +77,8 @@ class BackupAnswer:
 
 def backup(db: Database, request: BackupRequest) -> BackupAnswer:
     """Copy everything into a second file. Raises StoreError where it exists or cannot be written."""
-    copy = take_backup(db, request.target)
+    with db.reading():
+        copy = take_backup(db, request.target)
     rows = sum(count for count, _ in copy.tables.values())
     return BackupAnswer(
         file=request.target,
@@ -127,4 +129,5 @@ class ExportAnswer:
 
 def export(db: Database, request: ExportRequest) -> ExportAnswer:
     """Write all tables as files. Raises InputError for a folder that is not empty, StoreError."""
-    return ExportAnswer(export_tables(db, request.folder, request.format))
+    with db.reading():
+        return ExportAnswer(export_tables(db, request.folder, request.format))
