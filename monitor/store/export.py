@@ -2,11 +2,14 @@
 
 A folder with a file for every table and view, ``columns.csv`` with the meaning and unit of every column, and
 the imported files, byte for byte, under ``source_files/NUMBER OF THE CAMPAIGN/``. In CSV the maps and lists
-are text, and bytes are left out; Parquet has everything.
+are text, bytes are left out, and text that a spreadsheet would run as a formula begins with an apostrophe; Parquet
+has everything as it is. The folder gets its name when it is whole.
 """
 
 from __future__ import annotations
 
+import contextlib
+import shutil
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +18,8 @@ import duckdb
 from monitor.exceptions import InputError, StoreError
 from monitor.store.connection import Database
 
+#: Texts that spreadsheets run as formulas (OWASP, CSV injection).
+_FORMULA = r"^[=+\-@\t\r]"
 _OPTIONS = {"csv": "FORMAT csv, HEADER", "parquet": "FORMAT parquet, COMPRESSION zstd"}
 
 
@@ -30,14 +35,31 @@ def export_tables(
     folder = Path(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} is not an empty folder; name a new one")
+    partial = folder.with_name(folder.name + ".partial")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        written = [_copy(db, name, folder, form) for name in _names(db)]
-        written.append(_columns(db, folder))
-        written += _source_files(db, folder)
-    except (OSError, duckdb.IOException) as fault:
+        _remove(partial)
+        partial.mkdir(parents=True, mode=0o700)
+        (partial / _MARK).touch()
+        written = [_copy(db, name, partial, form) for name in _names(db)]
+        written.append(_columns(db, partial))
+        written += _source_files(db, partial)
+        (partial / _MARK).unlink()
+        partial.replace(folder)
+    except (OSError, StoreError, duckdb.IOException) as fault:
+        with contextlib.suppress(OSError):
+            _remove(partial)
         raise StoreError(f"the export to {folder} could not be written: {fault}") from fault
-    return tuple(written)
+    return tuple(folder / file.relative_to(partial) for file in written)
+
+
+def _remove(partial: Path) -> None:
+    """Remove what an export left that was killed; nothing that is not marked as such."""
+    if (partial / _MARK).is_file() and not partial.is_symlink():
+        shutil.rmtree(partial)
+
+
+#: In a folder that is not whole yet.
+_MARK = ".unfinished-export"
 
 
 def _names(db: Database) -> list[str]:
@@ -60,13 +82,22 @@ def _copy(db: Database, name: str, folder: Path, form: str) -> Path:
     ):
         if form == "csv" and kind == "BLOB":
             continue
-        columns.append(
-            f'to_json("{column}") AS "{column}"' if form == "csv" and "MAP" in kind else f'"{column}"'
-        )
+        columns.append(_column(column, kind) if form == "csv" else f'"{column}"')
     # The names come from the catalogue; the path is the only text of the user's.
     literal = str(path).replace("'", "''")
     db.execute(f"COPY (SELECT {', '.join(columns)} FROM \"{name}\") TO '{literal}' ({_OPTIONS[form]})")
     return path
+
+
+def _column(column: str, kind: str) -> str:
+    """A column as CSV has it: maps as JSON, and no text that a spreadsheet takes for a formula."""
+    if "MAP" in kind:
+        return f'to_json("{column}") AS "{column}"'
+    if kind == "VARCHAR":
+        quote = "''''"  # one apostrophe, as SQL writes it
+        is_formula = f"regexp_matches(\"{column}\", '{_FORMULA}')"
+        return f'CASE WHEN {is_formula} THEN {quote} || "{column}" ELSE "{column}" END AS "{column}"'
+    return f'"{column}"'
 
 
 def _columns(db: Database, folder: Path) -> Path:

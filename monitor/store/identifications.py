@@ -13,6 +13,7 @@ import numpy as np
 from monitor import __version__
 from monitor.exceptions import NotFoundError
 from monitor.store import audit, identified_values
+from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.results import (
@@ -58,9 +59,10 @@ def save_identification(db: Database, identification: StoredIdentification) -> i
         _insert_values(db, number, identification)
         identified_values.insert_values(db, number, identification)
         _insert_residuals(db, number, identification.runs)
-        audit.record(
-            db, "save", "identification", str(number), identification_content(number, identification)
+        content = with_bookkeeping(
+            db, "identification", number, identification_content(number, identification)
         )
+        audit.record(db, "save", "identification", str(number), content)
     return number
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from monitor import __version__
 from monitor.exceptions import InputError, NotFoundError
 from monitor.store import audit
+from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.connection import Database, utc_now
 
 if TYPE_CHECKING:
@@ -101,7 +102,8 @@ def save_model(
                 model.created_at,
             ],
         )
-        audit.record(db, "save", "model", model_key(name, model.version), model_content(model))
+        key = model_key(name, model.version)
+        audit.record(db, "save", "model", key, with_bookkeeping(db, "model", key, model_content(model)))
     return model
 
 

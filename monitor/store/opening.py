@@ -51,7 +51,10 @@ def connect(
             if holder is not None:
                 continue
         try:
-            return duckdb.connect(path, read_only=read_only, config=config)
+            connection = duckdb.connect(path, read_only=read_only, config=config)
+            # Written where a process looks interactive to DuckDB: between the lines of a JSON document.
+            connection.execute("SET enable_progress_bar = false")
+            return connection
         except (duckdb.Error, ValueError) as fault:
             holder = holder_in(str(fault))
             if holder is None:

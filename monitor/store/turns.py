@@ -30,6 +30,9 @@ _FIRST_PAUSE_S, _LONGEST_PAUSE_S, _PAUSE_GROWS = 0.004, 0.05, 1.3
 #: A wait that lasts so long is reported, in s.
 _REPORTED_S = 2.0
 
+#: Letters of the number in the file, which is written over and never shorter.
+_PID_WIDTH = 20
+
 _HOLDER = re.compile(r"Conflicting lock is held in (.*?) ?\(PID (\d+)\)")
 
 
@@ -94,8 +97,7 @@ def turn_to_write(path: str, patience: Patience) -> Iterator[Holder | None]:
         for _ in patience.tries(lambda: _last_writer(file)):
             if _locked(file, fcntl.LOCK_EX):
                 with contextlib.suppress(OSError):
-                    os.ftruncate(file, 0)
-                    os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
+                    os.pwrite(file, f"{os.getpid():<{_PID_WIDTH}}\n".encode(), 0)
                 yield None
                 return
         yield _last_writer(file)
@@ -160,7 +162,7 @@ def _locked(file: int, way: int) -> bool:
 
 def _last_writer(file: int) -> Holder:
     with contextlib.suppress(OSError, ValueError):
-        pid = int(os.pread(file, 32, 0).split()[0])
+        pid = int(os.pread(file, _PID_WIDTH, 0))
         return Holder(pid, _activity(pid))
     return Holder(None, "")
 

@@ -13,6 +13,7 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
+from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.record import NotApplicable, Party, Person
 from monitor.reporting.texts import languages
@@ -93,7 +94,7 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
     """The answers in a TOML file. Raises InputError, with all faults, where it cannot be read as such."""
     file = Path(path)
     try:
-        text = file.read_bytes().decode("utf-8-sig")
+        text = read_bounded(file, LARGEST_SETTINGS).decode("utf-8-sig")
         tables = tomllib.loads(text)
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error

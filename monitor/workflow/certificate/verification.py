@@ -8,6 +8,7 @@ from datetime import UTC
 
 import numpy as np
 
+from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.signature.signature import SignatureFinding, check_signature, is_signed
 from monitor.store import Database, StoredCertificate, find_certificate, load_certificate, verify_audit
@@ -27,7 +28,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
     """
     file = request.file
     try:
-        content = file.read_bytes()
+        content = read_bounded(file, LARGEST_DOCUMENT)
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
     number = find_certificate(db, hashlib.sha256(content).hexdigest())
