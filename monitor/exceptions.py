@@ -38,6 +38,10 @@ class TakenNumberError(InputError):
     """The number of a certificate that another one has by now."""
 
 
+class UnfinishedLogError(StoreError):
+    """A log beside the database that only somebody who may write can bring into it."""
+
+
 class BusyError(StoreError):
     """The database is in use by another process, for longer than one would wait."""
 

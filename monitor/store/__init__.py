@@ -16,7 +16,7 @@ from monitor.store.analyses import (
     save_analysis,
     stored_analyses,
 )
-from monitor.store.audit import AuditEntry, last_entries
+from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_entries
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
@@ -45,6 +45,7 @@ from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
 from monitor.store.identifications import (
     identification_by_number,
+    identification_numbers,
     list_identifications,
     list_parameters,
     load_identification,
@@ -120,11 +121,13 @@ __all__ = [
     "Withdrawal",
     "WithdrawnCampaign",
     "analysis_text",
+    "anchored_entry",
     "campaign_machines",
     "campaign_notes",
     "campaign_readings",
     "campaign_tolerances",
     "certificate_numbers",
+    "chain_faults",
     "check_analysis",
     "check_campaigns",
     "clear_refusals",
@@ -137,6 +140,7 @@ __all__ = [
     "fleet_sums",
     "followed_by",
     "identification_by_number",
+    "identification_numbers",
     "identified_runs",
     "import_campaign",
     "import_curve",

@@ -194,11 +194,9 @@ class Database:
                     connection.commit()
                 except BaseException as fault:
                     _roll_back(connection)
-                    # A disk that is full when the transaction ends is reported as a fault of the transaction.
-                    full = isinstance(fault, duckdb.TransactionException) and "Could not write file" in str(
-                        fault
-                    )
-                    if full or isinstance(fault, duckdb.IOException | duckdb.OutOfMemoryException):
+                    # A full disk or a folder that is not writable shows at the end, as a fault of the transaction.
+                    at_end = isinstance(fault, duckdb.TransactionException) and "commit" in str(fault)
+                    if at_end or isinstance(fault, duckdb.IOException | duckdb.OutOfMemoryException):
                         raise StoreError(
                             f"{self.path} could not be written, nothing was kept: {fault}"
                         ) from fault

@@ -144,6 +144,18 @@ def list_parameters(
     )
 
 
+def identification_numbers(db: Database, software_version: str) -> list[int]:
+    """Return the numbers of the identifications that a version made of campaigns that count."""
+    return [
+        int(number)
+        for (number,) in db.rows(
+            "SELECT identification_id FROM identification AS i JOIN campaign USING (campaign_id) "
+            "WHERE i.software_version = ? ORDER BY ALL",
+            [software_version],
+        )
+    ]
+
+
 def stored_identification_content(db: Database, number: int) -> str:
     """The content hash computed anew from what is stored; "" where the parameters stored beside it contradict it."""
     identification = identification_by_number(db, number)

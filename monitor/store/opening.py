@@ -9,7 +9,7 @@ from pathlib import Path
 
 import duckdb
 
-from monitor.exceptions import BusyError, StoreError
+from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
 from monitor.store import migrations
 from monitor.store.turns import Holder, Patience, holder_in, turn_to_write, writer_at_work
 
@@ -58,6 +58,8 @@ def connect(
         except (duckdb.Error, ValueError) as fault:
             holder = holder_in(str(fault))
             if holder is None:
+                if read_only and "replaying WAL" in str(fault):
+                    raise UnfinishedLogError(_in_words(path, read_only, str(fault))) from fault
                 raise StoreError(_in_words(path, read_only, str(fault))) from fault
     raise busy(path, holder, patience)
 
@@ -166,5 +168,7 @@ def _in_words(path: str, read_only: bool, message: str) -> str:
 
 
 def damaged(path: str, message: str) -> str:
-    """Return the sentence about a file that DuckDB cannot read."""
+    """Return the sentence about a file that DuckDB cannot read, or not write."""
+    if "Could not write" in message or "No space left" in message:
+        return f"{path} could not be written, nothing was kept: {message.splitlines()[0]}"
     return f"{path} cannot be read, it may be damaged: {message.splitlines()[0]}; restore a backup: `monitor restore`"

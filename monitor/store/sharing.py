@@ -19,7 +19,7 @@ from pathlib import Path
 
 import duckdb
 
-from monitor.exceptions import BusyError, StoreError
+from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
 from monitor.store import migrations
 from monitor.store.connection import Database
 from monitor.store.opening import busy, connect, is_missing
@@ -111,7 +111,14 @@ class SharedDatabase(Database):
     def _open_to_read(self) -> None:
         if self.path == ":memory:" or (is_missing(self.path) and not self.read_only):
             raise StoreError(f"the database {self.path} is no longer there")
-        connection = connect(self.path, True, self._threads, self._waiting)
+        try:
+            connection = connect(self.path, True, self._threads, self._waiting)
+        except UnfinishedLogError:
+            # A process died, or found the disk full, in a checkpoint: whoever may write finishes it.
+            if self.read_only:
+                raise
+            self._open_to_write()
+            return
         try:
             waiting = migrations.pending(connection, self._available)
         except StoreError as fault:
