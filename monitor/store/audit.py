@@ -18,6 +18,8 @@ from monitor.store.connection import Database, utc_now
 
 #: What stands in the first entry for the hash of the entry before.
 NO_ENTRY_BEFORE = "0" * 64
+#: How far from its place an entry is looked for that was put elsewhere.
+_NEAR = 500
 
 _COLUMNS = (
     "entry, made_at, actor, action, subject, key, content_sha256, software_version, "
@@ -75,9 +77,10 @@ def chain_faults(db: Database) -> tuple[str, ...]:
             missing = f"{before + 1}" if entry == before + 2 else f"{before + 1} to {entry - 1}"
             faults.append(f"audit entry {missing} is missing: it was removed, or given another number")
         if digest(*values) != entry_sha256:
-            written_as = entry_of.get(follows, 0) + 1
-            moved = written_as != entry and digest(written_as, *values[1:]) == entry_sha256
-            how = f"it was written as entry {written_as}, and put elsewhere" if moved else "it was edited"
+            number = _number_before(values, entry_sha256)
+            how = (
+                "it was edited" if number is None else f"it was written as entry {number}, and put elsewhere"
+            )
             faults.append(f"audit entry {entry} was altered: {how}")
         elif follows != previous and entry == before + 1:
             place = f"entry {entry_of[follows]}" if follows in entry_of else "one that is gone"
@@ -86,6 +89,12 @@ def chain_faults(db: Database) -> tuple[str, ...]:
             )
         previous, before = entry_sha256, entry
     return tuple(faults)
+
+
+def _number_before(values: list[Any], entry_sha256: str) -> int | None:
+    """The number with which an entry fits its hash, among the next ones; None where it has none."""
+    near = range(max(1, values[0] - _NEAR), values[0] + _NEAR)
+    return next((number for number in near if digest(number, *values[1:]) == entry_sha256), None)
 
 
 def anchored_entry(db: Database, anchor: str) -> AuditEntry | None:

@@ -57,6 +57,8 @@ def connect(
             return connection
         except (duckdb.Error, ValueError) as fault:
             holder = holder_in(str(fault))
+            if patience.seconds > 0 and "different configuration" in str(fault):
+                holder = Holder(os.getpid(), "another part of this process")
             if holder is None:
                 if read_only and "replaying WAL" in str(fault):
                     raise UnfinishedLogError(_in_words(path, read_only, str(fault))) from fault

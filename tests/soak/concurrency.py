@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import random
 import shutil
 import sys
 import tempfile
@@ -43,6 +44,15 @@ class Tally:
     longest_question_s: float
 
 
+@dataclass(frozen=True)
+class Load:
+    """How long each works in s, at least how often it asks, and how long it pauses on average in between, in s."""
+
+    seconds: float
+    least: int
+    pause_s: float
+
+
 def _folder(example: Path, folder: Path, name: str) -> Path:
     shutil.copytree(example, folder)
     path = folder / "campaign.toml"
@@ -51,12 +61,14 @@ def _folder(example: Path, folder: Path, name: str) -> Path:
     return folder
 
 
-def work(kind: str, number: int, database: Path, example: Path, seconds: float, least: int) -> Tally:
+def work(kind: str, number: int, database: Path, example: Path, load: Load) -> Tally:
     """Import, or ask, again and again with the database opened anew each time."""
     tally = Tally(kind, 0, [], [], 0.0, 0.0)
-    end = time.monotonic() + seconds
+    pauses = random.Random(f"{kind} {number}")
+    time.sleep(pauses.uniform(0.0, load.pause_s))
+    end = time.monotonic() + load.seconds
     with tempfile.TemporaryDirectory() as room:
-        while time.monotonic() < end or tally.answered < least:
+        while time.monotonic() < end or tally.answered < load.least:
             patience = Patience(PATIENCE_S, _nothing)
             begin = time.monotonic()
             try:
@@ -75,6 +87,7 @@ def work(kind: str, number: int, database: Path, example: Path, seconds: float, 
             tally.answered += 1
             tally.longest_wait_s = max(tally.longest_wait_s, patience.longest_s)
             tally.longest_question_s = max(tally.longest_question_s, time.monotonic() - begin)
+            time.sleep(pauses.uniform(0.0, 2 * load.pause_s))
     return tally
 
 
@@ -94,16 +107,20 @@ def _ask(db: Database, turn: int) -> None:
         sql(db, SqlRequest("SELECT count(*) FROM v_parameters", None))
 
 
-def trial(
-    database: Path, importers: int, readers: int, seconds: float, least: int, example: Path
-) -> list[Tally]:
+def trial(database: Path, importers: int, readers: int, load: Load, example: Path) -> list[Tally]:
     """Let them all work at once; what each did."""
-    context = multiprocessing.get_context("spawn")
     jobs = [("importer", number) for number in range(importers)] + [
         ("reader", number) for number in range(readers)
     ]
-    with context.Pool(len(jobs)) as pool:
-        return pool.starmap(work, [(*job, database, example, seconds, least) for job in jobs])
+    # Forked: whatever has to be loaded is loaded, and what is measured is the work at the database.
+    with multiprocessing.get_context("fork").Pool(len(jobs)) as pool:
+        return pool.starmap(work, [(*job, database, example, load) for job in jobs], chunksize=1)
+
+
+def _begin(database: Path) -> None:
+    with SharedDatabase(database, patience=Patience(PATIENCE_S)) as db:
+        import_folders(db, ImportRequest([EXAMPLE]))
+        identify(db, IdentifyRequest(EXAMPLE.name))
 
 
 def lost(database: Path, tallies: list[Tally]) -> list[str]:
@@ -123,13 +140,21 @@ def main() -> int:
     options.add_argument("--seconds", type=float, default=600)
     options.add_argument("--importers", type=int, default=8)
     options.add_argument("--readers", type=int, default=20)
+    options.add_argument(
+        "--pause", type=float, default=1.0, help="seconds between two questions of one, on average"
+    )
+    options.add_argument(
+        "--least", type=int, default=1, help="questions of each at least, whatever the seconds"
+    )
     chosen = options.parse_args()
     with tempfile.TemporaryDirectory() as room:
         database = Path(room) / "shop.duckdb"
-        with SharedDatabase(database, patience=Patience(PATIENCE_S)) as db:
-            import_folders(db, ImportRequest([EXAMPLE]))
-            identify(db, IdentifyRequest(EXAMPLE.name))
-        tallies = trial(database, chosen.importers, chosen.readers, chosen.seconds, 1, EXAMPLE)
+        # In a process of its own: a database engine that was open is not forked.
+        first = multiprocessing.get_context("fork").Process(target=_begin, args=(database,))
+        first.start()
+        first.join()
+        load = Load(chosen.seconds, chosen.least, chosen.pause)
+        tallies = trial(database, chosen.importers, chosen.readers, load, EXAMPLE)
         faults = lost(database, tallies)
         size_mb = database.stat().st_size / 1e6
     for kind in ("importer", "reader"):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import gzip
+import importlib
 import io
 import os
 import random
@@ -25,6 +26,7 @@ from pathlib import Path
 import monitor.workflow.certificate.issue as issuing
 from monitor.cli import main as verb
 from monitor.store import Database, verify_audit
+from monitor.workflow.contract import QUESTIONS
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 EXAMPLES = CHECKOUT / "examples"
@@ -160,6 +162,18 @@ def trial(kills: int, first_seed: int = 0, verbs: tuple[str, ...] = VERBS) -> tu
     """Kill so many verbs, in turn; how often each was hit before its end, and what was wrong afterwards."""
     # Certificates of a fixed day; the moment it is computed on is nobody's concern here.
     issuing.today = lambda: date(2027, 6, 1)
+    # Loaded once, here: the moments of the kills are to fall on the work.
+    for question in QUESTIONS.values():
+        question.load()
+    for name in (
+        "weasyprint",
+        "matplotlib.backends.backend_svg",
+        "jinja2",
+        "scipy.optimize",
+        "scipy.stats",
+        "pandas",
+    ):
+        importlib.import_module(name)
     hits: Counter[str] = Counter()
     wrong: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -184,6 +198,11 @@ def trial(kills: int, first_seed: int = 0, verbs: tuple[str, ...] = VERBS) -> tu
             share = place.uniform(0.0, 1.0) if place.random() < 0.5 else place.uniform(0.6, 1.1)
             status, _, _ = forked(arguments(name, room), share * durations[name])
             hits[name] += status == -signal.SIGKILL
+            print(
+                f"seed {seed}, {name}, {share:.2f} of {durations[name]:.2f} s: {status}",
+                file=sys.stderr,
+                flush=True,
+            )
             wrong += [f"seed {seed}, {name}: {fault}" for fault in _in_own_process(name, room, status)]
             shutil.rmtree(room)
     return hits, wrong
