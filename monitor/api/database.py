@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 class Database:
     """An open database, which holds its file only while it reads or writes. Close it, or use a ``with`` statement."""
 
-    def __init__(self, path: Path, *, read_only: bool = False, wait_s: float = 60.0) -> None:
+    def __init__(self, path: Path, *, read_only: bool = False, wait_s: float = 300.0) -> None:
         actor = ""
         with suppress(OSError, KeyError):  # a container may run under a number that has no name
             actor = getpass.getuser()
@@ -123,7 +123,7 @@ def _no_campaign(name: str, names: Sequence[str]) -> str:
     return f"there is no campaign '{name}'; there are {listed}"
 
 
-def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s: float = 60.0) -> Database:
+def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s: float = 300.0) -> Database:
     """Open a database file; ``new`` makes one where there is none; another process that has it is waited for.
 
     Raises NotFoundError for a file that is not there, StoreError for one that is no database or is in use for longer

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 #: How long a verb waits for another process that has the database, in s; ``--wait`` says otherwise.
-PATIENCE_S = 60.0
+PATIENCE_S = 300.0
 
 
 def opened(options: Namespace, *, threads: int | None = None) -> Database:

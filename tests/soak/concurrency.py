@@ -28,8 +28,8 @@ from monitor.workflow.keeping import AuditRequest, audit
 from monitor.workflow.query import SqlRequest, sql
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "cold-cold"
-#: No verb of the trial may wait for longer, in s; the verbs of the command line wait for 60.
-PATIENCE_S = 60.0
+#: No verb of the trial may wait for longer, in s; as the verbs of the command line wait.
+PATIENCE_S = 300.0
 
 
 @dataclass
