@@ -203,7 +203,9 @@ def trial(kills: int, first_seed: int = 0, verbs: tuple[str, ...] = VERBS) -> tu
                 file=sys.stderr,
                 flush=True,
             )
-            wrong += [f"seed {seed}, {name}: {fault}" for fault in _in_own_process(name, room, status)]
+            for fault in _in_own_process(name, room, status):
+                wrong.append(f"seed {seed}, {name}: {fault}")
+                print(f"  {wrong[-1]}", file=sys.stderr, flush=True)
             shutil.rmtree(room)
     return hits, wrong
 
