@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
+.PHONY: concurrency kills real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -55,6 +55,12 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_regions.py --replicates 80
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_outliers.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_curve.py --seeds 40
+
+concurrency: setup  ## eight importers and twenty readers at one database for ten minutes (docs/reliability.md)
+	@OMP_NUM_THREADS=1 $(RUN) tests/soak/concurrency.py $(ARGS)
+
+kills: setup  ## twelve verbs killed 500 times at random moments (docs/reliability.md)
+	@OMP_NUM_THREADS=1 $(RUN) tests/soak/kills.py $(ARGS)
 
 wheel: setup  ## build the wheel and run the tests against it, away from the checkout
 	@$(RUN) tests/setup/installed_wheel.py $(PARALLEL) $(ARGS)

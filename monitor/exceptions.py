@@ -45,6 +45,18 @@ class StoreError(InputError):
     """A database that cannot be opened, is newer than the software, or was altered."""
 
 
+class TakenNumberError(InputError):
+    """The number of a certificate that another one has by now."""
+
+
+class UnfinishedLogError(StoreError):
+    """A log beside the database that only somebody who may write can bring into it."""
+
+
+class BusyError(StoreError):
+    """The database is in use by another process, for longer than one would wait."""
+
+
 @dataclass(frozen=True)
 class Fault:
     """One fault of an input file.

@@ -23,6 +23,7 @@ class Ask:
         asked = QUESTIONS[question]
         request = asked.request
         arguments = [] if request is None else [_request(request, values)]
+        self.db.forget_campaigns()
         return asked.load()(*([self.db] if asked.needs_database else []), *arguments)
 
 

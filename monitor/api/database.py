@@ -28,13 +28,15 @@ if TYPE_CHECKING:
 
 
 class Database:
-    """An open database; close it, or use it in a ``with`` statement: other processes wait meanwhile."""
+    """An open database, which holds its file only while it reads or writes. Close it, or use a ``with`` statement."""
 
-    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+    def __init__(self, path: Path, *, read_only: bool = False, wait_s: float = 300.0) -> None:
         actor = ""
         with suppress(OSError, KeyError):  # a container may run under a number that has no name
             actor = getpass.getuser()
-        self._store = store.Database(path, read_only=read_only, threads=1, actor=actor)
+        self._store = store.SharedDatabase(
+            path, read_only=read_only, threads=1, actor=actor, patience=store.Patience(wait_s)
+        )
         self._ask = Ask(self._store)
         self.path = Path(path)
 
@@ -127,15 +129,16 @@ def _no_campaign(name: str, names: Sequence[str]) -> str:
     return f"there is no campaign '{name}'; {did_you_mean(name, names)}there are {listed}"
 
 
-def open(path: str | Path, *, new: bool = False, read_only: bool = False) -> Database:
-    """Open a database file; ``new`` makes one where there is none.
+def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s: float = 300.0) -> Database:
+    """Open a database file; ``new`` makes one where there is none; another process that has it is waited for.
 
-    Raises NotFoundError for a file that is not there, StoreError for one that is no database or is in use.
+    Raises NotFoundError for a file that is not there, StoreError for one that is no database or is in use for longer
+    than ``wait_s``.
     """
     path = Path(path)
     if not new and not path.exists():
         raise NotFoundError(f"there is no database {path}; open('{path}', new=True) makes one")
-    return Database(path, read_only=read_only)
+    return Database(path, read_only=read_only, wait_s=wait_s)
 
 
 def simulate(out: str | Path, **options: Any) -> Answer[SimulateAnswer]:

@@ -37,6 +37,8 @@ from monitor.documents import to_document
 PIPE_WIDTH = 10_000
 # Words longer than this may be broken over lines in a narrow window; numbers and names never are.
 LONGEST_UNBROKEN = 24
+#: With these begins what a spreadsheet runs (OWASP, CSV injection).
+_FORMULA_STARTS = "=+-@\t\r"
 _MOMENT = re.compile(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d:\d\d)(?:\.\d+)?(Z?)")
 
 
@@ -52,6 +54,11 @@ def _plain(answer: object) -> Any:
     if isinstance(answer, (list, tuple)):
         return [_plain(element) for element in answer]
     return to_document(answer) if is_dataclass(answer) else answer
+
+
+def csv_cell(cell: object) -> object:
+    """Return a cell as CSV has it: a text that a spreadsheet would run as a formula begins with an apostrophe."""
+    return "'" + cell if isinstance(cell, str) and cell[:1] in _FORMULA_STARTS and cell else cell
 
 
 def say(text: str = "") -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from monitor import __version__
-from monitor.cli.database import check_path
+from monitor.cli.database import PATIENCE_S, check_path, seconds_to_wait
 from monitor.exceptions import did_you_mean
 
 #: Verb: what it does in a few words. The file of the same name in ``monitor.cli.verbs`` has the rest.
@@ -83,6 +83,10 @@ def common(parser: argparse.ArgumentParser, *, database: bool = True) -> None:
     """Add the options that every verb has."""
     if database:
         parser.add_argument("--db", metavar="PATH", default=argparse.SUPPRESS, help="the database file")
+        parser.add_argument(
+            "--wait", metavar="SECONDS", default=argparse.SUPPRESS,
+            help=f"how long to wait for another process that has the database (default {PATIENCE_S:g})",
+        )  # fmt: skip
     parser.add_argument(
         "--json", action="store_true", help="one JSON document on standard output, nothing else"
     )
@@ -118,6 +122,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="PATH",
         help=f"the database file (else $MONITOR_DB, else that of the configuration, else {DEFAULT_DATABASE})",
     )
+    first.add_argument(
+        "--wait",
+        metavar="SECONDS",
+        default=os.environ.get("MONITOR_WAIT") or f"{PATIENCE_S:g}",
+        help=f"how long to wait for another process that has the database (else $MONITOR_WAIT, else {PATIENCE_S:g})",
+    )
     first.add_argument("--version", action="version", version=f"monitor {__version__}")
     first.add_argument("verb", nargs="?", metavar="VERB", help=argparse.SUPPRESS)
     first.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
@@ -129,7 +139,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         hint = did_you_mean(head.verb, VERBS)
         first.error(f"there is no verb '{head.verb}'; {hint}there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
-    database = argparse.Namespace(db=_default_database(head.verb) if head.db is None else head.db)
+    database = argparse.Namespace(
+        db=_default_database(head.verb) if head.db is None else head.db, wait=head.wait
+    )
     try:
         # People write options before, between and behind the other words.
         options = parser.parse_intermixed_args(head.rest, database)
@@ -138,6 +150,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         options = parser.parse_args(head.rest, database)
     if not hasattr(options, "run"):
         options.run = run
+    options.wait = seconds_to_wait(options.wait)
     needs_none = head.verb in WITHOUT_DATABASE or getattr(options, "what", None) in SUBVERBS_WITHOUT_DATABASE
     check_path(options.db, may_be_new=needs_none)
     return options

@@ -16,7 +16,7 @@ from monitor.store.analyses import (
     save_analysis,
     stored_analyses,
 )
-from monitor.store.audit import AuditEntry, last_entries
+from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_entries
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
@@ -46,6 +46,7 @@ from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
 from monitor.store.identifications import (
     identification_by_number,
+    identification_numbers,
     list_identifications,
     list_parameters,
     load_identification,
@@ -78,12 +79,15 @@ from monitor.store.models import (
     list_models,
     load_model,
     model_history,
+    next_version,
     save_model,
 )
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
+from monitor.store.sharing import SharedDatabase
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
+from monitor.store.turns import Holder, Patience
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 from monitor.store.workbook import export_workbook
@@ -96,14 +100,17 @@ __all__ = [
     "CampaignRow",
     "Database",
     "FleetSums",
+    "Holder",
     "Imported",
     "MachineDescription",
     "MachineEvent",
     "MachineHistory",
     "MachineModel",
+    "Patience",
     "QueryResult",
     "RecordedRun",
     "RunRow",
+    "SharedDatabase",
     "StoredAnalysis",
     "StoredCertificate",
     "StoredEvent",
@@ -116,11 +123,13 @@ __all__ = [
     "Withdrawal",
     "WithdrawnCampaign",
     "analysis_text",
+    "anchored_entry",
     "campaign_machines",
     "campaign_notes",
     "campaign_readings",
     "campaign_tolerances",
     "certificate_numbers",
+    "chain_faults",
     "check_analysis",
     "check_campaigns",
     "check_database_name",
@@ -135,6 +144,7 @@ __all__ = [
     "fleet_sums",
     "followed_by",
     "identification_by_number",
+    "identification_numbers",
     "identified_runs",
     "import_campaign",
     "import_curve",
@@ -171,6 +181,7 @@ __all__ = [
     "machines_of_method",
     "mark_certificate",
     "model_history",
+    "next_version",
     "not_identified",
     "probing_counts",
     "record_event",

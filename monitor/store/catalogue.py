@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from monitor.documents import IN_UTC, OMITTED
-from monitor.exceptions import NotFoundError, did_you_mean
+from monitor.exceptions import DataError, NotFoundError, did_you_mean
 from monitor.records import Machine
 from monitor.store.campaign_runs import imported_campaigns
 from monitor.store.connection import Database
@@ -110,7 +110,13 @@ def campaign_number(db: Database, name: str) -> int:
         raise NotFoundError(
             f"there is no campaign {name!r}; {_withdrawn(db, name)}{_what_is_there(db, 'campaign', name)}"
         )
-    return int(numbers[0][0])
+    number = int(numbers[0][0])
+    if not db.is_same_campaign(name, number):
+        raise DataError(
+            f"campaign {name!r} was withdrawn and imported again by somebody else meanwhile; what was computed of the "
+            "campaign of before is not stored: type the command again"
+        )
+    return number
 
 
 def _withdrawn(db: Database, name: str) -> str:

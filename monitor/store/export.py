@@ -2,11 +2,14 @@
 
 A folder with a file for every table and view, ``columns.csv`` with the meaning and unit of every column, and
 the imported files, byte for byte, under ``source_files/NUMBER OF THE CAMPAIGN/``. In CSV the maps and lists
-are text, and bytes are left out; Parquet has everything.
+are text, bytes are left out, and text that a spreadsheet would run as a formula begins with an apostrophe; Parquet
+has everything as it is. The folder gets its name when it is whole.
 """
 
 from __future__ import annotations
 
+import contextlib
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -17,6 +20,8 @@ from monitor.exceptions import InputError, NotFoundError, StoreError, did_you_me
 from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database
 
+#: Texts that spreadsheets run as formulas (OWASP, CSV injection).
+_FORMULA = r"^[=+\-@\t\r]"
 _OPTIONS = {"csv": "FORMAT csv, HEADER", "parquet": "FORMAT parquet, COMPRESSION zstd"}
 
 
@@ -42,15 +47,32 @@ def export_tables(
     if machine is not None:
         check_machine(db, machine)
     chosen = _chosen(db, tables, machine)
+    partial = folder.with_name(folder.name + ".partial")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        written = [_copy(db, name, folder, form, machine) for name in chosen]
-        written.append(_columns(db, folder))
+        _remove(partial)
+        partial.mkdir(parents=True, mode=0o700)
+        (partial / _MARK).touch()
+        written = [_copy(db, name, partial, form, machine) for name in chosen]
+        written.append(_columns(db, partial))
         if tables is None and machine is None:
-            written += _source_files(db, folder)
-    except (OSError, duckdb.IOException) as fault:
+            written += _source_files(db, partial)
+        (partial / _MARK).unlink()
+        partial.replace(folder)
+    except (OSError, StoreError, duckdb.IOException) as fault:
+        with contextlib.suppress(OSError):
+            _remove(partial)
         raise StoreError(f"the export to {folder} could not be written: {fault}") from fault
-    return tuple(written)
+    return tuple(folder / file.relative_to(partial) for file in written)
+
+
+def _remove(partial: Path) -> None:
+    """Remove what an export left that was killed; nothing that is not marked as such."""
+    if (partial / _MARK).is_file() and not partial.is_symlink():
+        shutil.rmtree(partial)
+
+
+#: In a folder that is not whole yet.
+_MARK = ".unfinished-export"
 
 
 def _names(db: Database) -> list[str]:
@@ -97,9 +119,7 @@ def _copy(db: Database, name: str, folder: Path, form: str, machine: str | None)
     ):
         if form == "csv" and kind == "BLOB":
             continue
-        columns.append(
-            f'to_json("{column}") AS "{column}"' if form == "csv" and "MAP" in kind else f'"{column}"'
-        )
+        columns.append(_column(column, kind) if form == "csv" else f'"{column}"')
     # The names come from the catalogue; path and machine, which COPY cannot bind, are quoted.
     literal = str(path).replace("'", "''")
     where = ""
@@ -107,6 +127,17 @@ def _copy(db: Database, name: str, folder: Path, form: str, machine: str | None)
         where = " WHERE machine = '{}'".format(machine.replace("'", "''"))
     db.execute(f"COPY (SELECT {', '.join(columns)} FROM \"{name}\"{where}) TO '{literal}' ({_OPTIONS[form]})")
     return path
+
+
+def _column(column: str, kind: str) -> str:
+    """A column as CSV has it: maps as JSON, and no text that a spreadsheet takes for a formula."""
+    if "MAP" in kind:
+        return f'to_json("{column}") AS "{column}"'
+    if kind == "VARCHAR":
+        quote = "''''"  # one apostrophe, as SQL writes it
+        is_formula = f"regexp_matches(\"{column}\", '{_FORMULA}')"
+        return f'CASE WHEN {is_formula} THEN {quote} || "{column}" ELSE "{column}" END AS "{column}"'
+    return f'"{column}"'
 
 
 def _columns(db: Database, folder: Path) -> Path:

@@ -13,6 +13,7 @@ import numpy as np
 from monitor import __version__
 from monitor.exceptions import NotFoundError
 from monitor.store import audit, identified_values
+from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.results import (
@@ -59,9 +60,10 @@ def save_identification(db: Database, identification: StoredIdentification) -> i
         _insert_frames(db, number, identification)
         identified_values.insert_values(db, number, identification)
         _insert_residuals(db, number, identification.runs)
-        audit.record(
-            db, "save", "identification", str(number), identification_content(number, identification)
+        content = with_bookkeeping(
+            db, "identification", number, identification_content(number, identification)
         )
+        audit.record(db, "save", "identification", str(number), content)
     return number
 
 
@@ -144,6 +146,18 @@ def list_parameters(
         "ORDER BY started_at, campaign, run, model, model_version, parameter",
         {"machine": machine, "campaign": campaign, "parameter": parameter},
     )
+
+
+def identification_numbers(db: Database, software_version: str) -> list[int]:
+    """Return the numbers of the identifications that a version made of campaigns that count."""
+    return [
+        int(number)
+        for (number,) in db.rows(
+            "SELECT identification_id FROM identification AS i JOIN campaign USING (campaign_id) "
+            "WHERE i.software_version = ? ORDER BY ALL",
+            [software_version],
+        )
+    ]
 
 
 def stored_identification_content(db: Database, number: int) -> str:

@@ -70,7 +70,7 @@ def run(options: Namespace) -> int:
         volumetric_limit_um=options.volumetric_limit,
         figures=options.figures,
     )
-    with opened(options) as db, output.working("following"), db.transaction():
+    with opened(options) as db, output.working("following"):
         answer = trend(db, request)
     if options.json:
         output.document(answer)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from monitor.bounded import read_bounded
 from monitor.exceptions import CampaignError, did_you_mean
 from monitor.readers.csv_table import CsvTable, parse_csv
 from monitor.readers.curve_columns import DATA, NAME, CurveColumns, CurveSettings, read_columns
@@ -28,16 +29,15 @@ RESERVED = ("sequence", "formula", "pi")
 def recognises(folder: Path) -> bool:
     """Return whether a folder is a curve: its file says so, or it has data.csv and no probings."""
     try:
-        content = (folder / TOML).read_bytes()[:LARGEST_TOML]
+        content = read_bounded(folder / TOML, LARGEST_TOML)
         return tomllib.loads(content.decode("utf-8-sig")).get("method") == METHOD
     except (OSError, ValueError, RecursionError):
         # A damaged file: the name of the method in it, or the data beside it, say which reader should refuse it.
         if (folder / DATA).is_file() and not (folder / "probings.csv").exists():
             return True
         try:
-            return (
-                re.search(rb'(?m)^\s*method\s*=\s*["\']curve["\']', (folder / TOML).read_bytes()) is not None
-            )
+            head = read_bounded(folder / TOML, LARGEST_TOML)
+            return re.search(rb'(?m)^\s*method\s*=\s*["\']curve["\']', head) is not None
         except OSError:
             return False
 

@@ -13,6 +13,7 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
+from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.laboratory_keys import SECTIONS
 from monitor.reporting.certificate.mark import read_mark
@@ -83,7 +84,7 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
     """The answers in a TOML file. Raises InputError, with all faults, where it cannot be read as such."""
     file = Path(path)
     try:
-        text = file.read_bytes().decode("utf-8-sig")
+        text = read_bounded(file, LARGEST_SETTINGS).decode("utf-8-sig")
         tables = tomllib.loads(text)
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
