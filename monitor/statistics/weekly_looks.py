@@ -1,0 +1,175 @@
+"""Looks at a fleet every week, for ever: which parameter, or which machine as a whole, changed; few of them falsely.
+
+Every look spends a part of a probability: a small stake is put on "it changes now" in every series, multiplied from
+then on by the likelihood ratio of every score against "nothing changed". A stake that has grown to one is a change
+that was noticed. Without a change the expected worth of all stakes is what was put in (each is a martingale: Ville), so
+that the expected number of false notices never exceeds it, whenever one stops to look; and what is put in over the
+whole fleet never exceeds ``rate`` times the number of changes noticed (or one, before the first): online control of the
+false discovery rate by spending (Foster and Stine, J. R. Stat. Soc. B 70 (2008) 429; Ramdas et al., NIPS 30 (2017)
+5650), with e-detectors in place of tests (Shin, Ramdas and Rinaldo, New Engl. J. Stat. Data Sci. 2 (2024) 229).
+Parameters and machines may depend on each other in any way.
+
+A stake overshoots one when it is crossed; by that mean factor (Siegmund, Sequential Analysis, 1985, eq. 4.37) it is put in
+larger. What is assumed: scores that are standard normal and independent of the past (``sequential_scores``); how far
+that holds is in docs/trials-statistics.md.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from monitor.exceptions import DataError
+from monitor.records import Array
+from monitor.statistics.checks import as_probability
+from monitor.statistics.sequential_scores import (
+    SequentialScores,
+    TailShape,
+    VectorScores,
+    shrunk_correlation,
+)
+
+#: False discovery rate over all machines, parameters and weeks.
+RATE = 0.05
+#: Shifts, in standard deviations of a value, that the stakes are on; between them the loss is below a fifth of the
+#: information. Each with both signs.
+SHIFTS = (1.0, 2.0, 4.0)
+#: Mean squared lengths of a shift of the whole vector (in its covariance) that the stakes are on.
+LENGTHS = (4.0, 16.0)
+#: Of what may still be spent, the part that a look spends: half a year's looks share it.
+PART = 1.0 / 26.0
+#: Looks that a stake on the vector is followed: a change that half a year did not show is left to the singles.
+FOLLOWED = 26
+
+
+def overshoot(shift: float) -> float:
+    """Mean of exp(-overshoot) of a random walk of likelihood ratios for a ``shift``, in standard deviations.
+
+    Siegmund (1985), eq. 4.37: 2 / shift² exp(-2 sum Phi(-shift sqrt(n) / 2) / n).
+    """
+    n = np.arange(1, 2001)
+    return float(
+        2.0 / shift**2 * np.exp(-2.0 * np.sum(scipy.special.ndtr(-0.5 * shift * np.sqrt(n)) / n))
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What one look noticed: ``parameters`` (m, p), ``vectors`` (m,), and the stakes (m, p) and (m,), noticed at 1.
+
+    ``looks_since`` (m, p) and ``vector_looks_since`` (m,): the values of the series since its change probably was.
+    ``spent`` is the expected number of false notices so far at most, ``noticed`` the notices so far.
+    """
+
+    parameters: npt.NDArray[np.bool_]
+    vectors: npt.NDArray[np.bool_]
+    stakes: Array
+    vector_stakes: Array
+    looks_since: npt.NDArray[np.int64]
+    vector_looks_since: npt.NDArray[np.int64]
+    spent: float
+    noticed: int
+
+
+class WeeklyLooks:
+    """The looks at m machines with p parameters. ``look`` takes the values of a week and says what was noticed.
+
+    A series that was noticed begins anew; one with fewer than seven values (a vector: p + 7) says nothing and costs
+    nothing. Raises DataError for a rate that is none.
+    """
+
+    def __init__(self, machines: int, parameters: int, *, rate: float = RATE) -> None:
+        self.rate = as_probability(rate, "rate")
+        m, p = self._shape = (machines, parameters)
+        self.spent, self.noticed = 0.0, 0
+        self._single, self._vector = SequentialScores(m, p), VectorScores(m, p)
+        self._single_tails, self._vector_tails = TailShape(), TailShape()
+        shifts = np.array([sign * shift for shift in SHIFTS for sign in (1.0, -1.0)])
+        self._shifts = shifts
+        self._weights = np.array([1.0 / overshoot(abs(shift)) for shift in shifts]) / len(shifts)
+        self._worth = np.zeros((m, p, len(shifts)))
+        self._climb = np.zeros_like(self._worth)
+        self._since = np.zeros(self._worth.shape, dtype=np.int64)
+        self._path = np.zeros((m, p))
+        self._steps = np.zeros(m)
+        # Of each earlier look: the path of the vector before it, the steps, the stake put in then.
+        self._starts: deque[tuple[Array, Array, Array]] = deque(maxlen=FOLLOWED)
+
+    def restart(self, mask: npt.NDArray[np.bool_]) -> None:
+        """Begin the machines of ``mask`` (m,) anew: something was done to them, and what was is no measure any more."""
+        self._restart_singles(np.repeat(mask[:, np.newaxis], self._shape[1], axis=1))
+        self._restart_vectors(mask)
+
+    def _restart_singles(self, mask: npt.NDArray[np.bool_]) -> None:
+        self._single.restart(mask)
+        self._worth[mask] = self._climb[mask] = 0.0
+        self._since[mask] = 0
+
+    def _restart_vectors(self, mask: npt.NDArray[np.bool_]) -> None:
+        self._vector.restart(mask)
+        for _, _, stake in self._starts:
+            stake[mask] = 0.0
+
+    def look(self, values: Array) -> Look:
+        """Take the ``values`` (m, p) of a week, NaN where none was measured, and return what is noticed now.
+
+        Raises DataError for another shape.
+        """
+        if values.shape != self._shape:
+            raise DataError(f"values has shape {values.shape}; {self._shape} is needed.")
+        raw = self._single.raw_correlation()
+        correlation = shrunk_correlation(raw, self._single.count)
+        scores = self._single_tails.normalised(self._single.add(values, correlation))
+        whole = self._vector_tails.normalised(self._vector.add(values, correlation))
+        stake = self._stake(np.isfinite(scores), np.isfinite(whole).all(axis=1))
+        stakes, since = self._singles(scores, stake)
+        vector_stakes, vector_since = self._vectors(whole, stake)
+        parameters, vectors = stakes >= 1.0, vector_stakes >= 1.0
+        self._restart_singles(parameters)
+        self._restart_vectors(vectors)
+        self.noticed += int(parameters.sum() + vectors.sum())
+        return Look(
+            parameters, vectors, stakes, vector_stakes, since, vector_since, self.spent, self.noticed
+        )
+
+    def _stake(self, singles: npt.NDArray[np.bool_], vectors: npt.NDArray[np.bool_]) -> float:
+        """What is put on each series of this look."""
+        count = int(singles.sum() + vectors.sum())
+        spend = max(self.rate * max(self.noticed, 1) - self.spent, 0.0) * PART
+        self.spent += spend if count else 0.0
+        return spend / max(count, 1)
+
+    def _singles(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
+        active = np.isfinite(scores)
+        rise = scores[active][:, np.newaxis] * self._shifts - 0.5 * self._shifts**2
+        self._worth[active] = (self._worth[active] + stake * self._weights) * np.exp(np.minimum(rise, 500.0))
+        # Where each chart last stood at nothing: since then its series has probably been another.
+        climb = self._climb[active] + rise
+        self._since[active] = np.where(climb > 0.0, self._since[active] + 1, 0)
+        self._climb[active] = np.maximum(climb, 0.0)
+        best = self._worth.argmax(axis=2)[:, :, np.newaxis]
+        return self._worth.sum(axis=2), np.take_along_axis(self._since, best, axis=2)[:, :, 0]
+
+    def _vectors(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
+        m, p = self._shape
+        active = np.isfinite(scores).all(axis=1)
+        self._starts.append((self._path.copy(), self._steps.copy(), np.where(active, stake, 0.0)))
+        self._path += np.where(active[:, np.newaxis], scores, 0.0)
+        self._steps += active
+        total, most = np.zeros(m), np.zeros(m)
+        since = np.zeros(m, dtype=np.int64)
+        for path, steps, put_in in self._starts:
+            squares, k = ((self._path - path) ** 2).sum(axis=1), self._steps - steps
+            for length in LENGTHS:
+                # A shift of unknown direction, normal with this mean squared length.
+                spread = length / p
+                log = -0.5 * p * np.log1p(k * spread) + 0.5 * spread * squares / (1.0 + k * spread)
+                worth = put_in / len(LENGTHS) * np.exp(np.minimum(log, 500.0))
+                total += worth
+                since = np.where(worth > most, k.astype(np.int64), since)
+                most = np.maximum(most, worth)
+        return total, since
