@@ -52,98 +52,43 @@ def overshoot(shift: float) -> float:
     Siegmund (1985), eq. 4.37: 2 / shift² exp(-2 sum Phi(-shift sqrt(n) / 2) / n).
     """
     n = np.arange(1, 2001)
-    return float(
-        2.0 / shift**2 * np.exp(-2.0 * np.sum(scipy.special.ndtr(-0.5 * shift * np.sqrt(n)) / n))
-    )
+    return float(2.0 / shift**2 * np.exp(-2.0 * np.sum(scipy.special.ndtr(-0.5 * shift * np.sqrt(n)) / n)))
 
 
 @dataclass(frozen=True, eq=False)
 class Look:
     """What one look noticed: ``parameters`` (m, p), ``vectors`` (m,), and the stakes (m, p) and (m,), noticed at 1.
 
-    ``looks_since`` (m, p) and ``vector_looks_since`` (m,): the values of the series since its change probably was.
-    ``spent`` is the expected number of false notices so far at most, ``noticed`` the notices so far.
+    ``since`` (m, p) and ``vector_since`` (m,): how many values of the series, with this one, probably lie after its
+    change. ``spent`` is the expected number of false notices so far at most, ``noticed`` the notices so far.
     """
 
     parameters: npt.NDArray[np.bool_]
     vectors: npt.NDArray[np.bool_]
     stakes: Array
     vector_stakes: Array
-    looks_since: npt.NDArray[np.int64]
-    vector_looks_since: npt.NDArray[np.int64]
+    since: npt.NDArray[np.int64]
+    vector_since: npt.NDArray[np.int64]
     spent: float
     noticed: int
 
 
-class WeeklyLooks:
-    """The looks at m machines with p parameters. ``look`` takes the values of a week and says what was noticed.
+class _Singles:
+    """Stakes on a shift of every series: worth (m, p, k) of k shifts."""
 
-    A series that was noticed begins anew; one with fewer than seven values (a vector: p + 7) says nothing and costs
-    nothing. Raises DataError for a rate that is none.
-    """
-
-    def __init__(self, machines: int, parameters: int, *, rate: float = RATE) -> None:
-        self.rate = as_probability(rate, "rate")
-        m, p = self._shape = (machines, parameters)
-        self.spent, self.noticed = 0.0, 0
-        self._single, self._vector = SequentialScores(m, p), VectorScores(m, p)
-        self._single_tails, self._vector_tails = TailShape(), TailShape()
-        shifts = np.array([sign * shift for shift in SHIFTS for sign in (1.0, -1.0)])
-        self._shifts = shifts
-        self._weights = np.array([1.0 / overshoot(abs(shift)) for shift in shifts]) / len(shifts)
-        self._worth = np.zeros((m, p, len(shifts)))
+    def __init__(self, m: int, p: int) -> None:
+        self._shifts = np.array([sign * shift for shift in SHIFTS for sign in (1.0, -1.0)])
+        self._weights = np.array([1.0 / overshoot(abs(shift)) for shift in self._shifts]) / len(self._shifts)
+        self._worth = np.zeros((m, p, len(self._shifts)))
         self._climb = np.zeros_like(self._worth)
         self._since = np.zeros(self._worth.shape, dtype=np.int64)
-        self._path = np.zeros((m, p))
-        self._steps = np.zeros(m)
-        # Of each earlier look: the path of the vector before it, the steps, the stake put in then.
-        self._starts: deque[tuple[Array, Array, Array]] = deque(maxlen=FOLLOWED)
 
     def restart(self, mask: npt.NDArray[np.bool_]) -> None:
-        """Begin the machines of ``mask`` (m,) anew: something was done to them, and what was is no measure any more."""
-        self._restart_singles(np.repeat(mask[:, np.newaxis], self._shape[1], axis=1))
-        self._restart_vectors(mask)
-
-    def _restart_singles(self, mask: npt.NDArray[np.bool_]) -> None:
-        self._single.restart(mask)
         self._worth[mask] = self._climb[mask] = 0.0
         self._since[mask] = 0
 
-    def _restart_vectors(self, mask: npt.NDArray[np.bool_]) -> None:
-        self._vector.restart(mask)
-        for _, _, stake in self._starts:
-            stake[mask] = 0.0
-
-    def look(self, values: Array) -> Look:
-        """Take the ``values`` (m, p) of a week, NaN where none was measured, and return what is noticed now.
-
-        Raises DataError for another shape.
-        """
-        if values.shape != self._shape:
-            raise DataError(f"values has shape {values.shape}; {self._shape} is needed.")
-        raw = self._single.raw_correlation()
-        correlation = shrunk_correlation(raw, self._single.count)
-        scores = self._single_tails.normalised(self._single.add(values, correlation))
-        whole = self._vector_tails.normalised(self._vector.add(values, correlation))
-        stake = self._stake(np.isfinite(scores), np.isfinite(whole).all(axis=1))
-        stakes, since = self._singles(scores, stake)
-        vector_stakes, vector_since = self._vectors(whole, stake)
-        parameters, vectors = stakes >= 1.0, vector_stakes >= 1.0
-        self._restart_singles(parameters)
-        self._restart_vectors(vectors)
-        self.noticed += int(parameters.sum() + vectors.sum())
-        return Look(
-            parameters, vectors, stakes, vector_stakes, since, vector_since, self.spent, self.noticed
-        )
-
-    def _stake(self, singles: npt.NDArray[np.bool_], vectors: npt.NDArray[np.bool_]) -> float:
-        """What is put on each series of this look."""
-        count = int(singles.sum() + vectors.sum())
-        spend = max(self.rate * max(self.noticed, 1) - self.spent, 0.0) * PART
-        self.spent += spend if count else 0.0
-        return spend / max(count, 1)
-
-    def _singles(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
+    def add(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
+        """Return the worth (m, p) after ``scores`` (m, p) and the values since each probable change."""
         active = np.isfinite(scores)
         rise = scores[active][:, np.newaxis] * self._shifts - 0.5 * self._shifts**2
         self._worth[active] = (self._worth[active] + stake * self._weights) * np.exp(np.minimum(rise, 500.0))
@@ -154,14 +99,36 @@ class WeeklyLooks:
         best = self._worth.argmax(axis=2)[:, :, np.newaxis]
         return self._worth.sum(axis=2), np.take_along_axis(self._since, best, axis=2)[:, :, 0]
 
-    def _vectors(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
-        m, p = self._shape
+
+class _Vectors:
+    """Stakes on a shift, in any direction, of the vectors of the machines ``rows`` that have the same ``columns``."""
+
+    def __init__(self, rows: npt.NDArray[np.int64], columns: npt.NDArray[np.int64]) -> None:
+        self.rows, self.columns = rows, columns
+        self._scores = VectorScores(len(rows), len(columns))
+        self._path = np.zeros((len(rows), len(columns)))
+        self._steps = np.zeros(len(rows))
+        # Of each earlier look: the path of the vectors before it, the steps, the stake put in then.
+        self._starts: deque[tuple[Array, Array, Array]] = deque(maxlen=FOLLOWED)
+
+    def restart(self, mask: npt.NDArray[np.bool_]) -> None:
+        self._scores.restart(mask)
+        for _, _, stake in self._starts:
+            stake[mask] = 0.0
+
+    def scores(self, values: Array, correlation: Array) -> Array:
+        """Return the scores of the machines in ``rows`` and add their values, both (m, p) of the whole fleet."""
+        place = np.ix_(self.rows, self.columns)
+        return self._scores.add(values[place], correlation[place])
+
+    def add(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
+        """Return the worth (r,) of the machines' stakes and the values since each probable change."""
+        r, p = scores.shape
         active = np.isfinite(scores).all(axis=1)
         self._starts.append((self._path.copy(), self._steps.copy(), np.where(active, stake, 0.0)))
         self._path += np.where(active[:, np.newaxis], scores, 0.0)
         self._steps += active
-        total, most = np.zeros(m), np.zeros(m)
-        since = np.zeros(m, dtype=np.int64)
+        total, most, since = np.zeros(r), np.zeros(r), np.zeros(r, dtype=np.int64)
         for path, steps, put_in in self._starts:
             squares, k = ((self._path - path) ** 2).sum(axis=1), self._steps - steps
             for length in LENGTHS:
@@ -173,3 +140,75 @@ class WeeklyLooks:
                 since = np.where(worth > most, k.astype(np.int64), since)
                 most = np.maximum(most, worth)
         return total, since
+
+
+class WeeklyLooks:
+    """The looks at m machines of which each has the parameters that ``has`` (m, p) says.
+
+    ``look`` takes the values of a week and says what was noticed. A series that was noticed begins anew; one with few
+    values (fewer than seven, a vector of q parameters q + 7) says nothing and costs nothing.
+    """
+
+    def __init__(self, has: npt.NDArray[np.bool_], *, rate: float = RATE) -> None:
+        """Raises DataError for a ``rate`` that is none."""
+        self.rate = as_probability(rate, "rate")
+        self.spent, self.noticed = 0.0, 0
+        m, p = self._shape = has.shape
+        self._scores, self._singles = SequentialScores(m, p), _Singles(m, p)
+        self._tails, self._vector_tails = TailShape(), TailShape()
+        kinds, kind = np.unique(has, axis=0, return_inverse=True)
+        # One parameter alone has no vector.
+        self._vectors = [
+            _Vectors(np.flatnonzero(kind.ravel() == k), np.flatnonzero(columns))
+            for k, columns in enumerate(kinds)
+            if columns.sum() > 1
+        ]
+
+    def restart(self, mask: npt.NDArray[np.bool_]) -> None:
+        """Begin the machines of ``mask`` (m,) anew: something was done to them, and what was is no measure any more."""
+        series = np.repeat(mask[:, np.newaxis], self._shape[1], axis=1)
+        self._scores.restart(series)
+        self._singles.restart(series)
+        for vectors in self._vectors:
+            vectors.restart(mask[vectors.rows])
+
+    def look(self, values: Array) -> Look:
+        """Take the ``values`` (m, p) of a week, NaN where none was measured, and return what is noticed now.
+
+        Raises DataError for another shape.
+        """
+        if values.shape != self._shape:
+            raise DataError(f"values has shape {values.shape}; {self._shape} is needed.")
+        correlation = shrunk_correlation(self._scores.raw_correlation(), self._scores.count)
+        scores = self._tails.normalised(self._scores.add(values, correlation))
+        of_vectors = [vectors.scores(values, correlation) for vectors in self._vectors]
+        every = self._vector_tails.normalised(
+            np.concatenate([part.ravel() for part in [np.empty(0), *of_vectors]])
+        )
+        ends = np.cumsum([0, *(part.size for part in of_vectors)])
+        of_vectors = [
+            every[first:end].reshape(part.shape)
+            for part, first, end in zip(of_vectors, ends[:-1], ends[1:], strict=True)
+        ]
+        stake = self._stake(
+            int(np.isfinite(scores).sum() + sum(np.isfinite(part).all(axis=1).sum() for part in of_vectors))
+        )
+        stakes, since = self._singles.add(scores, stake)
+        vector_stakes, vector_since = np.zeros(len(values)), np.zeros(len(values), dtype=np.int64)
+        for vectors, part in zip(self._vectors, of_vectors, strict=True):
+            vector_stakes[vectors.rows], vector_since[vectors.rows] = vectors.add(part, stake)
+        parameters, whole = stakes >= 1.0, vector_stakes >= 1.0
+        self._scores.restart(parameters)
+        self._singles.restart(parameters)
+        for vectors in self._vectors:
+            vectors.restart(whole[vectors.rows])
+        self.noticed += int(parameters.sum() + whole.sum())
+        return Look(parameters, whole, stakes, vector_stakes, since, vector_since, self.spent, self.noticed)
+
+    def _stake(self, count: int) -> float:
+        """What is put on each of the ``count`` series of this look."""
+        if not count:
+            return 0.0
+        spend = max(self.rate * max(self.noticed, 1) - self.spent, 0.0) * PART
+        self.spent += spend
+        return spend / count
