@@ -186,9 +186,12 @@ class TailShape:
         self._middle, self._ratio = middle, far / middle
         self.freedom, self.scale = 200.0, 1.0
 
-    def normalised(self, scores: Array) -> Array:
-        """Return scores (any shape) as standard normal ones; they count for the shape of the next."""
-        usable = np.abs(scores[np.isfinite(scores)])
+    def normalised(self, scores: Array, calm: npt.NDArray[np.bool_]) -> Array:
+        """Return scores (any shape) as standard normal ones; those that are ``calm`` (same shape) count for the shape.
+
+        What is calm must not depend on the scores themselves, only on those before.
+        """
+        usable = np.abs(scores[np.isfinite(scores) & calm])
         # Those of this look take part: of independent series a few among thousands, and the first look has a shape.
         self._counts += np.bincount(
             np.minimum((usable / self._EDGES[1]).astype(np.int64), len(self._EDGES) - 1),

@@ -35,13 +35,15 @@ from monitor.statistics.sequential_scores import (
 
 #: False discovery rate over all machines, parameters and weeks.
 RATE = 0.05
-#: Shifts, in standard deviations of a value, that the stakes are on; between them the loss is below a fifth of the
-#: information. Each with both signs.
-SHIFTS = (1.0, 2.0, 4.0)
+#: Shifts, in standard deviations of a value, that the stakes are on, each with both signs; for others from 0.8 to 4 a
+#: tenth of the information is lost at most, and of a third one's share more would be lost than won (trial_weekly).
+SHIFTS = (1.0, 2.5)
 #: Mean squared lengths of a shift of the whole vector (in its covariance) that the stakes are on.
 LENGTHS = (4.0, 16.0)
 #: Of what may still be spent, the part that a look spends: half a year's looks share it.
 PART = 1.0 / 26.0
+#: A likelihood ratio of exp(3) for a change leaves a series out of what scores usually look like.
+CALM = 3.0
 #: Looks that a stake on the vector is followed: a change that half a year did not show is left to the singles.
 FOLLOWED = 26
 
@@ -86,6 +88,11 @@ class _Singles:
     def restart(self, mask: npt.NDArray[np.bool_]) -> None:
         self._worth[mask] = self._climb[mask] = 0.0
         self._since[mask] = 0
+
+    @property
+    def calm(self) -> npt.NDArray[np.bool_]:
+        """Series (m, p) of which no chart has climbed by ``CALM``: those that say what scores look like."""
+        return np.asarray((self._climb < CALM).all(axis=2))
 
     def add(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
         """Return the worth (m, p) after ``scores`` (m, p) and the values since each probable change."""
@@ -180,11 +187,10 @@ class WeeklyLooks:
         if values.shape != self._shape:
             raise DataError(f"values has shape {values.shape}; {self._shape} is needed.")
         correlation = shrunk_correlation(self._scores.raw_correlation(), self._scores.count)
-        scores = self._tails.normalised(self._scores.add(values, correlation))
+        scores = self._tails.normalised(self._scores.add(values, correlation), self._singles.calm)
         of_vectors = [vectors.scores(values, correlation) for vectors in self._vectors]
-        every = self._vector_tails.normalised(
-            np.concatenate([part.ravel() for part in [np.empty(0), *of_vectors]])
-        )
+        every = np.concatenate([np.empty(0), *(part.ravel() for part in of_vectors)])
+        every = self._vector_tails.normalised(every, np.ones(len(every), dtype=np.bool_))
         ends = np.cumsum([0, *(part.size for part in of_vectors)])
         of_vectors = [
             every[first:end].reshape(part.shape)
