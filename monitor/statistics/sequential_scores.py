@@ -157,10 +157,8 @@ def shrunk_correlation(raw: Array, count: Array) -> Array:
     between = max(float(np.mean((raw[usable] - mean) ** 2 - own[usable])), 0.0)
     rows = usable.any(axis=1)
     of_machines = np.nanmean(raw[rows], axis=1)
-    if len(of_machines) > 1:
-        of_mean = float(of_machines.var(ddof=1)) / len(of_machines)
-    else:
-        of_mean = float(own[usable].max())
+    several = len(of_machines) > 1
+    of_mean = float(of_machines.var(ddof=1) / len(of_machines) if several else own[usable].max())
     share = np.where(usable, between / np.maximum(between + own, 1e-300), 0.0)
     centre = mean + share * np.where(usable, raw - mean, 0.0)
     unknown = np.where(usable, share * own, between) + (1.0 - share) ** 2 * of_mean
@@ -178,31 +176,33 @@ class TailShape:
     _EDGES = np.linspace(0.0, 12.0, 1201)
     _FREEDOM = 1.0 / np.linspace(1.0 / 200.0, 1.0 / 2.05, 120)
     _MIDDLE, _FAR = 0.5, 0.99
+    #: Scores that show a shape; before, Student's distribution with the degrees of freedom below.
+    _FEWEST, _AT_FIRST = 100.0, 4.0
 
     def __init__(self) -> None:
         self._counts = np.zeros(len(self._EDGES))
         middle = scipy.special.stdtrit(self._FREEDOM, 0.5 + self._MIDDLE / 2.0)
         far = scipy.special.stdtrit(self._FREEDOM, 0.5 + self._FAR / 2.0)
         self._middle, self._ratio = middle, far / middle
-        self.freedom, self.scale = 200.0, 1.0
+        self.freedom, self.scale = self._AT_FIRST, 1.0
 
     def normalised(self, scores: Array, calm: npt.NDArray[np.bool_]) -> Array:
-        """Return scores (any shape) as standard normal ones; those that are ``calm`` (same shape) count for the shape.
+        """Return scores (any shape) as standard normal ones by the shape of those before.
 
-        What is calm must not depend on the scores themselves, only on those before.
+        Those that are ``calm`` (same shape) then count for the shape; what is calm must not depend on these scores.
         """
+        normal = normal_score(scores / self.scale, np.full_like(scores, self.freedom))
         usable = np.abs(scores[np.isfinite(scores) & calm])
-        # Those of this look take part: of independent series a few among thousands, and the first look has a shape.
         self._counts += np.bincount(
             np.minimum((usable / self._EDGES[1]).astype(np.int64), len(self._EDGES) - 1),
             minlength=len(self._EDGES),
         )
         total = self._counts.sum()
-        if total > 0:
+        if total >= self._FEWEST:
             below = np.cumsum(self._counts)
             certain = self._FAR * total + 2.0 * np.sqrt(total * self._FAR * (1.0 - self._FAR))
             middle = self._EDGES[np.searchsorted(below, self._MIDDLE * total)] + 0.005
             far = self._EDGES[min(np.searchsorted(below, min(certain, total)), len(self._EDGES) - 1)] + 0.005
             place = min(int(np.searchsorted(self._ratio, far / middle)), len(self._FREEDOM) - 1)
             self.freedom, self.scale = float(self._FREEDOM[place]), float(middle / self._middle[place])
-        return normal_score(scores / self.scale, np.full_like(scores, self.freedom))
+        return normal

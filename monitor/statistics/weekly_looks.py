@@ -9,9 +9,9 @@ false discovery rate by spending (Foster and Stine, J. R. Stat. Soc. B 70 (2008)
 5650), with e-detectors in place of tests (Shin, Ramdas and Rinaldo, New Engl. J. Stat. Data Sci. 2 (2024) 229).
 Parameters and machines may depend on each other in any way.
 
-A stake overshoots one when it is crossed; by that mean factor (Siegmund, Sequential Analysis, 1985, eq. 4.37) it is put in
-larger. What is assumed: scores that are standard normal and independent of the past (``sequential_scores``); how far
-that holds is in docs/trials-statistics.md.
+A stake overshoots one when it crosses it; by that mean factor (Siegmund, Sequential Analysis, 1985, eq. 4.37) it is
+put in larger. What is assumed: scores that are standard normal and independent of the past (``sequential_scores``);
+how far that holds is in docs/trials-statistics.md.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ class Look:
     """What one look noticed: ``parameters`` (m, p), ``vectors`` (m,), and the stakes (m, p) and (m,), noticed at 1.
 
     ``since`` (m, p) and ``vector_since`` (m,): how many values of the series, with this one, probably lie after its
-    change. ``spent`` is the expected number of false notices so far at most, ``noticed`` the notices so far.
+    change. ``spent`` is the expected number of false notices so far at most, ``noticed`` the notices so far;
+    ``series`` is how many had a stake put on them.
     """
 
     parameters: npt.NDArray[np.bool_]
@@ -73,6 +74,7 @@ class Look:
     vector_since: npt.NDArray[np.int64]
     spent: float
     noticed: int
+    series: int
 
 
 class _Singles:
@@ -131,7 +133,7 @@ class _Vectors:
     def add(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
         """Return the worth (r,) of the machines' stakes and the values since each probable change."""
         r, p = scores.shape
-        active = np.isfinite(scores).all(axis=1)
+        active: npt.NDArray[np.bool_] = np.asarray(np.isfinite(scores).all(axis=1))
         self._starts.append((self._path.copy(), self._steps.copy(), np.where(active, stake, 0.0)))
         self._path += np.where(active[:, np.newaxis], scores, 0.0)
         self._steps += active
@@ -163,12 +165,14 @@ class WeeklyLooks:
         m, p = self._shape = has.shape
         self._scores, self._singles = SequentialScores(m, p), _Singles(m, p)
         self._tails, self._vector_tails = TailShape(), TailShape()
-        kinds, kind = np.unique(has, axis=0, return_inverse=True)
+        alike: dict[bytes, list[int]] = {}
+        for machine in range(m):
+            alike.setdefault(has[machine].tobytes(), []).append(machine)
         # One parameter alone has no vector.
         self._vectors = [
-            _Vectors(np.flatnonzero(kind.ravel() == k), np.flatnonzero(columns))
-            for k, columns in enumerate(kinds)
-            if columns.sum() > 1
+            _Vectors(np.array(rows), np.flatnonzero(has[rows[0]]))
+            for rows in alike.values()
+            if has[rows[0]].sum() > 1
         ]
 
     def restart(self, mask: npt.NDArray[np.bool_]) -> None:
@@ -196,9 +200,10 @@ class WeeklyLooks:
             every[first:end].reshape(part.shape)
             for part, first, end in zip(of_vectors, ends[:-1], ends[1:], strict=True)
         ]
-        stake = self._stake(
-            int(np.isfinite(scores).sum() + sum(np.isfinite(part).all(axis=1).sum() for part in of_vectors))
+        count = int(
+            np.isfinite(scores).sum() + sum(np.isfinite(part).all(axis=1).sum() for part in of_vectors)
         )
+        stake = self._stake(count)
         stakes, since = self._singles.add(scores, stake)
         vector_stakes, vector_since = np.zeros(len(values)), np.zeros(len(values), dtype=np.int64)
         for vectors, part in zip(self._vectors, of_vectors, strict=True):
@@ -209,7 +214,9 @@ class WeeklyLooks:
         for vectors in self._vectors:
             vectors.restart(whole[vectors.rows])
         self.noticed += int(parameters.sum() + whole.sum())
-        return Look(parameters, whole, stakes, vector_stakes, since, vector_since, self.spent, self.noticed)
+        return Look(
+            parameters, whole, stakes, vector_stakes, since, vector_since, self.spent, self.noticed, count
+        )
 
     def _stake(self, count: int) -> float:
         """What is put on each of the ``count`` series of this look."""

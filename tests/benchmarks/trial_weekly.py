@@ -1,8 +1,8 @@
 """Weekly looks at a fleet: how many notices are false, and how late the true ones come.
 
-``python tests/benchmarks/trial_weekly.py [MACHINES]`` prints the tables of docs/trials-statistics.md (numpy; some ten
-minutes for 1000 machines in the first row, a fifth of them in the others). Each fleet is followed for five years of weeks;
-a tenth of its parameters steps once, by 1 to 4 standard deviations, at any week. A notice is false where nothing
+``python tests/benchmarks/trial_weekly.py [MACHINES]`` prints the tables of docs/trials-statistics.md (numpy; some five
+minutes for 1000 machines in the first row, a fifth of them in the others). Each fleet is followed for five years of
+weeks; a tenth of its parameters steps once, by 1 to 4 standard deviations, at any week. A notice is false where nothing
 changed since the series began (or began anew).
 
 The rival that knows where to look is a CUSUM of that one parameter which knows mean, scatter and the size of the step,
@@ -218,10 +218,9 @@ def vector_power(rng: np.random.Generator, machines: int = 200, weeks: int = 104
             if week >= at:
                 single |= look.parameters.any(axis=1)
                 vector |= look.vectors
-        lines.append(
-            f"| {correlation:g} | {length:g} | {100 * single[stepped].mean():.0f} | {100 * vector[stepped].mean():.0f} | "
-            f"{100 * (single | vector)[stepped].mean():.0f} | {false.sum()} |"
-        )
+        shares = (100 * noticed[stepped].mean() for noticed in (single, vector, single | vector))
+        in_words = " | ".join(f"{share:.0f}" for share in shares)
+        lines.append(f"| {correlation:g} | {length:g} | {in_words} | {false.sum()} |")
     return lines
 
 

@@ -119,6 +119,7 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
             for state, meaning in STATES.items()
             if state in {row.state for row in fleet.rows}
         ],
+        "noticed": [(machine, _anchor(machine), what) for machine, what in fleet.noticed],
         "imports": [printed_refusal(refusal) for refusal in fleet.refused_imports],
         "alarms": sum(row.state in ALARMS for row in fleet.rows),
         "measured": sum(row.state != "not measured" for row in fleet.rows),
@@ -174,10 +175,14 @@ def _range(condition: ConditionRange) -> str:
     return f"{lowest} to {highest}, mean {mean} {condition.unit}".strip()
 
 
+def _anchor(machine: str) -> str:
+    return "machine-" + "".join(sign if sign.isalnum() else f"_{ord(sign):x}_" for sign in machine)
+
+
 def _line(row: FleetRow) -> FleetLine:
     return FleetLine(
         machine=row.machine,
-        anchor="machine-" + "".join(sign if sign.isalnum() else f"_{ord(sign):x}_" for sign in row.machine),
+        anchor=_anchor(row.machine),
         location=row.location,
         sign=SIGNS[row.state],
         state=row.state,

@@ -219,7 +219,8 @@ class Fleet:
     """The first page: the week, when the report was made, and the machines by urgency.
 
     ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known. ``ended``
-    says whether the week had, by the shop's clock, when the report was made.
+    says whether the week had, by the shop's clock, when the report was made. ``noticed``: machine and sentence of what
+    was noticed in the week under weekly looks at the fleet.
     """
 
     week: str
@@ -231,6 +232,7 @@ class Fleet:
     rows: tuple[FleetRow, ...]
     refused_imports: tuple[RefusedImport, ...] = ()
     ended: bool = True
+    noticed: tuple[tuple[str, str], ...] = ()
 
 
 def fleet_row(health: MachineHealth) -> FleetRow:
