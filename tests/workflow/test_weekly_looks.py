@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import UTC, datetime
+from dataclasses import replace
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 from by_path import load
 
+from monitor.reporting.health.records import Fleet
+from monitor.reporting.health.render import health_html
 from monitor.store import Database, record_event
 from monitor.workflow.fleet import FleetRequest, fleet
-from monitor.workflow.health.report import report
-from monitor.workflow.health.request import ReportRequest
 from monitor.workflow.health.weeks import week_named
 from monitor.workflow.history.weekly_looks import NoticeKind, sentence, weekly_notices
 from monitor.workflow.trend.request import TrendRequest
@@ -35,7 +36,7 @@ def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
         yield database
 
 
-def test_trend_fleet_and_report_notice_the_same(db: Database, tmp_path: Path) -> None:
+def test_trend_and_fleet_notice_the_same(db: Database) -> None:
     looks = weekly_notices(db)
     (noticed,) = [notice for notice in looks.notices if notice.kind is NoticeKind.PARAMETER]
     assert (noticed.machine, noticed.parameters, noticed.after, noticed.since) == (
@@ -52,14 +53,20 @@ def test_trend_fleet_and_report_notice_the_same(db: Database, tmp_path: Path) ->
     page = trend(db, TrendRequest("M-2", weekly_looks=True)).weekly_looks
     assert page == looks.of_machines({"M-2"})
     assert trend(db, TrendRequest("M-1", weekly_looks=True)).weekly_looks.notices == ()
-    # The report of the week says it on its first page; that of the week before knows nothing of it.
-    made = datetime(2024, 12, 1, tzinfo=UTC)
-    answer = report(db, ReportRequest(noticed.week, out=tmp_path, made_at=made, workers=1))
-    assert noticed in answer.weekly_looks.notices
-    text = (tmp_path / f"health-{noticed.week}.html").read_text(encoding="utf-8")
+    assert weekly_notices(db, week_named("2024-W30")).notices == ()
+
+
+def test_the_first_page_of_the_report_says_it(db: Database) -> None:
+    (noticed,) = [notice for notice in weekly_notices(db).notices if notice.kind is NoticeKind.PARAMETER]
+    day = date(2024, 7, 29)
+    fleet_page = Fleet(
+        noticed.week, day, day, datetime(2024, 8, 5), "monitor", 0.05, (),
+        noticed=((noticed.machine, sentence(noticed)),),
+    )  # fmt: skip
+    text = "".join(health_html(fleet_page, []))
     assert "Noticed this week under weekly looks" in text
     assert f"N{sentence(noticed)[1:]}" in text
-    assert weekly_notices(db, week_named("2024-W30")).notices == ()
+    assert "weekly looks" not in "".join(health_html(replace(fleet_page, noticed=()), []))
 
 
 def test_what_is_noticed_does_not_depend_on_later_weeks(db: Database) -> None:
