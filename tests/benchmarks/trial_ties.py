@@ -37,8 +37,9 @@ HIDDEN = (
     ("cold-cold", "EYC:harmonic1"),
     ("five days", "EXC1:harmonic1"),
     ("five days", "EYC1:harmonic1"),
-    ("one day", "EXX:poly1@x_axis_degC"),
-    ("one day", "EXX:poly1@warmup"),
+    ("one day", "EYY:poly2@x_axis_degC"),
+    ("one day", "EYY:poly2@warmup"),
+    ("one day", "EZC1:const@x_axis_degC"),
 )
 TAU_S = 3600.0
 
