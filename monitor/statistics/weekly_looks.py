@@ -88,6 +88,7 @@ class _Singles:
         self._since = np.zeros(self._worth.shape, dtype=np.int64)
 
     def restart(self, mask: npt.NDArray[np.bool_]) -> None:
+        """Forget the stakes on the series of ``mask`` (m, p)."""
         self._worth[mask] = self._climb[mask] = 0.0
         self._since[mask] = 0
 
@@ -121,6 +122,7 @@ class _Vectors:
         self._starts: deque[tuple[Array, Array, Array]] = deque(maxlen=FOLLOWED)
 
     def restart(self, mask: npt.NDArray[np.bool_]) -> None:
+        """Forget the past of the machines in ``mask`` (r,) and the stakes on them."""
         self._scores.restart(mask)
         for _, _, stake in self._starts:
             stake[mask] = 0.0

@@ -2,10 +2,10 @@
 
 ``python tests/challenge/answer.py OUT PROGRAM [PROGRAM ...]`` writes ``OUT/answers-PROGRAM.json`` (format: README.md
 beside this file). Programs: ``ours``, ``stepwise-bic`` (forward and backward by BIC, as analysts of telescope pointing
-do), ``lasso`` (cross-validated over runs, refitted), ``sindy`` (sequentially thresholded ridge regression on standardised
-columns, the threshold by BIC), ``knockoffs`` (model-X, equicorrelated, false discovery rate 0.2). The others need the
-extra ``challenge``. They get what ours starts from: the residual of the base model and the columns of all effects, with all
-that is free in every run taken out.
+do), ``lasso`` (cross-validated over runs, refitted), ``sindy`` (sequentially thresholded ridge regression on
+standardised columns, the threshold by BIC), ``knockoffs`` (model-X, equicorrelated, false discovery rate 0.2). The others
+need the extra ``challenge``. They get what ours starts from: the residual of the base model and the columns of all
+effects, with all that is free in every run taken out.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ def knockoffs(library: Library) -> list[int]:
         x, Sigma=covariance / np.outer(scale, scale), method="equicorrelated", verbose=False
     )
     copies = sampler.sample_knockoffs()
-    # The statistic of Barber and Candès (Ann. Stat. 43 (2015) 2055), a ridge in place of the lasso path: it takes seconds.
+    # The difference of Barber and Candès (Ann. Stat. 43 (2015) 2055), of a ridge in place of the lasso path.
     both = np.concatenate([x, copies], axis=1)
     beta = np.abs(np.linalg.solve(both.T @ both + 0.01 * len(x) * np.eye(both.shape[1]), both.T @ library.y))
     difference = beta[: x.shape[1]] - beta[x.shape[1] :]
