@@ -3,9 +3,9 @@
 ``python tests/challenge/answer.py OUT PROGRAM [PROGRAM ...]`` writes ``OUT/answers-PROGRAM.json`` (format: README.md
 beside this file). Programs: ``ours``, ``stepwise-bic`` (forward and backward by BIC, as analysts of telescope pointing
 do), ``lasso`` (cross-validated over runs, refitted), ``sindy`` (sequentially thresholded ridge regression on
-standardised columns, the threshold by BIC), ``knockoffs`` (model-X, equicorrelated, false discovery rate 0.2). The others
-need the extra ``challenge``. They get what ours starts from: the residual of the base model and the columns of all
-effects, with all that is free in every run taken out.
+standardised columns, the threshold by BIC), ``knockoffs`` (model-X, equicorrelated, false discovery rate 0.2).
+The others need the extra ``challenge``. They get what ours starts from: the residual of the base model and the columns
+of all effects, with all that is free in every run taken out.
 """
 
 from __future__ import annotations
