@@ -160,10 +160,11 @@ def sindy(library: Library) -> list[int]:
     x = standardised(library)
     gram, projected = x.T @ x, x.T @ library.y
     best, least = [], bic(library, [])
-    for threshold in np.geomspace(0.05, 1.0, 8):
+    for threshold in np.geomspace(0.01, 0.5, 8):
         active = np.ones(x.shape[1], dtype=bool)
         for _ in range(10):
-            ridge = gram[np.ix_(active, active)] + 0.05 * np.eye(int(active.sum()))
+            # 0.05 of a column's length, as pysindy has it for columns of length one.
+            ridge = gram[np.ix_(active, active)] + 0.05 * len(x) * np.eye(int(active.sum()))
             beta = np.linalg.solve(ridge, projected[active])
             small = np.abs(beta) < threshold
             if not small.any():
