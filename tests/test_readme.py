@@ -5,14 +5,18 @@
   command ends in ``# exit status 1``.
 - Fenced ``python`` blocks are run as scripts.
 
-All run in document order in one folder that holds a copy of ``examples/``, as a reader would do it.
+All run in document order in one folder that holds a copy of ``examples/``, as a reader would do it. The first command
+is typed into a shell; what only calls ``monitor`` after it runs in this process, which saves a second of loading each.
 """
 
 from __future__ import annotations
 
+import contextlib
 import doctest
+import io
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -21,6 +25,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from monitor.cli import main
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 README = CHECKOUT / "README.md"
@@ -85,15 +91,8 @@ def reader_environment() -> dict[str, str]:
     return kept | {"PATH": path, "COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
 
 
-def try_out(example: Example, folder: Path) -> str:
-    """Run one example in ``folder`` and return what it prints (nothing where it is not run).
-
-    Raises AssertionError when it ends or prints otherwise than the README says.
-    """
-    source = MAKE.get(example.source, example.source)
-    if example.language == "console" and source.startswith(NOT_RUN):
-        return ""
-    wanted = re.search(r"# exit status (\d+)$", source)
+def run_in_shell(example: Example, source: str, folder: Path) -> tuple[int, str]:
+    """Run an example in a process of its own; its exit status and what it prints."""
     command = [sys.executable, "-c", source] if example.language == "python" else ["bash", "-c", source]
     done = subprocess.run(
         command,
@@ -105,15 +104,44 @@ def try_out(example: Example, folder: Path) -> str:
         text=True,
         timeout=300,
     )
-    told = f"README line {example.line}: {source}\n"
-    status = int(wanted[1]) if wanted else 0
-    assert done.returncode == status, (
-        f"{told}ended with status {done.returncode}, not {status}:\n{done.stdout}"
+    return done.returncode, done.stdout
+
+
+def run_here(source: str, folder: Path) -> tuple[int, str]:
+    """Run a command of ``monitor`` in this process; its exit status and what it prints."""
+    printed = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for name in [name for name in os.environ if name.startswith("MONITOR_")]:
+            patch.delenv(name)
+        for name in ("COLUMNS", "NO_COLOR", "TERM"):
+            patch.setenv(name, reader_environment()[name])
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+            status = main(shlex.split(source, comments=True)[1:])
+    return status, printed.getvalue()
+
+
+def try_out(example: Example, folder: Path, *, in_shell: bool = True) -> str:
+    """Run one example in ``folder`` and return what it prints (nothing where it is not run).
+
+    Without ``in_shell`` a command of ``monitor`` that needs no shell runs in this process. Raises AssertionError where
+    it ends or prints otherwise than the README says.
+    """
+    source = MAKE.get(example.source, example.source)
+    if example.language == "console" and source.startswith(NOT_RUN):
+        return ""
+    wanted = re.search(r"# exit status (\d+)$", source)
+    plain = source.startswith("monitor ") and not re.search(r"[|&;<>$`*?~]", source)
+    status, printed = (
+        run_here(source, folder) if plain and not in_shell else run_in_shell(example, source, folder)
     )
-    same = doctest.OutputChecker().check_output(example.shown + "\n", done.stdout, LOOSELY)
+    line = f"README line {example.line}: {source}\n"
+    expected = int(wanted[1]) if wanted else 0
+    assert status == expected, f"{line}ended with status {status}, not {expected}:\n{printed}"
+    same = doctest.OutputChecker().check_output(example.shown + "\n", printed, LOOSELY)
     if example.shown and not same:
-        raise AssertionError(f"{told}shows\n{example.shown}\nbut prints\n{done.stdout}")
-    return done.stdout
+        raise AssertionError(f"{line}shows\n{example.shown}\nbut prints\n{printed}")
+    return printed
 
 
 def test_readme_examples_do_what_it_says(tmp_path: Path) -> None:
@@ -121,7 +149,8 @@ def test_readme_examples_do_what_it_says(tmp_path: Path) -> None:
         shutil.copytree(CHECKOUT / "examples", tmp_path / "examples")
     typed = examples(README.read_text(encoding="utf-8"))
     assert any(example.language == "console" for example in typed)
-    printed = {example.source: try_out(example, tmp_path) for example in typed}
+    first = next(example for example in typed if example.source.startswith("monitor "))
+    printed = {example.source: try_out(example, tmp_path, in_shell=example == first) for example in typed}
     # The demo is the main job; it takes long and is looked at here, where it runs anyway.
     demo = printed["make demo"]
     assert "five-days: imported, 20 runs, 1240 probings\n" in demo

@@ -69,6 +69,45 @@ class Expected:
         return {axis.column: axis for axis in self.axes or ()}
 
 
+@dataclass(frozen=True)
+class _Columns:
+    """The columns of a table that has all of them, over its rows (n)."""
+
+    run: Wholes
+    sequence: Wholes
+    time: Numbers
+    target: Sequence[str]
+    setup: npt.NDArray[np.float64]
+    readings: Mapping[str, Numbers]
+    channels: Mapping[str, Numbers]
+
+    @property
+    def good(self) -> Mask:
+        """The rows (n,) whose values can be read and whose setup there is; their runs are judged elsewhere."""
+        read: list[Numbers | Wholes] = [
+            *self.readings.values(),
+            *self.channels.values(),
+            self.time,
+            self.sequence,
+        ]
+        return np.asarray(np.logical_and.reduce([*(column.good for column in read), self.setup != 0.0]))
+
+    def probings(self, expected: Expected) -> Probings:
+        """Return the rows in internal units, damaged ones among them."""
+        channels = {name: channel.values for name, channel in self.channels.items()}
+        return Probings(
+            self.run.values,
+            self.sequence.values,
+            self.time.values,
+            np.array(self.target, dtype=np.str_),
+            {
+                axis.name: self.readings[name].values * axis.unit.factor
+                for name, axis in expected.columns.items()
+            },
+            {SETUP: self.setup, **channels} if expected.allowed.needs_setups else channels,
+        )
+
+
 def read_probings(table: CsvTable, expected: Expected, faults: Faults) -> ProbingsPart | None:
     """Read the probings; None where a column is missing or the axes could not be read.
 
@@ -91,21 +130,9 @@ def read_probings(table: CsvTable, expected: Expected, faults: Faults) -> Probin
     complete = read and expected.axes is not None and all(name in table.columns for name in required)
     if not complete or time is None or sequence is None:
         return None
-    columns: list[Numbers | Wholes] = [*readings.values(), *channels.values(), time, sequence]
-    good: Mask = np.logical_and.reduce(
-        [*(column.good for column in columns), known_target, known_run, in_order, setup != 0.0]
-    )
-    probings = Probings(
-        run.values,
-        sequence.values,
-        time.values,
-        np.array(target, dtype=np.str_),
-        {axis.name: readings[name].values * axis.unit.factor for name, axis in expected.columns.items()},
-        {
-            **({SETUP: setup} if expected.allowed.needs_setups else {}),
-            **{name: channel.values for name, channel in channels.items()},
-        },
-    )
+    columns = _Columns(run, sequence, time, target, setup, readings, channels)
+    good: Mask = columns.good & known_target & known_run & in_order
+    probings = columns.probings(expected)
     damaged = _damaged_runs(table, run.values, known_run, good)
     if not good.all():
         probings = probings.rows(good)

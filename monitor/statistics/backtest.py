@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -267,5 +267,5 @@ def backtest(
     predicted, spread, dof, target_runs = predicted[made], spread[made], dof[made], target_runs[made]
     errors = y[target_runs] - predicted
     z = errors / np.maximum(spread, 1e-300)
-    inside = int((np.abs(z) <= -special.stdtrit(dof, (1.0 - level) / 2.0)).sum())
+    inside = int((np.abs(z) <= -scipy.special.stdtrit(dof, (1.0 - level) / 2.0)).sum())
     return Backtest(len(z), inside, level, float(errors.mean()), float(np.sqrt((errors**2).mean())), z)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.records import Array
 from monitor.statistics.scan import DAY_GRID, WIDE_DAYS
@@ -36,7 +36,9 @@ def shows_wide_days(support: Array) -> npt.NDArray[np.bool_]:
         others = np.delete(support, i, axis=0)
         share = np.full(support.shape[1], 1.0 / support.shape[1])
         for _ in range(STEPS):
-            share = (before + special.softmax(others + np.log(share), axis=1).sum(axis=0)) / (1 + len(others))
+            share = (before + scipy.special.softmax(others + np.log(share), axis=1).sum(axis=0)) / (
+                1 + len(others)
+            )
             share = np.maximum(share, 1e-300)
-        shown[i] = special.softmax(log_likelihood + np.log(share))[usual:].sum() >= LIKELY
+        shown[i] = scipy.special.softmax(log_likelihood + np.log(share))[usual:].sum() >= LIKELY
     return shown

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.records import Array
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, candidates, wave_columns
@@ -230,7 +230,7 @@ class Scanner:
         while simulated < trials:
             upto = min(simulated + BLOCK if simulated else FIRST_BLOCK, trials)
             exceeding += int((self._simulated(family, index, upto, rng)[simulated:] >= gain).sum())
-            if exceeding and special.bdtrc(exceeding - 1, upto, level) < HOPELESS:
+            if exceeding and scipy.special.bdtrc(exceeding - 1, upto, level) < HOPELESS:
                 return exceeding / upto
             simulated = upto
         return (1 + exceeding) / (trials + 1)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_array
+import scipy
 
 from monitor.records import Array
 from monitor.uncertainty.row_run import RowRun
@@ -37,7 +37,7 @@ class Expansion:
     residual: Array
     jacobian: Array
     hessian: Array
-    gather: csr_array
+    gather: scipy.sparse.csr_array
     bent: bool
 
     def gradient(self, unknowns: Array, inputs: Array) -> Array:
@@ -93,7 +93,7 @@ def expansion_of(run: RowRun, unknowns: Array, steps: Array) -> Expansion:
     bent = bool(
         np.any(np.abs(reach[:, :, None] * hessian * reach[:, None, :]) > 1e-9 * np.abs(slope * reach).max())
     )
-    gather = csr_array(
+    gather = scipy.sparse.csr_array(
         (np.where(largest_acts, 1.0, 0.0).ravel(), (order.ravel(), np.arange(order.size))),
         shape=(len(unknowns), order.size),
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy import special
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -52,7 +52,7 @@ class Normal:
 
     def quantile(self, probability: Array) -> Array:
         """Quantiles."""
-        return np.asarray(self.mean + self.std * special.ndtri(probability))
+        return np.asarray(self.mean + self.std * scipy.special.ndtri(probability))
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class StudentT:
 
     def quantile(self, probability: Array) -> Array:
         """Quantiles."""
-        return np.asarray(self.mean + self.scale * special.stdtrit(self.dof, probability))
+        return np.asarray(self.mean + self.scale * scipy.special.stdtrit(self.dof, probability))
 
 
 @dataclass(frozen=True)

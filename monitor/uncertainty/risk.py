@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import special
+import scipy
 
 from monitor.exceptions import DataError
 
@@ -62,11 +62,13 @@ class Process:
                 continue
             at = np.linspace(first, last, _POINTS)
             true = self.mean + self.spread * at
-            inside = special.ndtr((acceptance[1] - true) / u) - special.ndtr((acceptance[0] - true) / u)
+            inside = scipy.special.ndtr((acceptance[1] - true) / u) - scipy.special.ndtr(
+                (acceptance[0] - true) / u
+            )
             density = np.exp(-0.5 * at * at) / math.sqrt(2.0 * math.pi)
             step = (last - first) / (_POINTS - 1)
             accepted[index] = step * (
                 np.sum(inside * density) - 0.5 * (inside[0] * density[0] + inside[-1] * density[-1])
             )
-        conforming = float(special.ndtr(edges[2]) - special.ndtr(edges[1]))
+        conforming = float(scipy.special.ndtr(edges[2]) - scipy.special.ndtr(edges[1]))
         return GlobalRisks(float(accepted[0] + accepted[2]), conforming - float(accepted[1]))

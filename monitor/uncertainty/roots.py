@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -50,7 +50,7 @@ def covariance_root(covariance: Array, tolerance: float = RANK_TOLERANCE) -> Cov
     covariance = checked_covariance(covariance)
     scale = np.sqrt(np.diag(covariance))
     safe = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = linalg.eigh(covariance / np.outer(safe, safe))
+    values, vectors = scipy.linalg.eigh(covariance / np.outer(safe, safe))
     largest = max(float(values[-1]), 0.0) if len(values) else 0.0
     if len(values) and values[0] < -max(tolerance, 1e-9) * max(largest, 1e-300):
         raise DataError(
@@ -79,7 +79,7 @@ def whitening(covariance: Array, tolerance: float = RANK_TOLERANCE) -> Array:
             return covariance_root(covariance, tolerance).whitener
         # The squared pivots bound the smallest eigenvalue from above: small ones ask for the rank.
         if float(np.min(np.diag(factor))) ** 2 > 1e3 * tolerance * len(scale):
-            inverse = linalg.solve_triangular(factor, np.eye(len(scale)), lower=True)
+            inverse = scipy.linalg.solve_triangular(factor, np.eye(len(scale)), lower=True)
             return np.asarray(inverse / scale)
     return covariance_root(covariance, tolerance).whitener
 

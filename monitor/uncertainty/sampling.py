@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy import special
+import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
@@ -88,9 +88,9 @@ class JointDistribution:
         latent = self.factor.root @ normal
         if self.copula == "t":
             latent /= np.sqrt(rng.chisquare(self.copula_dof, count) / self.copula_dof)
-            probability = special.stdtr(self.copula_dof, latent)
+            probability = scipy.special.stdtr(self.copula_dof, latent)
         else:
-            probability = special.ndtr(latent)
+            probability = scipy.special.ndtr(latent)
         # Beyond 8 sigma the probability rounds to 0 or 1, where a quantile would be infinite.
         np.clip(probability, 1e-300, 1.0 - 2.0**-53, out=probability)
         drawn = np.empty_like(probability)

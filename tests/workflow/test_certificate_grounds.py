@@ -20,11 +20,15 @@ from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.grounds import GroundKind
 from monitor.store import Database, import_campaign, load_certificate
-from monitor.workflow.certificate.grounds import LARGEST_GAIN, MOST_TIMES, accepted_grounds, grounds_of
+from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
 from monitor.workflow.models import resolve
+from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.uncertainty.grounds import LARGEST_GAIN, MOST_TIMES
+from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.stored import stored_uncertainty
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 DAY = date(2026, 3, 12)
@@ -40,7 +44,7 @@ def five_days() -> Campaign:
 
 def grounds(campaign: Campaign, run: int = 20):
     with Database(":memory:") as db:
-        return grounds_of(campaign, resolve(db, None, campaign.method), [run])
+        return grounds_against(campaign, resolve(db, None, campaign.method), {run: None})
 
 
 def with_bar(campaign: Campaign, more_mm: float) -> Campaign:
@@ -105,6 +109,30 @@ def test_a_gross_reading_of_any_run(five_days: Campaign) -> None:
     assert (ground.kind, ground.run) == (GroundKind.GROSS_READINGS, 2)
     assert ground.subject == f"8 ({five_days.probings.target[row]})"
     assert ground.size == pytest.approx(500.0, abs=5.0)
+
+
+def test_the_grounds_of_a_stored_evaluation_are_read_and_not_determined_again(
+    five_days: Campaign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    readings = dict(five_days.probings.readings)
+    readings["Z"] = readings["Z"].copy()
+    readings["Z"][int(np.flatnonzero(five_days.probings.run == 2)[7])] -= 0.5
+    wrong = with_bar(replace(five_days, probings=replace(five_days.probings, readings=readings)), 1.0)
+    with Database(":memory:") as db:
+        import_campaign(db, wrong)
+        model = resolve(db, None, wrong.method)
+        for run in (19, 20):
+            uncertainty(db, UncertaintyRequest("five-days", run, method="guf"))
+        stored = {run: stored_uncertainty(db, wrong, run, model) for run in (19, 20)}
+        before_that = {
+            run: replace(each, answer=replace(each.answer, grounds=None)) for run, each in stored.items()
+        }
+        determined = grounds_against(wrong, model, before_that)
+        monkeypatch.delattr("monitor.discovery.robust_fit")
+        assert grounds_against(wrong, model, stored) == determined
+    # The gross reading of run 2 speaks against both, once; the rest is of each run.
+    assert [ground.run for ground in determined if ground.kind is GroundKind.GROSS_READINGS] == [2]
+    assert {ground.run for ground in determined if ground.kind is GroundKind.SCALE_BAR} == {19, 20}
 
 
 def test_no_temperature_where_a_bar_gives_the_length(five_days: Campaign) -> None:

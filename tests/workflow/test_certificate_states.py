@@ -25,6 +25,8 @@ from monitor.workflow.certificate.request import (
     VerificationRequest,
 )
 from monitor.workflow.certificate.verification import verify_file
+from monitor.workflow.uncertainty.evaluation import uncertainty
+from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -36,6 +38,9 @@ DONE = "The offset of C was entered into the control after run 10."
 def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     with Database(tmp_path_factory.mktemp("states") / "c.duckdb", threads=1) as opened:
         import_campaign(opened, read_campaign(EXAMPLES / "five-days"))
+        # Evaluated once: every certificate below states these results.
+        for run in (10, 20):
+            uncertainty(opened, UncertaintyRequest("five-days", run, method="guf"))
         yield opened
 
 

@@ -12,9 +12,11 @@ from monitor.cli.budget_output import behind
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.readers import read_linear_axes
+from monitor.reporting.certificate.grounds import ground_sentence
 from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.frames import frame_words, sum_words
 from monitor.reporting.numbers import written_factor
+from monitor.reporting.texts import texts_of
 from monitor.workflow.uncertainty.answer import MonteCarloAnswer, UncertaintyAnswer, ValidationAnswer
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
@@ -99,6 +101,8 @@ def run(options: Namespace) -> int:
         )
     for refusal in answer.refused:
         output.say(f"no number: {refusal.why}")
+    for ground in answer.grounds or ():
+        output.say(f"speaks against a certificate ({ground.kind}): {ground_sentence(ground, texts_of())}")
     return 0
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg, special
+import scipy
 
 from monitor.methods.curve.fit import CurveFit
 from monitor.records import Array
@@ -67,13 +67,13 @@ def _worst(rows: npt.NDArray[np.int64], y: Array, x: Array) -> Outlier | None:
     r = float(studentised[worst])
     # The externally studentised residual is Student's t with one degree of freedom less.
     t = r * np.sqrt((freedom - 1) / max(freedom - r**2, 1e-12))
-    p_value = min(1.0, 2.0 * float(special.stdtr(freedom - 1, -t)) * len(rows))
+    p_value = min(1.0, 2.0 * float(scipy.special.stdtr(freedom - 1, -t)) * len(rows))
     return Outlier(int(rows[worst]), float(residual[worst] / one_less_leverage[worst]), p_value)
 
 
 def _residual(y: Array, x: Array) -> tuple[Array, float, int, Array]:
     """Residual (n,), its standard deviation, degrees of freedom, and one less the leverage (n,)."""
-    u, values, _ = linalg.svd(x, full_matrices=False)
+    u, values, _ = scipy.linalg.svd(x, full_matrices=False)
     basis = u[:, values > 1e-10 * max(values.max(initial=0.0), 1e-300)]
     residual = y - basis @ (basis.T @ y)
     freedom = len(y) - basis.shape[1]

@@ -5,7 +5,7 @@ uncertainties that allow for that noise.
 from __future__ import annotations
 
 import numpy as np
-from scipy import linalg
+import scipy
 
 from monitor.discovery.search.held_out import folds_of, held_out_rms
 from monitor.methods.curve.fit import CurveFit
@@ -60,7 +60,7 @@ def _covariance(fitted: CurveFit, noise: Assessed) -> Array:
     variance = fitted.deviation**2
     if not noise.noticed:
         return np.asarray(variance * inverse)
-    middle = x.T @ linalg.matmul_toeplitz(noise.noise.correlations(len(x)), x)
+    middle = x.T @ scipy.linalg.matmul_toeplitz(noise.noise.correlations(len(x)), x)
     # What the fit takes out of correlated noise is missing from the residual; the trace puts it back.
     absorbed = float(np.trace(inverse @ middle))
     count = len(x)

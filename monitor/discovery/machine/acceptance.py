@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import special
+import scipy
 
 from monitor.discovery.machine.flexible import FlexibleErrors, error_of
 from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows
@@ -66,7 +66,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         rest = float(residual @ residual) - explained
         if size == 0 or dof < 1 or rest <= 0.0:
             return False
-        p_value = float(special.fdtrc(size, dof, explained / size / (rest / dof)))
+        p_value = float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof)))
         return p_value * candidate.variant.tries * candidate.variant.odds * self._families <= self.rate
 
     def _beside(

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
@@ -58,7 +58,7 @@ def p_value_by_poses(
     # What the fit took out of the residual is missing from the sums.
     meat = scores.T @ scores * (int(inside.sum()) / dof)
     statistic = float(onto @ np.linalg.pinv(meat, hermitian=True) @ onto) / size
-    return float(min(1.0, special.fdtrc(size, poses - size, statistic) * candidate.variant.tries))
+    return float(min(1.0, scipy.special.fdtrc(size, poses - size, statistic) * candidate.variant.tries))
 
 
 def widening(scene: ChainScene, selected: Sequence[ChainCandidate], pose: npt.NDArray[np.int64]) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.search.evidence import SMALLEST_REMAINDER, Evidence, Pool, evidence_of, explained_by
@@ -90,6 +90,6 @@ def p_value_against_runs(
     dof = scene.degrees_of_freedom - basis.shape[1] - int(ranks[0])
     if more < 1 or dof < 1 or between <= 0 or stays <= 0:
         return 0.0
-    if special.fdtrc(more, dof, (between / more) / (stays / dof)) > SCATTERS:
+    if scipy.special.fdtrc(more, dof, (between / more) / (stays / dof)) > SCATTERS:
         return 0.0
-    return float(special.fdtrc(int(rank), more, (float(common) / int(rank)) / (between / more)))
+    return float(scipy.special.fdtrc(int(rank), more, (float(common) / int(rank)) / (between / more)))

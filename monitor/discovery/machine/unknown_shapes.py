@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy import special
+import scipy
 
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.flexible import error_of
@@ -168,7 +168,7 @@ def _says_more(scene: ChainScene, whole: ChainCandidate, selected: Sequence[Chai
     rest = float(residual @ residual) - explained
     if size == 0 or dof < 1 or rest <= 0.0:
         return False
-    return float(special.fdtrc(size, dof, explained / size / (rest / dof))) < LEVEL
+    return float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof))) < LEVEL
 
 
 def _parts(scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]) -> list[int]:

@@ -12,7 +12,7 @@ from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.records import Array
 
@@ -95,13 +95,13 @@ def lack_of_fit_test(
     if degrees_of_freedom < 1 or pure_error_degrees_of_freedom < 1 or pure_error <= 0.0:
         return None
     f = (lack / degrees_of_freedom) / (pure_error / pure_error_degrees_of_freedom)
-    p_value = float(special.fdtrc(degrees_of_freedom, pure_error_degrees_of_freedom, f))
+    p_value = float(scipy.special.fdtrc(degrees_of_freedom, pure_error_degrees_of_freedom, f))
     return LackOfFit(float(f), p_value, float(degrees_of_freedom), float(pure_error_degrees_of_freedom))
 
 
 def excess_p_value(chi_square: float, degrees_of_freedom: int) -> float:
     """Return p-value of a sum of squares in stated standard uncertainties."""
-    return float(special.chdtrc(degrees_of_freedom, chi_square))
+    return float(scipy.special.chdtrc(degrees_of_freedom, chi_square))
 
 
 def verdict_of(

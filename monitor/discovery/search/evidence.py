@@ -14,7 +14,7 @@ from typing import Generic
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.discovery.search.candidate import Candidate
 from monitor.discovery.search.projection import orthonormal, without
@@ -186,7 +186,7 @@ def evidence_of(
     stays = np.maximum(total - explained, 1e-300)
     f = np.where(able, (explained / number) / (stays / other), 0.0)
     odds = pool.tries * pool.odds * np.where(too_large, ODDS_OF_TOO_LARGE, 1.0)
-    p_value = np.where(able, np.minimum(1.0, special.fdtrc(number, other, f) * odds), 1.0)
+    p_value = np.where(able, np.minimum(1.0, scipy.special.fdtrc(number, other, f) * odds), 1.0)
     price = rank * np.log(max(dof, 1)) + 2.0 * np.log(odds)
     score = np.where(able, dof * np.log(max(total, 1e-300) / stays) - price, -np.inf)
     return [

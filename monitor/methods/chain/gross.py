@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+import scipy
 
 from monitor.machine import MOTION
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
@@ -152,7 +152,7 @@ class _Deletion:
             return False
         # A model that explains the rest to the last digit leaves no scale of its own: the stated one then.
         scale = max((self.total - drop) / rest, 1.0)
-        return float(special.fdtrc(rank, rest, drop / rank / scale)) * tests < LEVEL
+        return float(scipy.special.fdtrc(rank, rest, drop / rank / scale)) * tests < LEVEL
 
 
 def _deletion(rows: _Rows, out: npt.NDArray[np.bool_]) -> _Deletion:

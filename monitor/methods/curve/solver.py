@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import linalg
+import scipy
 
 from monitor.effects.curve import SEARCHED, CurveEffect, coefficient_names, curve_columns
 from monitor.exceptions import EffectError
@@ -25,16 +25,16 @@ def solve(columns: Array, y: Array) -> tuple[Array, int, Array]:
     columns scaled to unit length."""
     scale = np.linalg.norm(columns, axis=0)
     scale[scale == 0] = 1.0
-    u, values, vectors = linalg.svd(columns / scale, full_matrices=False)
+    u, values, vectors = scipy.linalg.svd(columns / scale, full_matrices=False)
     rank = int(np.sum(values > RANK_TOLERANCE * max(values.max(initial=0.0), 1e-300)))
     # QR keeps more digits than the normal equations, and so does a second step on what is left.
     if rank == columns.shape[1]:
-        q, r = linalg.qr(columns / scale, mode="economic")
-        scaled = linalg.solve_triangular(r, q.T @ y)
-        scaled = scaled + linalg.solve_triangular(r, q.T @ (y - (columns / scale) @ scaled))
+        q, r = scipy.linalg.qr(columns / scale, mode="economic")
+        scaled = scipy.linalg.solve_triangular(r, q.T @ y)
+        scaled = scaled + scipy.linalg.solve_triangular(r, q.T @ (y - (columns / scale) @ scaled))
         return np.asarray(scaled / scale), rank, np.zeros((0, columns.shape[1]))
     scaled = vectors[:rank].T @ ((u[:, :rank].T @ y) / values[:rank])
-    full = linalg.svd(columns / scale, full_matrices=True)[2]
+    full = scipy.linalg.svd(columns / scale, full_matrices=True)[2]
     return np.asarray(scaled / scale), rank, np.asarray(full[rank:])
 
 
@@ -124,7 +124,9 @@ def searched(problem: CurveProblem, effects: Sequence[CurveEffect], index: int) 
         if position != index and (rival.value or not rival.free)
     ]
     _, _, nuisance = problem.columns(others)
-    basis = linalg.orth(nuisance[weighted] / np.maximum(np.linalg.norm(nuisance[weighted], axis=0), 1e-300))
+    basis = scipy.linalg.orth(
+        nuisance[weighted] / np.maximum(np.linalg.norm(nuisance[weighted], axis=0), 1e-300)
+    )
     residual = y[weighted] - basis @ (basis.T @ y[weighted])
     best, least = effect.at(float(values[0])), np.inf
     for value in values:

@@ -131,6 +131,7 @@ def _gaps(value: object) -> list[str]:
 
 
 def gaps_of_text(text: str) -> list[str]:
+    """Return why a text of the laboratory states nothing: blank, or a placeholder; empty where it states something."""
     if not text.strip():
         return [""]
     said = text.strip().casefold()

@@ -33,6 +33,10 @@ class ErrorSteps:
     unit: str = "µm"
 
 
+#: Letters of the names of steps that fit on the page beside each other.
+_LETTERS = 100
+
+
 def error_falling(steps: ErrorSteps, *, title: str) -> Figure:
     """Draw the error of every model version; versions after the first get a plus."""
     fitted = np.asarray(steps.rms, dtype=np.float64)
@@ -85,13 +89,8 @@ def error_falling(steps: ErrorSteps, *, title: str) -> Figure:
                     fontsize=7,
                     color=INK,
                 )
-        labels = [
-            f"+\N{NO-BREAK SPACE}{step.removeprefix('+ ')}".replace("@", "\n@")
-            if index
-            else textwrap.fill(step, 20)
-            for index, step in enumerate(steps.names)
-        ]
-        axes.set_xticks(at, labels)
+        room = max(6, int(_LETTERS / (count + 0.5)))
+        axes.set_xticks(at, [_step_name(index, step, room) for index, step in enumerate(steps.names)])
         axes.set_xlim(-0.5, max(count - 1, 1) + 0.8)
         axes.set_ylim(0.0, 1.22 * float(np.nanmax(np.concatenate([fitted, held_out, [noise]]))))
         axes.set_ylabel(f"RMS residual / {unit}" if unit else "RMS residual")
@@ -99,9 +98,19 @@ def error_falling(steps: ErrorSteps, *, title: str) -> Figure:
     return figure
 
 
+def _step_name(index: int, step: str, room: int) -> str:
+    """Return the name below a step, in lines of ``room`` letters; what was added gets a plus, its driver a line."""
+    parts = (
+        [step]
+        if not index
+        else f"+\N{NO-BREAK SPACE}{step.removeprefix('+ ')}".replace("@", "\n@").split("\n")
+    )
+    return "\n".join(textwrap.fill(part, room, break_on_hyphens=False) for part in parts)
+
+
 def _at_height(value: float, unit: str) -> str:
     """Return the number beside a point: hundredths of a micrometre, three digits of anything else."""
-    return f"{value:.2f}" if unit == "µm" else f"{value:.3g}"
+    return f"{value:.0f}" if value >= 1e3 else f"{value:.2f}" if unit == "µm" else f"{value:.3g}"
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,10 @@ class ParametersOfRuns:
     expanded: npt.ArrayLike
 
 
+#: Days named above a panel; of more, every second, third ... one.
+DAYS_NAMED = 7
+
+
 def parameters_by_run(
     parameters: ParametersOfRuns,
     *,
@@ -80,18 +84,23 @@ def _panel(
     colour = ORANGE if highlighted else BLUE
     present = np.isfinite(values)
     position = np.arange(len(run))
-    for count, label in enumerate(dict.fromkeys(day.tolist())):
+    days = list(dict.fromkeys(day.tolist()))
+    named = max(1, math.ceil(len(days) / DAYS_NAMED))
+    for count, label in enumerate(days):
         inside = np.flatnonzero(day == label)
         start, end = inside[0] - 0.5, inside[-1] + 0.5
+        narrow = (
+            count == 0 and named > 1
+        )  # its words are wider than its band, and the power of ten stands left
         if count % 2 == 0:
             axes.axvspan(start, end, color=FAINT, linewidth=0, zorder=0)
         axes.annotate(
-            f"day {label}" if count == 0 else f"{label}",
-            ((start + end) / 2, 1.0),
+            "" if count % named else f"day {label}" if count == 0 else f"{label}",
+            (start if narrow else (start + end) / 2, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, 1.5),
             textcoords="offset points",
-            ha="center",
+            ha="left" if narrow else "center",
             fontsize=6,
             color=INK,
         )
@@ -112,6 +121,7 @@ def _panel(
     axes.set_xticks(position[::step], [str(number) for number in run[::step]])
     axes.set_xlim(-0.6, len(run) - 0.4)
     axes.yaxis.get_major_locator().set_params(nbins=5)  # type: ignore[call-arg]
+    axes.yaxis.get_offset_text().set_horizontalalignment("right")  # the days stand right of it
     axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
 
 

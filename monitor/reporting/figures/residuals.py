@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,10 @@ from monitor.reporting.texts import texts_of
 
 #: A residual's arrow: the longest is this part of the workspace's longest edge.
 _LONGEST_ARROW = 0.2
+
+
+#: Part of a figure that each of its panels has at least, so that its words have room.
+_LEAST_SHARE = 0.14
 
 
 def residual_bars(
@@ -38,15 +43,22 @@ def residual_bars(
     if not groups:
         raise DataError("groups is empty; a grouping such as 'target' with its labels and RMS is needed")
     bars = {kind: (list(labels), _rms(kind, labels, rms)) for kind, (labels, rms) in groups.items()}
-    counts = [max(len(labels), 3) for labels, _ in bars.values()]
+    total = sum(len(labels) for labels, _ in bars.values())
+    counts = [max(len(labels), 3, _LEAST_SHARE * total) for labels, _ in bars.values()]
     say = texts_of()
     limit = math.inf if level_um is None else 2.0 * level_um
+    printed = [
+        _labelled(labels, 0.88 * width_mm * share / sum(counts))
+        for (labels, _), share in zip(bars.values(), counts, strict=True)
+    ]
+    lines = max(name.count("\n") for names in printed for name in names)
     with style():
-        figure = new_figure(width_mm, height_mm, title)
+        figure = new_figure(width_mm, height_mm + 3.4 * lines, title)
         panels = figure.subplots(1, len(bars), squeeze=False, sharey=True, width_ratios=counts)[0]
-        for axes, (kind, (labels, rms)) in zip(panels, bars.items(), strict=True):
+        for axes, names, (kind, (labels, rms)) in zip(panels, printed, bars.items(), strict=True):
             _bars(axes, rms, rms > limit)
-            _label(axes, labels, sum(counts), width_mm)
+            shown = [index for index, name in enumerate(names) if name]
+            axes.set_xticks(shown, [names[index] for index in shown])
             axes.set_xlabel(say("figures.by", kind=kind), labelpad=2)
             axes.grid(axis="y", color=PALE, linewidth=0.4)
             axes.margins(x=0.02 if len(labels) > 8 else 0.08)
@@ -79,15 +91,17 @@ def _bars(axes: Axes, rms: Array, marked: npt.NDArray[np.bool_]) -> None:
         bar.set_linewidth(0.0)
 
 
-def _label(axes: Axes, labels: list[str], count: int, width_mm: float) -> None:
-    """Label as many bars as have room on a figure of ``count`` bars.
+def _labelled(labels: list[str], panel_mm: float) -> list[str]:
+    """Return what stands under each bar of a panel so wide, "" under those that have no room; a letter takes 1.5 mm.
 
-    Thirty short labels fit across a page; long ones take their width, some 1.5 mm a letter.
+    A few long names are broken into lines instead.
     """
-    room = min(1.0, 5.7 / (1.5 + 1.5 * max(map(len, labels), default=1)))
-    fitting = 30 * len(labels) / count * width_mm / PAGE_WIDTH_MM * room
-    step = max(1, math.ceil(len(labels) / max(2 if room < 1.0 else 4, fitting)))
-    axes.set_xticks(np.arange(len(labels))[::step], labels[::step])
+    longest = max(map(len, labels), default=1)
+    letters = int(panel_mm / max(len(labels), 1) / 1.5) - 1
+    if len(labels) <= 4 and longest > letters:
+        return [textwrap.fill(label, max(letters, 5)) for label in labels]
+    step = max(1, math.ceil(len(labels) * (longest + 1.0) * 1.5 / panel_mm))
+    return [label if index % step == 0 else "" for index, label in enumerate(labels)]
 
 
 @dataclass(frozen=True)

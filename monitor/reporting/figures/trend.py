@@ -88,6 +88,10 @@ def _changes_and_events(axes: Axes, changes: Sequence[float], events: Mapping[fl
         )  # fmt: skip
 
 
+#: Names of parameters that fit beside each other slanted; more stand upright.
+MANY_NAMES = 26
+
+
 def selections_side_by_side(
     names: Sequence[str],
     units: Sequence[str],
@@ -107,6 +111,7 @@ def selections_side_by_side(
     kinds = list(dict.fromkeys(units))
     members = [[index for index, unit in enumerate(units) if unit == kind] for kind in kinds]
     width = 0.8 / max(len(selections), 1)
+    upright = {"rotation": 60} if len(names) <= MANY_NAMES else {"rotation": 90, "fontsize": 5.5}
     shades = (BLUE, ORANGE, MID, INK, PALE)
     with style():
         figure = new_figure(PAGE_WIDTH_MM, 78.0, title)
@@ -121,7 +126,7 @@ def selections_side_by_side(
                     color=shades[row % len(shades)], edgecolor=INK, linewidth=0.3, label=name,
                     hatch=("", "///", "...", "xxx")[row % 4],
                 )  # fmt: skip
-            axes.set_xticks(np.arange(len(part)), [names[index] for index in part], rotation=60)
+            axes.set_xticks(np.arange(len(part)), [names[index] for index in part], **upright)
             axes.set_ylabel(kind, labelpad=2)
             axes.grid(axis="y", color=MID, linewidth=0.25, alpha=0.5)
         panels[0].legend(loc="upper left", fontsize=6.5)

@@ -16,7 +16,7 @@ from monitor.workflow.certificate.orders import Measured
 from monitor.workflow.certificate.results import StoredMonteCarlo, stored_monte_carlo
 from monitor.workflow.models import label
 from monitor.workflow.uncertainty.request import Asked, UncertaintyRequest
-from monitor.workflow.uncertainty.stored import StatedUncertainty, stored_uncertainty
+from monitor.workflow.uncertainty.stored import StatedUncertainty
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,15 @@ class CertifiedRun:
 
 
 def certified_run(
-    db: Database, campaign: Campaign, model: StoredModel, measured: Measured, asked: Asked
+    db: Database,
+    campaign: Campaign,
+    model: StoredModel,
+    measured: Measured,
+    asked: Asked,
+    stored: StatedUncertainty | None,
 ) -> CertifiedRun:
-    """The run's stored evaluation where there is one, else a new one, with the Monte Carlo result stored of it."""
-    evaluated = stored_uncertainty(db, campaign, measured.run, model, asked)
-    if evaluated is None:
-        evaluated = _evaluated(db, campaign, model, measured.run, asked)
+    """Return a run with its ``stored`` evaluation, else a new one, and the Monte Carlo result stored of it."""
+    evaluated = stored or _evaluated(db, campaign, model, measured.run, asked)
     return CertifiedRun(measured, evaluated, stored_monte_carlo(db, evaluated))
 
 

@@ -1,127 +1,36 @@
-"""What speaks against a certificate although everything could be computed: found before it is issued.
-
-Limits, each with its reason; over all examples and labelled campaigns they refuse nothing that is good (the largest
-value there is named): docs/reports-and-certificates.md has the table.
-"""
+"""The grounds against a certificate: read from the stored evaluations of its runs, and accepted by the laboratory."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from monitor.discovery import RobustFit, robust_fit
-from monitor.effects import ChainEffect
 from monitor.exceptions import InputError, RefusedResultError
-from monitor.readers.doubts import LARGEST_BAR_DIFFERENCE, bar_difference
-from monitor.records import Campaign, Run
+from monitor.records import Campaign
 from monitor.reporting.certificate.grounds import AcceptedGround, Ground, GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
 from monitor.store import StoredModel
-from monitor.units import MICROMETRE
-from monitor.workflow.identify.fitting import machine_problem
-
-#: The residuals over what the stated uncertainties leave. Up to three a probe's statement may be wrong, and lack of fit
-#: has its line in the budget; from five on 96 % of their variance has no known source. Largest of a complete model:
-#: 1.6; with hidden effects: 3.4 (tracked-robot).
-MOST_TIMES = 5.0
-#: mm/m. A steel scale 30 K off 20 °C comes to 0.35; what is more is no property of an axis, but a wrong length. Largest
-#: in the examples: 0.07.
-LARGEST_GAIN = 1e-3
-#: rad. Axes of machines given by letters are set up to tenths of a milliradian at worst; 5 mrad are 2.5 mm over 500 mm.
-#: Joints of a chain with lengths are mastered to degrees. Largest in the examples: 0.06 mrad, of the robot 8 mrad.
-LARGEST_ANGLE, LARGEST_MASTERING = 5e-3, float(np.deg2rad(5.0))
-#: mm. An axis of a machine given by letters lies where the machine file's coordinates put it, to some tenths. Largest
-#: in the examples: 0.11. Of a chain with lengths `identify` compares each with its own.
-LARGEST_OFFSET = 5.0
-#: What a recorded temperature that says how long the bar was is called.
-TEMPERATURES = ("ambient", "air", "bar", "artefact", "artifact", "workpiece")
+from monitor.workflow.uncertainty.stored import StatedUncertainty
 
 
-def grounds_of(campaign: Campaign, model: StoredModel, runs: Sequence[int]) -> tuple[Ground, ...]:
-    """Every ground against a certificate of these runs. Raises DataError where the campaign cannot be fitted."""
-    robust = robust_fit(machine_problem(campaign, model))
-    by_number = {run.run: run for run in campaign.runs}
-    return (
-        *_gross_readings(robust),
-        *(ground for run in runs for ground in _of_run(campaign, robust, by_number[run])),
-    )
+def grounds_against(
+    campaign: Campaign, model: StoredModel, stored: Mapping[int, StatedUncertainty | None]
+) -> tuple[Ground, ...]:
+    """Return every ground against a certificate of runs, which are given with their stored evaluations.
 
+    They are determined where no evaluation has them. Raises DataError where the campaign cannot be fitted then.
+    """
+    by_run = [None if stated is None else stated.answer.grounds for stated in stored.values()]
+    if None in by_run:
+        # Loaded here: what is stored waits for no solver.
+        from monitor.discovery import robust_fit
+        from monitor.workflow.identify.fitting import machine_problem
+        from monitor.workflow.uncertainty.grounds import grounds_of
 
-def _of_run(campaign: Campaign, robust: RobustFit, run: Run) -> Iterator[Ground]:
-    yield from _lack_of_fit(robust, run.run)
-    yield from _implausible(campaign, robust, run.run)
-    yield from _scale_bar(campaign, run.run)
-    yield from _temperature(campaign, run)
-
-
-def _gross_readings(robust: RobustFit) -> Iterator[Ground]:
-    """Of any run: the covariance of the readings is pooled over all of them."""
-    for reading in robust.gross:
-        size = MICROMETRE.to_display(abs(reading.size))
-        subject = f"{reading.sequence} ({reading.target})"
-        yield Ground(GroundKind.GROSS_READINGS, reading.run, subject, size, None, MICROMETRE.name)
-
-
-def _lack_of_fit(robust: RobustFit, run: int) -> Iterator[Ground]:
-    fit = robust.fit
-    index = int(np.flatnonzero(fit.problem.runs == run)[0])
-    weighted = fit.solution.last.residual[index]
-    rows = (fit.problem.context.run == run) & ~fit.left_out
-    freedom = int(rows.sum()) * len(fit.problem.components) + len(fit.problem.extra_names)
-    freedom -= int(fit.solution.rank[index])
-    if freedom < 1:
-        return
-    times = float(np.sqrt(weighted @ weighted / freedom))
-    if times > MOST_TIMES:
-        yield Ground(GroundKind.LACK_OF_FIT, run, "", times, MOST_TIMES)
-
-
-def _implausible(campaign: Campaign, robust: RobustFit, run: int) -> Iterator[Ground]:
-    """Gains, angles and offsets that are none of a machine, by what the run determines for certain."""
-    problem, solution = robust.fit.problem, robust.fit.solution
-    index = int(np.flatnonzero(problem.runs == run)[0])
-    has_lengths = bool(campaign.machine.chain)
-    for effect, columns in zip(problem.base, problem.base_columns, strict=True):
-        if not isinstance(effect, ChainEffect) or not solution.local_free[index, columns.start]:
-            continue
-        if effect.is_gain:
-            limit = LARGEST_GAIN
-        elif effect.text != effect.term.symbol:
-            continue
-        elif effect.term.is_rotation:
-            limit = LARGEST_MASTERING if has_lengths else LARGEST_ANGLE
-        else:
-            limit = np.inf if has_lengths else LARGEST_OFFSET
-        value = float(solution.local[index, columns.start])
-        if abs(value) > limit:
-            unit, name = effect.unit, problem.base_names[columns.start]
-            size, most = unit.to_display(value), unit.to_display(limit)
-            yield Ground(GroundKind.IMPLAUSIBLE, run, name, size, most, unit.name)
-
-
-def _scale_bar(campaign: Campaign, run: int) -> Iterator[Ground]:
-    difference = bar_difference(campaign)
-    if difference is not None and abs(difference) > LARGEST_BAR_DIFFERENCE:
-        bar = campaign.artefact.scale_bar
-        assert bar is not None
-        yield Ground(GroundKind.SCALE_BAR, run, "-".join(bar.balls), difference, LARGEST_BAR_DIFFERENCE, "mm")
-
-
-def _temperature(campaign: Campaign, run: Run) -> Iterator[Ground]:
-    """A bar gives the unit of length: without a temperature nobody can say how long it was (11.5 µm/m for 1 K)."""
-    bar = campaign.artefact.scale_bar
-    if bar is None:
-        return
-    recorded = [name for name, value in run.conditions.items() if np.isfinite(value)]
-    rows = campaign.probings.run == run.run
-    recorded += [
-        name for name, values in campaign.probings.channels.items() if np.isfinite(values[rows]).any()
-    ]
-    if not any(
-        name.endswith("_degC") and any(word in name.lower() for word in TEMPERATURES) for name in recorded
-    ):
-        yield Ground(GroundKind.TEMPERATURE, run.run, "-".join(bar.balls))
+        robust = robust_fit(machine_problem(campaign, model))
+        by_run = [grounds_of(campaign, robust, run) for run in stored]
+    # Gross readings of any run speak against each: once each, before what is the runs' own.
+    grounds = dict.fromkeys(ground for of_run in by_run for ground in of_run or ())
+    return tuple(sorted(grounds, key=lambda ground: ground.kind is not GroundKind.GROSS_READINGS))
 
 
 def accepted_grounds(

@@ -27,7 +27,7 @@ from monitor.workflow.certificate.answer import CertificateFileAnswer, Certifica
 from monitor.workflow.certificate.certified import CertifiedRun, certified_run, inputs_of
 from monitor.workflow.certificate.conformity import statement_of
 from monitor.workflow.certificate.files import keep_issued, path_of, prepared, publish
-from monitor.workflow.certificate.grounds import accepted_grounds, grounds_of
+from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.inputs import CertificateInputs
 from monitor.workflow.certificate.orders import (
     check_adjustment,
@@ -43,6 +43,7 @@ from monitor.workflow.certificate.results import results_of
 from monitor.workflow.certificate.states import state_of
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import label, resolve_for
+from monitor.workflow.uncertainty.stored import stored_uncertainty
 
 
 def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
@@ -68,9 +69,9 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     path = path_of(request.out, number)
     keep_issued(db, path)
     model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
-    grounds = grounds_of(campaign, model, [run.run for run in measured])
-    accepted = accepted_grounds(grounds, request.accept)
-    runs = [certified_run(db, campaign, model, run, request.asked) for run in measured]
+    stored = {run.run: stored_uncertainty(db, campaign, run.run, model, request.asked) for run in measured}
+    accepted = accepted_grounds(grounds_against(campaign, model, stored), request.accept)
+    runs = [certified_run(db, campaign, model, run, request.asked, stored[run.run]) for run in measured]
     identity = CertificateIdentity(
         number, day, label(runs[-1].evaluated.model),
         method_name=_method_name(campaign.method, texts_of(stated.language or ENGLISH)),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import scipy
+
 from monitor.reporting.health.records import PoseError, VolumetricMap
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 
@@ -14,14 +16,12 @@ def probability_beyond(answer: VolumetricAnswer, limit_um: float) -> float:
 
     That of the point that is worst by the estimates: the length of a vector with its own uncertainty.
     """
-    from scipy.special import ndtr, stdtr
-
     beyond = answer.worst.error_um - limit_um
     if answer.worst.u_um <= 0.0:
         return float(beyond > 0.0)
     freedom = answer.degrees_of_freedom
     z = beyond / answer.worst.u_um
-    return float(ndtr(z) if freedom is None else stdtr(freedom, z))
+    return float(scipy.special.ndtr(z) if freedom is None else scipy.special.stdtr(freedom, z))
 
 
 def stated_map(

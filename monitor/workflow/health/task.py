@@ -7,7 +7,7 @@ later runs), uncertainty, explanation and map all rest on that fit, uncertainty 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -28,6 +28,7 @@ from monitor.workflow.identify.machine import identified
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.evaluation import evaluate_fit
+from monitor.workflow.uncertainty.grounds import grounds_of
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import StatedUncertainty
@@ -113,7 +114,9 @@ class _Fitted:
     def uncertainty(self) -> UncertaintyAnswer:
         task = self._task
         request = UncertaintyRequest(task.past.name, task.run, method=METHOD)
-        return answer_of(evaluate_fit(task.past, task.model, self.fit, request))
+        answer = answer_of(evaluate_fit(task.past, task.model, self.fit, request))
+        # What was measured later may speak against a certificate, too.
+        return replace(answer, grounds=grounds_of(task.past, self.robust, task.run)) if task.whole else answer
 
     @property
     def evaluated(self) -> StatedUncertainty:

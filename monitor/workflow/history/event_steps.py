@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from monitor.records import Array
 from monitor.store import NOTE, MachineEvent
@@ -109,10 +110,7 @@ def _student(first: Array, second: Array) -> tuple[float, float] | None:
     u = float(np.sqrt(squares / freedom * (1.0 / len(first) + 1.0 / len(second))))
     if u <= 0.0:
         return None
-    # Loaded here: pages without an event do not wait for it.
-    from scipy.special import stdtr
-
-    return u, float(2.0 * stdtr(freedom, -abs(second.mean() - first.mean()) / u))
+    return u, float(2.0 * scipy.special.stdtr(freedom, -abs(second.mean() - first.mean()) / u))
 
 
 def _means(series: Series) -> Array:

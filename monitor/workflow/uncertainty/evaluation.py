@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from monitor.discovery import Fit, fit
+from monitor.discovery import Fit, fit, robust_fit
 from monitor.discovery.machine.model_uncertainty import model_uncertainty
 from monitor.discovery.machine.variants import variants_of
 from monitor.effects.catalogue import catalogue
@@ -18,6 +18,7 @@ from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.results import refusals
 from monitor.records import Array, Campaign
+from monitor.reporting.certificate.grounds import Ground
 from monitor.reporting.covariance_source import CovarianceSource, TakenAsKnown
 from monitor.store import Database, StoredModel
 from monitor.uncertainty import (
@@ -42,6 +43,7 @@ from monitor.workflow.models import as_model, resolve_for
 from monitor.workflow.selections.readings import SelectedReadings, selected_readings
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.beside import Linearised, beside_readings
+from monitor.workflow.uncertainty.grounds import grounds_of
 from monitor.workflow.uncertainty.inputs import (
     calibrated_inputs,
     reading_inputs,
@@ -268,6 +270,16 @@ def uncertainty(db: Database, request: UncertaintyRequest) -> UncertaintyAnswer:
     With ``request.before`` it is stored as ``partial uncertainty``: it is not the result of the whole campaign.
     """
     result = evaluate(db, request)
-    answer = answer_of(result)
+    answer = replace(answer_of(result), grounds=_grounds(result, request))
     save_uncertainty(db, answer, result.model, request.method, request.before)
     return answer
+
+
+def _grounds(result: RunUncertainty, request: UncertaintyRequest) -> tuple[Ground, ...] | None:
+    """Determine what speaks against a certificate; None where runs took no part, or no robust fit stands."""
+    if request.before is not None:
+        return None
+    try:
+        return grounds_of(result.campaign, robust_fit(result.fit.problem), result.run)
+    except DataError:
+        return None
