@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: concurrency kills real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
+.PHONY: challenge concurrency kills real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -48,6 +48,8 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_empty.py --seeds 300 --seconds 1200
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_days.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_weekly.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_ties.py 20
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_dependence.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_robots.py --seeds 10
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_mounts.py --seeds 30
@@ -61,6 +63,15 @@ concurrency: setup  ## eight importers and twenty readers at one database for te
 
 kills: setup  ## twelve verbs killed 500 times at random moments (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/kills.py $(ARGS)
+
+# CAMPAIGNS=40 writes and answers fewer of them, DIR=... elsewhere.
+CAMPAIGNS ?= 1000
+DIR ?= demo-output/challenge
+challenge: setup  ## campaigns with sealed truth, answered by ours and four others (docs/challenge.md); hours for 1000
+	@$(RUN) -m pip install --quiet --constraint constraints.txt 'scikit-learn>=1.5' 'knockpy>=1.3'
+	@$(RUN) tests/challenge/generate.py $(DIR) --campaigns $(CAMPAIGNS)
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(RUN) tests/challenge/answer.py $(DIR) $(ARGS)
+	@$(RUN) tests/challenge/score.py $(DIR)
 
 wheel: setup  ## build the wheel and run the tests against it, away from the checkout
 	@$(RUN) tests/setup/installed_wheel.py $(PARALLEL) $(ARGS)

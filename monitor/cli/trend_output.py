@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from monitor.cli import output
-from monitor.workflow.history import agreement
+from monitor.workflow.history import agreement, weekly_looks
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
@@ -69,9 +69,26 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from _backtest(answer)
     yield from _resemblance(answer)
     yield from dict.fromkeys(parameter.drift.why for _, parameter in parameters if parameter.drift.why)
+    if answer.weekly_looks is not None:
+        yield from weekly_lines(answer.weekly_looks)
     for event in answer.events:
         yield f"event {event.at[:10]}: {event.kind}, {event.description}"
     yield from answer.figures or ()
+
+
+def weekly_lines(looks: weekly_looks.WeeklyNotices, *, machines: bool = False) -> Iterator[str]:
+    """What weekly looks noticed, a sentence each, with the name of the machine where there are several."""
+    for notice in looks.notices:
+        yield (
+            f"{notice.machine}: {weekly_looks.sentence(notice)}"
+            if machines
+            else weekly_looks.sentence(notice)
+        )
+    yield (
+        f"weekly looks: {looks.weeks} weeks, {looks.machines} machine{'' if looks.machines == 1 else 's'}, "
+        f"{looks.series} series in the last; of all notices at most {100 * looks.false_discovery_rate:g} % false on "
+        f"average{'' if looks.notices else '; nothing was noticed'}"
+    )
 
 
 def _size(answer: TrendAnswer) -> str:

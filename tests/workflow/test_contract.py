@@ -30,6 +30,7 @@ BESIDES_QUESTIONS = {
     "demo:fresh_database",
     "explain.curve_sentences:correlation",  # a sentence that two verbs print
     "history.agreement:sentence",
+    "history.weekly_looks:sentence",
     "health.mail:mail_report",  # sends what was written; nothing is asked
     "health.mail:read_mail_settings",
 }

@@ -47,6 +47,11 @@ def options(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
     )
+    parser.add_argument(
+        "--weekly-looks",
+        action="store_true",
+        help="also what looks at the whole fleet every week noticed (reads the history of every machine)",
+    )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw every parameter over the dates")
 
 
@@ -69,6 +74,7 @@ def run(options: Namespace) -> int:
         model=options.model,
         volumetric_limit_um=options.volumetric_limit,
         figures=options.figures,
+        weekly_looks=options.weekly_looks,
     )
     with opened(options) as db, output.working("following"):
         answer = trend(db, request)

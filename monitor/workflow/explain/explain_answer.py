@@ -9,6 +9,7 @@ from monitor.documents import INLINED, OMITTED, named
 from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
+from monitor.workflow.explain.ties import Tie
 from monitor.workflow.identify.answer import CurveNoise, Estimate
 
 
@@ -52,7 +53,8 @@ class MachineMissing:
 
     ``heldout_..`` are None with one run of few poses, ``heldout_days_..`` with fewer than three days,
     ``heldout_poses_..`` (poses left out of every run) with fewer than eight poses. ``coinciding`` are rivals that no
-    data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart. Where the catalogue does
+    data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart; ``ties``
+    say for every rival what does. Where the catalogue does
     not have the shape of the effect, ``shape_unknown`` says so, ``nearest_shape`` is the entry that comes closest, and
     ``curve`` the shape in ``unit``, without the constant and the slope that every run has of its own.
     ``reversal_value`` of a play (ISO 230-2) is twice its amplitude: what a backlash compensation is set to.
@@ -91,6 +93,7 @@ class MachineMissing:
     reversal_value: Estimate | None = field(default=None, metadata=OMITTED)
     travelled_periods: float | None = field(default=None, metadata=OMITTED)
     within_its_shape: tuple[str, ...] = ()
+    ties: tuple[Tie, ...] = ()
 
 
 @dataclass(frozen=True)

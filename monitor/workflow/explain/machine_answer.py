@@ -30,6 +30,7 @@ from monitor.workflow.explain.shared_answer import (
     rivals,
     searched_value,
 )
+from monitor.workflow.explain.ties import ties_of
 from monitor.workflow.identify.answer import Estimate, reversal_value
 
 
@@ -113,6 +114,7 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         reversal_value=reversal_value(
             effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
         ),
+        ties=ties_of(effect, rivals(effect)),
     )
 
 

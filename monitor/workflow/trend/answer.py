@@ -13,6 +13,7 @@ from enum import Enum
 from monitor.documents import INLINED, OMITTED, named
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
+from monitor.workflow.history.weekly_looks import WeeklyNotices
 
 #: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
 FEW_DAYS = DAYS_THAT_SHOW
@@ -385,3 +386,4 @@ class TrendAnswer:
     parameters: Mapping[str, ParameterTrend]
     volumetric_error: VolumetricForecast | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)

@@ -28,6 +28,7 @@ from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.runs import same_hours, selected_campaigns
+from monitor.workflow.history.weekly_looks import weekly_notices
 from monitor.workflow.trend.answer import (
     ControlCharts,
     ParameterTrend,
@@ -66,6 +67,8 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
         save_analysis(
             db, "trend", to_document(answer), method="all parameters", machine=request.machine, seed=SEED
         )
+    if request.weekly_looks:
+        answer = replace(answer, weekly_looks=weekly_notices(db).of_machines({request.machine}))
     if request.figures is None:
         return answer
     # Loaded here: the libraries that draw take longer to load than a page to make.
