@@ -35,10 +35,13 @@ ROOMS: dict[str, set[str]] = {
     "workflow": {
         "machine", "readers", "statistics", "store", "reporting", "effects", "methods", "uncertainty", "discovery",
     },
-    # Opens the database, reads files named by options, and says with which key is signed; it computes nothing.
-    "cli": {"workflow", "readers", "store", "reporting"},
     # Opens the database and hands out answers as tables; it computes nothing.
     "api": {"workflow", "readers", "store"},
+    # Opens the database, turns documents and forms into requests and answers into pages; it computes nothing.
+    "web": {"workflow", "store", "reporting"},
+    # Opens the database, reads files named by options, says with which key is signed, and starts the server; it
+    # computes nothing.
+    "cli": {"workflow", "readers", "store", "reporting", "web"},
 }  # fmt: skip
 
 # Room -> the parts of monitor that it may import, besides itself.
@@ -54,14 +57,16 @@ ALLOWED: dict[str, set[str]] = {
 # Library -> the only rooms that may know it; of a room that is still to be built, none.
 KEEPERS: dict[str, set[str]] = {
     "duckdb": {"store"},
-    "jinja2": {"reporting"},
+    "jinja2": {"reporting", "web"},
     "weasyprint": {"reporting"},
     "matplotlib": {"reporting"},
     "pyhanko": {"reporting"},
     "pkcs11": {"reporting"},
-    "fastapi": set(),
-    "starlette": set(),
-    "uvicorn": set(),
+    "fastapi": {"web"},
+    "starlette": {"web"},
+    "uvicorn": {"web"},
+    "pydantic": {"web"},
+    "plotly": {"web"},
     "numba": {"uncertainty"},
     "pandas": {"store", "api"},
     "dask": {"uncertainty"},

@@ -9,6 +9,7 @@ is therefore computed with ``threads=1`` (or in numpy, in a fixed order).
 
 from __future__ import annotations
 
+import copy
 import re
 import threading
 import time
@@ -57,6 +58,7 @@ class Database:
         self.read_only = read_only
         self.actor = actor
         self._lock = threading.RLock()
+        self._writing = threading.RLock()
         self._in_transaction = False
         self._connection = _connect(self.path, read_only, threads)
         try:
@@ -76,6 +78,31 @@ class Database:
     def close(self) -> None:
         """Close the file; other processes can open it then."""
         self._connection.close()
+
+    def session(self, actor: str) -> Database:
+        """Return a second view of the open file for another user; sessions read at the same time, and write in turn.
+
+        Close it when it is no longer needed; the file stays open until this database is closed.
+        """
+        session = copy.copy(self)
+        session.actor = actor
+        session._lock = threading.RLock()
+        session._in_transaction = False
+        with self._lock:
+            session._connection = self._connection.cursor()
+        return session
+
+    def confine(self, folder: Path) -> None:
+        """Let queries of this file and its sessions read and write no other files than those below ``folder``.
+
+        DuckDB's SQL reads any file that the process may read; what is asked over a network must not. It holds until
+        the file is closed.
+        """
+        literal = str(folder.resolve()).replace("'", "''")
+        with self._lock:
+            self._connection.execute(f"SET allowed_directories = ['{literal}']")
+            self._connection.execute("SET enable_external_access = false")
+            self._connection.execute("SET lock_configuration = true")
 
     def execute(self, sql: str, parameters: Parameters = ()) -> None:
         """Run a statement. Values are always bound, never written into the text."""
@@ -147,7 +174,8 @@ class Database:
 
         A transaction inside another joins it.
         """
-        with self._lock:
+        # In this order always: a thread that waits for its turn to write holds nothing that the writer needs.
+        with self._writing, self._lock:
             if self.read_only:
                 raise StoreError(f"{self.path} was opened for reading only; nothing can be changed")
             if self._in_transaction:

@@ -1,0 +1,129 @@
+"""Model against measurement: where it fails, what is missing, add it, watch the error fall, take it out again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse, Response
+
+from monitor.exceptions import MonitorError, NotFoundError
+from monitor.web.charts.residuals import (
+    MAGNIFICATIONS,
+    failing_charts,
+    falling_chart,
+    ranking_chart,
+    scene_chart,
+    scene_vectors,
+)
+from monitor.web.desk import Ticket
+from monitor.web.forms import read_form
+from monitor.web.rendering import link, page
+from monitor.workflow.explain.explain_answer import MachineExplanation
+from monitor.workflow.model.answer import ChangeModelAnswer
+
+
+def routes() -> APIRouter:
+    """Return the routes of the page and of its two buttons."""
+    router = APIRouter()
+
+    @router.get("/model")
+    def model(request: Request, campaign: str, model: str = "", effect: str = "", note: str = "") -> Response:
+        """Compare a model with a campaign; with an effect tried beside it."""
+        user, desk, ask = request.state.user, request.app.state.desk, request.app.state.asker
+        row = next((row for row in ask(user, "campaigns").campaigns if row.campaign == campaign), None)
+        if row is None:
+            raise NotFoundError(f"there is no campaign '{campaign}'; the page Campaigns lists them")
+        asked = {"campaign": campaign, **({"model": model} if model else {})}
+        tickets: dict[str, Ticket] = {"explain": desk.ask(user, "explain", asked)}
+        if row.rows is None:
+            tried = {"effect": effect} if effect else {}
+            tickets["residuals"] = desk.ask(user, "residuals", {**asked, **tried})
+        tickets["compare"] = desk.ask(user, "compare", asked)
+        compare, why = _answered(tickets["compare"])
+        if compare is not None:
+            tickets["history"] = desk.ask(
+                user, "model history", {"campaign": campaign, "model": compare.comparison.model}
+            )
+        answers: dict[str, Any] = {"compare": compare}
+        refusals = {"compare": why}
+        for name, ticket in tickets.items():
+            if name != "compare":
+                answers[name], refusals[name] = _answered(ticket)
+        explained = answers["explain"]
+        explanation = None if explained is None else explained.explanation
+        missing = explanation.missing if isinstance(explanation, MachineExplanation) else ()
+        residuals = answers.get("residuals")
+        history = answers.get("history")
+        versions = ask(user, "models").models
+        return page(
+            request, "model.html",
+            row=row, campaign=campaign, compare=compare, explanation=explanation,
+            missing=() if explanation is None else explanation.missing, refusals=refusals,
+            model=compare.comparison.model if compare is not None else model,
+            effect=effect, note=note, effects=[candidate.effect for candidate in missing],
+            scene=None if residuals is None else scene_chart(residuals),
+            vectors=None if residuals is None else scene_vectors(residuals),
+            residuals=residuals, magnifications=MAGNIFICATIONS,
+            failing=[] if compare is None else failing_charts(compare),
+            ranking=ranking_chart(missing) if missing else None,
+            falling=None if history is None else falling_chart(history.steps, missing[0] if missing else None),
+            steps=() if history is None else history.steps,
+            versions=versions, current=_version(versions, compare.comparison.model if compare else ""),
+            waiting=next((ticket for ticket in tickets.values() if not ticket.is_done), None),
+        )  # fmt: skip
+
+    @router.post("/model/add")
+    async def add(request: Request) -> Response:
+        """Add an effect: a new version of the model, or a new model."""
+        form = await read_form(request)
+        campaign, effect = form.text("campaign"), form.text("effect")
+        document = {
+            "effect": effect,
+            "campaign": campaign,
+            "to": form.text("to"),
+            **form.filled("new_name", "note"),
+        }
+        answer = await _asked(request, "add effect", document)
+        return _back(campaign, answer, f"{effect} was added")
+
+    @router.post("/model/undo")
+    async def undo(request: Request) -> Response:
+        """Take an effect out again: a new version without it."""
+        form = await read_form(request)
+        campaign, effect = form.text("campaign"), form.text("effect")
+        answer = await _asked(request, "remove effect", {"effect": effect, "model": form.text("model")})
+        return _back(campaign, answer, f"{effect} was taken out")
+
+    return router
+
+
+async def _asked(request: Request, question: str, document: dict[str, Any]) -> Any:
+    return await run_in_threadpool(request.app.state.asker, request.state.user, question, document)
+
+
+def _answered(ticket: Ticket) -> tuple[Any, str]:
+    """The answer of a ticket and why there is none; both empty while it is computed."""
+    try:
+        return ticket.answer(), ""
+    except MonitorError as error:
+        return None, str(error)
+
+
+def _back(campaign: str, answer: ChangeModelAnswer, done: str) -> Response:
+    version = answer.model.version
+    name = (
+        version.model if "@" in version.model or version.version == 1 else f"{version.name}@{version.version}"
+    )
+    note = f"{done}: the model is now {name}"
+    return RedirectResponse(link("/model", campaign=campaign, model=name, note=note), status_code=303)
+
+
+def _version(versions: Any, name: str) -> Any:
+    """The version by its label, ``samba`` or ``samba@2``; None for a model that was never stored."""
+    base, _, number = name.partition("@")
+    return next(
+        (version for version in versions if version.name == base and version.version == int(number or 1)),
+        None,
+    )
