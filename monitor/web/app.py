@@ -17,8 +17,8 @@ from monitor.web.faults import Refusal, refusal_of
 from monitor.web.gate import Gate
 from monitor.web.interface import ROOT, interface
 from monitor.web.opening import host_user_name
-from monitor.web.pages import certificates, importing, keeping, model, visiting
 from monitor.web.pages import campaign as campaign_page
+from monitor.web.pages import certificates, importing, keeping, model, visiting
 from monitor.web.pages import fleet as fleet_page
 from monitor.web.pages import machine as machine_page
 from monitor.web.rendering import refusal_page

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from starlette.datastructures import UploadFile
+from starlette.datastructures import FormData, UploadFile
 from starlette.requests import Request
 
 from monitor.exceptions import InputError
@@ -35,9 +37,14 @@ class Form:
         return {name: self.texts[name] for name in names if self.texts.get(name)}
 
 
-async def read_form(request: Request) -> Form:
-    """Return the form of a request. Raises ForbiddenError without the proof of its session (CSRF)."""
-    form = await request.form(max_files=2000, max_fields=200)
+@asynccontextmanager
+async def read_form(request: Request) -> AsyncIterator[Form]:
+    """Yield the form of a request. Raises ForbiddenError without the proof of its session (CSRF)."""
+    async with request.form(max_files=2000, max_fields=200) as form:
+        yield _checked(request, form)
+
+
+def _checked(request: Request, form: FormData) -> Form:
     sessions: Sessions = request.app.state.sessions
     session, proof = request.state.session, form.get(PROOF)
     if session is None or not isinstance(proof, str) or not sessions.is_proof(session, proof):

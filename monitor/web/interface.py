@@ -23,7 +23,7 @@ from starlette.responses import JSONResponse, Response
 
 from monitor import __version__
 from monitor.documents import to_document
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, MonitorError
 from monitor.web.access import FILES, offered, role_needed, taken_fields
 from monitor.web.asking import Asker, check_role, download_path
 from monitor.web.faults import refusal_of
@@ -77,19 +77,21 @@ def _answering(asker: Asker, question: str, working_folder: Path) -> Any:
             return await run_in_threadpool(_answered, asker, user, question, document, upload, working_folder)
         except Exception as error:
             return refused(error)
+        finally:
+            await request.close()
 
     return answer
 
 
-def refused(error: Exception) -> JSONResponse:
-    """Return a refusal as a document: ``error``, and ``faults`` where a folder was refused."""
+def refused(error: Exception, folder: str = "") -> JSONResponse:
+    """Return a refusal as a document: ``error``, and ``faults`` of a refused folder; without the server's ``folder``."""
     refusal = refusal_of(error)
     if refusal.status == 500:
         _log.error("a question failed", exc_info=error)
     content: dict[str, Any] = {"error": refusal.error}
     if refusal.faults:
         content["faults"] = refusal.faults
-    return JSONResponse(content, refusal.status)
+    return JSONResponse(_without(content, folder) if folder else content, refusal.status)
 
 
 async def _body(request: Request, question: str) -> tuple[dict[str, Any], list[UploadedFile]]:
@@ -140,7 +142,10 @@ def _answered(
         incoming.mkdir()
         outgoing.mkdir()
         files = {**_uploaded(question, upload, incoming), **download_path(question, outgoing)}
-        answer = asker(user, question, document, files)
+        try:
+            answer = asker(user, question, document, files)
+        except MonitorError as error:
+            return refused(error, folder)
         written = sorted(path for path in outgoing.rglob("*") if path.is_file())
         if written:
             return _file(question, written, outgoing)
@@ -165,7 +170,7 @@ def _without(value: Any, folder: str) -> Any:
         return value.replace(f"{folder}/in/", "").replace(f"{folder}/out/", "").replace(folder, "")
     if isinstance(value, dict):
         return {key: _without(element, folder) for key, element in value.items()}
-    return [_without(element, folder) for element in value] if isinstance(value, list) else value
+    return [_without(element, folder) for element in value] if isinstance(value, list | tuple) else value
 
 
 def _file(question: str, written: list[Path], folder: Path) -> Response:

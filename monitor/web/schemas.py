@@ -89,7 +89,10 @@ class Schemas:
         required, parts = [], []
         for field in fields(kind):
             if field.metadata.get("inlined"):
-                parts.append(self.of(hints[field.name]))
+                part = self.of(hints[field.name])
+                # A record that may be None is left out with all its keys.
+                may_lack = {"type": "null"} in part.get("anyOf", [])
+                parts.append({"anyOf": [*part["anyOf"][:-1], {}]} if may_lack else part)
                 continue
             key = str(field.metadata.get("key", field.name))
             properties[key] = self.of(hints[field.name])

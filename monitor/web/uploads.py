@@ -10,7 +10,7 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import BinaryIO
+from typing import IO
 
 from monitor.exceptions import InputError
 from monitor.web.settings import UPLOAD_BYTES
@@ -29,7 +29,7 @@ class UploadedFile:
     """A file as a form sends it: its ``name``, with the folder where the browser says it, and its content."""
 
     name: str
-    content: BinaryIO
+    content: IO[bytes]
 
 
 def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
@@ -63,7 +63,7 @@ class _Room:
         self._folder = folder
         self._bytes = self._files = 0
 
-    def write(self, path: PurePosixPath, content: BinaryIO) -> None:
+    def write(self, path: PurePosixPath, content: IO[bytes]) -> None:
         """Write a file; what it says of its own size is not believed."""
         self._files += 1
         if self._files > MOST_FILES:
@@ -101,7 +101,7 @@ def _unpack_zip(file: UploadedFile, room: _Room) -> None:
                 )
             for member, path in _regular(archive, file.name):
                 with archive.open(member) as content:
-                    room.write(path, content)  # type: ignore[arg-type]
+                    room.write(path, content)
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
         raise InputError(f"{file.name} cannot be unpacked: {error}; pack the folder again") from error
 

@@ -132,6 +132,13 @@ def how_far(row: FleetTableRow) -> str:
     return latest
 
 
+def since(row: FleetTableRow) -> str:
+    """Say since when: the latest day where it alone stands out, else the last event, else the first run."""
+    if row.attention == ATTENTION[2]:
+        return day(row.latest_at)
+    return "the first run" if row.since is None else f"{day(row.since)}, the last event"
+
+
 def _span(years: float) -> str:
     if years * 365.25 < 60.0:
         return f"{max(years * 365.25, 0.0):.0f} days"

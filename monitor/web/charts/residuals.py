@@ -11,7 +11,7 @@ from monitor.workflow.explain.explain_answer import MachineMissing
 from monitor.workflow.explain.residual_vectors import ResidualsAnswer
 from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 
-#: Steps of the magnification slider: an arrow of 1 µm is so many millimetres long.
+#: Steps of the magnification slider: 1 µm is drawn as so many millimetres.
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100)
 
 
@@ -26,7 +26,7 @@ def scene_chart(residuals: ResidualsAnswer) -> Chart:
         says=f"{len(residuals.run)} residual vectors of {residuals.campaign} at the probed places, model {residuals.model}",
         traces=[],
         layout={
-            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.4, "y": -1.6, "z": 0.9}}},
+            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 0.95, "y": -1.15, "z": 0.6}}},
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
             "uirevision": "scene",
             "showlegend": True,

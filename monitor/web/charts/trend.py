@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
 from typing import Any
 
 from monitor.web.charts.chart import DASHES, Chart, Trace, axis, look
@@ -153,10 +152,11 @@ def _conditions(values: ValuesAnswer) -> list[Trace]:
     for index, (name, column) in enumerate(values.conditions.items()):
         rows = [row for row, value in enumerate(column) if value is not None]
         if rows:
+            x, y = _broken(values, column, rows)
             traces.append(
                 {
                     "type": "scatter", "mode": "lines+markers", "name": name, "yaxis": "y2",
-                    "x": [_moment(values.started_at[row]) for row in rows], "y": [column[row] for row in rows],
+                    "x": x, "y": y,
                     "line": {"color": look(index + 2)[0], "dash": DASHES[index % len(DASHES)], "width": 1.2},
                     "marker": {"size": 4}, "hovertemplate": name + " %{y:.4g}<extra></extra>",
                 }
@@ -164,5 +164,19 @@ def _conditions(values: ValuesAnswer) -> list[Trace]:
     return traces
 
 
-def _moment(at: datetime) -> str:
-    return at.isoformat()
+def _broken(
+    values: ValuesAnswer, column: Sequence[float | None], rows: Sequence[int]
+) -> tuple[list[str], list[float | None]]:
+    """Times and values of a condition, with a gap between days: nobody knows what it was overnight."""
+    x: list[str] = []
+    y: list[float | None] = []
+    day = None
+    for row in rows:
+        at = values.started_at[row]
+        if day is not None and at.date() != day:
+            x.append(at.isoformat())
+            y.append(None)
+        x.append(at.isoformat())
+        y.append(column[row])
+        day = at.date()
+    return x, y

@@ -41,10 +41,10 @@ def routes() -> APIRouter:
     @router.post("/certificates/verify")
     async def verify(request: Request) -> Response:
         """Check a file: is it what was issued, and does it hold?"""
-        form = await read_form(request)
-        outcome = await run_in_threadpool(
-            _verified, request.app.state.asker, request.state.user, form, request.app.state.working_folder
-        )
+        async with read_form(request) as form:
+            outcome = await run_in_threadpool(
+                _verified, request.app.state.asker, request.state.user, form, request.app.state.working_folder
+            )
         refused = isinstance(outcome, Refusal)
         return _listed(
             request,

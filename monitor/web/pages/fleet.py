@@ -13,7 +13,7 @@ from monitor.exceptions import NotFoundError
 from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.svg.sparkline import MOST, sparkline
 from monitor.web.rendering import page
-from monitor.web.words import URGENCIES, Urgency, how_far
+from monitor.web.words import URGENCIES, Urgency, how_far, since
 from monitor.workflow.fleet import ATTENTION, FleetTableRow
 from monitor.workflow.history.values import ValuesAnswer
 from monitor.workflow.query import TableAnswer
@@ -32,6 +32,7 @@ class MachineRow:
     attention: str
     worst: FleetTableRow
     how_far: str
+    since: str
     others: int
 
 
@@ -49,10 +50,20 @@ def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> l
             attention=of_machine[0].attention,
             worst=of_machine[0],
             how_far=how_far(of_machine[0]),
+            since=since(of_machine[0]),
             others=sum(ATTENTION.index(row.attention) < usual for row in of_machine[1:]),
         )
         for machine, of_machine in rows.items()
     ]
+
+
+def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
+    """How many machines there are of each word, the most urgent first."""
+    counts: dict[str, tuple[Urgency, int]] = {}
+    for row in rows:
+        urgency, count = counts.get(row.urgency.word, (row.urgency, 0))
+        counts[row.urgency.word] = (urgency, count + 1)
+    return list(counts.values())
 
 
 def plants_of(machines: TableAnswer) -> dict[str, str]:
@@ -93,6 +104,7 @@ def routes() -> APIRouter:
             waiting=ticket if ticket is not None and not ticket.is_done else None,
             rows=shown[first : first + PAGE_SIZE],
             count=len(shown), first=first, page_size=PAGE_SIZE,
+            tally=_tally(rows),
             states=[(label, URGENCIES[label], count) for label, count in counts.items() if count],
             state=state, plant=plant, plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[name for name in every if name not in listed],

@@ -31,10 +31,10 @@ def routes() -> APIRouter:
     @router.post("/import")
     async def upload(request: Request) -> Response:
         """Import what was uploaded, or show what is wrong with it."""
-        form = await read_form(request)
-        outcome = await run_in_threadpool(
-            _imported, request.app.state.asker, request.state.user, form, request.app.state.working_folder
-        )
+        async with read_form(request) as form:
+            outcome = await run_in_threadpool(
+                _imported, request.app.state.asker, request.state.user, form, request.app.state.working_folder
+            )
         if isinstance(outcome, Refusal):
             return page(request, "import.html", status=outcome.status, answer=None, refusal=outcome)
         return page(request, "import.html", answer=outcome, refusal=None)

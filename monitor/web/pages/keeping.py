@@ -39,8 +39,8 @@ def routes() -> APIRouter:
     @router.post("/work/cancel")
     async def cancel(request: Request) -> Response:
         """Take back a question that still waits."""
-        form = await read_form(request)
-        number = form.text("number")
+        async with read_form(request) as form:
+            number = form.text("number")
         if not number.isdecimal() or not request.app.state.desk.cancel(int(number)):
             raise InputError("it is answered already, or being computed: that ends by itself")
         return RedirectResponse("/work", status_code=303)

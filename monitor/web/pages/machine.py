@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, NotFoundError
@@ -70,10 +71,10 @@ def routes() -> APIRouter:
     @router.post("/machine/event")
     async def event(request: Request) -> Response:
         """Record what happened to a machine."""
-        form = await read_form(request)
-        machine = form.text("machine")
-        document = {"machine": machine, "text": form.text("text"), **form.filled("at", "kind")}
-        request.app.state.asker(request.state.user, "event", document)
+        async with read_form(request) as form:
+            machine = form.text("machine")
+            document = {"machine": machine, "text": form.text("text"), **form.filled("at", "kind")}
+        await run_in_threadpool(request.app.state.asker, request.state.user, "event", document)
         return RedirectResponse(link("/machine", name=machine), status_code=303)
 
     return router

@@ -47,7 +47,7 @@ def routes() -> APIRouter:
                 user, "model history", {"campaign": campaign, "model": compare.comparison.model}
             )
         answers: dict[str, Any] = {"compare": compare}
-        refusals = {"compare": why}
+        refusals = {"compare": why, "explain": "", "residuals": "", "history": ""}
         for name, ticket in tickets.items():
             if name != "compare":
                 answers[name], refusals[name] = _answered(ticket)
@@ -77,23 +77,20 @@ def routes() -> APIRouter:
     @router.post("/model/add")
     async def add(request: Request) -> Response:
         """Add an effect: a new version of the model, or a new model."""
-        form = await read_form(request)
-        campaign, effect = form.text("campaign"), form.text("effect")
-        document = {
-            "effect": effect,
-            "campaign": campaign,
-            "to": form.text("to"),
-            **form.filled("new_name", "note"),
-        }
+        async with read_form(request) as form:
+            campaign, effect = form.text("campaign"), form.text("effect")
+            document = {"effect": effect, "campaign": campaign, "to": form.text("to")}
+            document |= form.filled("new_name", "note")
         answer = await _asked(request, "add effect", document)
         return _back(campaign, answer, f"{effect} was added")
 
     @router.post("/model/undo")
     async def undo(request: Request) -> Response:
         """Take an effect out again: a new version without it."""
-        form = await read_form(request)
-        campaign, effect = form.text("campaign"), form.text("effect")
-        answer = await _asked(request, "remove effect", {"effect": effect, "model": form.text("model")})
+        async with read_form(request) as form:
+            campaign, effect = form.text("campaign"), form.text("effect")
+            document = {"effect": effect, "model": form.text("model")}
+        answer = await _asked(request, "remove effect", document)
         return _back(campaign, answer, f"{effect} was taken out")
 
     return router
@@ -112,10 +109,7 @@ def _answered(ticket: Ticket) -> tuple[Any, str]:
 
 
 def _back(campaign: str, answer: ChangeModelAnswer, done: str) -> Response:
-    version = answer.model.version
-    name = (
-        version.model if "@" in version.model or version.version == 1 else f"{version.name}@{version.version}"
-    )
+    name = answer.model.version.model
     note = f"{done}: the model is now {name}"
     return RedirectResponse(link("/model", campaign=campaign, model=name, note=note), status_code=303)
 

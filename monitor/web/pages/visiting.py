@@ -26,10 +26,10 @@ def routes() -> APIRouter:
 
         No proof is asked: there is no session yet, and the gate refuses what another site's page sends.
         """
-        texts = await request.form(max_files=0)
         sessions: Sessions = request.app.state.sessions
-        then = _inside(str(texts.get("then") or "/"))
-        key = sessions.begin(str(texts.get("token") or "").strip())
+        async with request.form(max_files=0) as texts:
+            then = _inside(str(texts.get("then") or "/"))
+            key = sessions.begin(str(texts.get("token") or "").strip())
         if key is None:
             return page(request, "login.html", status=403, then=then, wrong=True)
         answer = RedirectResponse(then, status_code=303)
@@ -39,8 +39,8 @@ def routes() -> APIRouter:
     @router.post("/logout")
     async def logout(request: Request) -> Response:
         """End the session."""
-        await read_form(request)
-        request.app.state.sessions.end(request.state.session)
+        async with read_form(request):
+            request.app.state.sessions.end(request.state.session)
         answer = RedirectResponse("/login", status_code=303)
         answer.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
         return answer
