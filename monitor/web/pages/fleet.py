@@ -7,17 +7,19 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from fastapi import APIRouter, Request
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import NotFoundError
 from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.svg.sparkline import MOST, sparkline
+from monitor.web.forms import read_form
 from monitor.web.rendering import page
 from monitor.web.words import URGENCIES, Urgency, how_far, since
 from monitor.workflow.fleet import ATTENTION, FleetTableRow
 from monitor.workflow.history.values import ValuesAnswer
 from monitor.workflow.query import TableAnswer
 
+IDENTIFY = "identify all"
 #: Machines of one page.
 PAGE_SIZE = 40
 
@@ -93,6 +95,9 @@ def routes() -> APIRouter:
                 answer, ticket = None, None
             if answer is not None:
                 rows, not_identified = machine_rows(answer.table, plants_of(machines)), answer.not_identified
+        identifying = [old for old in request.app.state.desk.under_way() if old.question == IDENTIFY]
+        if identifying:
+            ticket = identifying[0]
         listed = {row.machine for row in rows}
         every = [str(row[machines.columns.index("machine")]) for row in machines.rows]
         counts = {label: sum(row.attention == label for row in rows) for label in ATTENTION}
@@ -110,6 +115,13 @@ def routes() -> APIRouter:
             unlisted=[name for name in every if name not in listed],
             not_identified=not_identified,
         )  # fmt: skip
+
+    @router.post("/fleet/identify")
+    async def identify(request: Request) -> Response:
+        """Identify the errors of every campaign, in a thread of its own."""
+        async with read_form(request):
+            request.app.state.desk.ask(request.state.user, IDENTIFY, {})
+        return RedirectResponse("/", status_code=303)
 
     @router.get("/machine/history.svg")
     def history(request: Request, name: str, parameter: str) -> Response:

@@ -43,12 +43,16 @@ def routes() -> APIRouter:
             values = ask(user, "values", _period(name, since, until))
         if campaign:
             values = _of_campaign(values, campaign)
+            if ticket.is_done and not values.run:
+                raise NotFoundError(
+                    f"machine {name} has no identified run of campaign '{campaign}' in this period"
+                )
         names = list(values.parameters)
         if parameter and parameter not in names and names:
             raise NotFoundError(
                 f"machine {name} has no parameter '{parameter}' here; it has {', '.join(names)}"
             )
-        shown = parameter or (_most_urgent(request, name, names) if names else "")
+        shown = (parameter or _most_urgent(request, name, names)) if names else ""
         campaigns = [row for row in ask(user, "campaigns").campaigns if row.machine == name]
         return page(
             request, "machine.html",
@@ -97,10 +101,6 @@ def _period(name: str, since: str, until: str) -> dict[str, Any]:
 def _of_campaign(values: ValuesAnswer, campaign: str) -> ValuesAnswer:
     """The runs of one campaign alone, all parameters and conditions."""
     rows = [row for row, name in enumerate(values.campaign) if name == campaign]
-    if not rows:
-        raise NotFoundError(
-            f"machine {values.machine} has no identified run of campaign '{campaign}' in this period"
-        )
 
     def taken(column: tuple[Any, ...]) -> tuple[Any, ...]:
         return tuple(column[row] for row in rows)
