@@ -1,6 +1,6 @@
 """The contract of the product: every question that can be asked, as a function of a typed request with a typed answer.
 
-The faces (the command line today; a Python interface, HTTP and pages to come) ask nothing else. A question is named by
+The faces (the command line, Python, HTTP and pages) ask nothing else. A question is named by
 the place of its function and loaded when it is asked, so that to list the contract loads neither solver nor engine; its
 types are the annotations of the function.
 """

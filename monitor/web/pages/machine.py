@@ -18,7 +18,8 @@ from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
 from monitor.workflow.history.values import ValuesAnswer
 
-KINDS = ("crash", "repair", "adjustment", "compensation", "relocation", "note")
+#: Usual kinds of events; any word is one.
+KINDS = ("crash", "repair", "compensation", "probe", "note")
 
 
 def routes() -> APIRouter:
