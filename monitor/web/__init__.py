@@ -1,1 +1,1 @@
-"""The pages and the HTTP interface of ``monitor serve``: a request of the contract in, its answer out; no computation."""
+"""The pages and the HTTP interface of ``monitor serve``: requests of the contract in, answers out; no computation."""

@@ -1,4 +1,4 @@
-"""Puts the server together: the gate before everything, the interface, the pages, and plain words for what goes wrong."""
+"""Puts the server together: the gate before everything, the interface, the pages, and words for what goes wrong."""
 
 from __future__ import annotations
 

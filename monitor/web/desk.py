@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as StillWorking
 from dataclasses import dataclass, field
-from threading import Lock
+from threading import RLock
 from typing import Any
 
 from monitor.web.asking import Asker, check_role
@@ -22,6 +22,8 @@ from monitor.web.users import User
 WORKERS = 2
 #: A page waits so long before it shows that something is being computed.
 PATIENCE_S = 1.5
+#: Questions that identify what nobody has identified yet.
+IDENTIFIES = frozenset({"trend", "identify"})
 #: Answers that are held; the oldest is forgotten, and computed again when somebody asks.
 MOST = 200
 
@@ -48,11 +50,16 @@ class Ticket:
         return self.future.done()
 
     @property
+    def is_good(self) -> bool:
+        """Whether it is under way, or has an answer: what was cancelled or refused is asked anew."""
+        return not self.is_done or not (self.future.cancelled() or self.future.exception())
+
+    @property
     def is_running(self) -> bool:
         """Whether it is computed now; else it waits for others."""
         return self.future.running()
 
-    def answer(self, patience: float = PATIENCE_S) -> Any | None:
+    def answer(self, patience: float = PATIENCE_S) -> Any:
         """Return the answer, None where it is not there yet or was cancelled. Raises what the question raised."""
         try:
             return self.future.result(timeout=patience)
@@ -67,7 +74,7 @@ class Desk:
         self.asker = asker
         self._pool = ThreadPoolExecutor(WORKERS, thread_name_prefix="monitor-desk")
         self._tickets: dict[tuple[str, str, int], Ticket] = {}
-        self._lock = Lock()
+        self._lock = RLock()  # a callback runs at once where the answer is there already
         self._count = 0
 
     def ask(self, user: User, question: str, document: Mapping[str, Any]) -> Ticket:
@@ -76,16 +83,24 @@ class Desk:
         key = (question, json.dumps(document, sort_keys=True, default=str), self.asker.generation)
         with self._lock:
             ticket = self._tickets.get(key)
-            if ticket is not None and not ticket.future.cancelled():
+            if ticket is not None and ticket.is_good:
                 return ticket
             self._count += 1
             future = self._pool.submit(self.asker, user, question, document)
             self._tickets[key] = ticket = Ticket(self._count, question, document, user, future)
+            if question in IDENTIFIES:
+                future.add_done_callback(self._forget_sums)
             for old in [old for old in self._tickets if old[2] != key[2] and self._tickets[old].is_done]:
                 del self._tickets[old]
             while len(self._tickets) > MOST:
                 del self._tickets[next(iter(self._tickets))]
             return ticket
+
+    def _forget_sums(self, _: Future[Any]) -> None:
+        """Forget the sums over the fleet: a machine may have been identified for the first time."""
+        with self._lock:
+            for key in [key for key in self._tickets if key[0] == "fleet"]:
+                del self._tickets[key]
 
     def under_way(self) -> list[Ticket]:
         """Return what is not answered yet, in the order of asking."""

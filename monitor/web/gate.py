@@ -1,7 +1,7 @@
 """Stands before every request: which host was meant, how large, from whom, from which site; and what a browser may do.
 
 What each check is against is said where it is made. The policy of the pages (Content-Security-Policy) has neither
-unsafe-inline nor unsafe-eval; the one hash in it is that of the empty style sheet, which plotly.js inserts to fill it rule by rule.
+unsafe-inline nor unsafe-eval; the one hash in it is that of the empty style sheet, which plotly.js fills rule by rule.
 """
 
 from __future__ import annotations

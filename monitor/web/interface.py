@@ -1,8 +1,8 @@
 """The HTTP interface: every question of the contract at ``POST /api/v1/QUESTION``, a document in, its answer out.
 
-The document has the request's fields, the answer is what the command line prints with ``--json``. A question that makes a
-file sends the file; one that reads a file takes it beside the document, as multipart/form-data. ``GET /api/v1/openapi.json``
-describes all of it, made from the same types.
+The document has the request's fields, the answer is what the command line prints with ``--json``. A question that makes
+a file sends the file; one that reads a file takes it beside the document, as multipart/form-data.
+``GET /api/v1/openapi.json`` describes all of it, made from the same types.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _answering(asker: Asker, question: str, working_folder: Path) -> Any:
 
 
 def refused(error: Exception, folder: str = "") -> JSONResponse:
-    """Return a refusal as a document: ``error``, and ``faults`` of a refused folder; without the server's ``folder``."""
+    """Return a refusal as a document: ``error``, and the ``faults`` of a folder; without the server's own."""
     refusal = refusal_of(error)
     if refusal.status == 500:
         _log.error("a question failed", exc_info=error)

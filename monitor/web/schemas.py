@@ -64,12 +64,12 @@ class Schemas:
     def request(self, kind: Any, taken: Sequence[str]) -> Schema:
         """Return the schema of a request of which only some fields are taken."""
         hints = typing.get_type_hints(kind)
-        chosen = [field for field in fields(kind) if field.name in taken]
+        accepted = [field for field in fields(kind) if field.name in taken]
         return {
             "type": "object",
             "description": inspect.getdoc(kind) or "",
-            "properties": {field.name: self.of(hints[field.name]) for field in chosen},
-            "required": [field.name for field in chosen if _is_required(field)],
+            "properties": {field.name: self.of(hints[field.name]) for field in accepted},
+            "required": [field.name for field in accepted if _is_required(field)],
             "additionalProperties": False,
         }
 
@@ -98,9 +98,9 @@ class Schemas:
             properties[key] = self.of(hints[field.name])
             if not field.metadata.get("omitted"):
                 required.append(key)
-        own = {"type": "object", "description": inspect.getdoc(kind) or "", "properties": properties}
-        own |= {"required": required} if required else {}
-        return {"allOf": [own, *parts]} if parts else own
+        record = {"type": "object", "description": inspect.getdoc(kind) or "", "properties": properties}
+        record |= {"required": required} if required else {}
+        return {"allOf": [record, *parts]} if parts else record
 
 
 def _is_required(field: Field[Any]) -> bool:

@@ -39,19 +39,19 @@ class Sessions:
         user = self.host_user if self.users is None else self.users.of_token(token or "")
         if user is None:
             return None
-        now = time.monotonic()
-        self._forget(now)
+        moment = time.monotonic()
+        self._forget(moment)
         key = secrets.token_urlsafe(32)
-        self._entries[key] = _Entry(user, now)
+        self._entries[key] = _Entry(user, moment)
         return key
 
     def user_of(self, key: str | None) -> User | None:
         """Return who a session belongs to; None where it ended or never was."""
         entry = None if key is None else self._entries.get(key)
-        now = time.monotonic()
-        if entry is None or now - entry.last_seen > LIFETIME_S:
+        moment = time.monotonic()
+        if entry is None or moment - entry.last_seen > LIFETIME_S:
             return None
-        entry.last_seen = now
+        entry.last_seen = moment
         return entry.user
 
     def end(self, key: str | None) -> None:
@@ -66,8 +66,8 @@ class Sessions:
         """Whether a form carries the proof of its session."""
         return hmac.compare_digest(self.proof(key).encode(), proof.encode("utf-8", "replace"))
 
-    def _forget(self, now: float) -> None:
-        for key in [key for key, entry in self._entries.items() if now - entry.last_seen > LIFETIME_S]:
+    def _forget(self, moment: float) -> None:
+        for key in [key for key, entry in self._entries.items() if moment - entry.last_seen > LIFETIME_S]:
             del self._entries[key]
         while len(self._entries) >= MOST:
             del self._entries[min(self._entries, key=lambda key: self._entries[key].last_seen)]

@@ -46,8 +46,8 @@ class ServerSettings:
             return
         if self.users is None:
             raise InputError(
-                f"{self.proxy or self.host} can be reached from other computers: name who may come in with --users FILE "
-                "(`monitor serve --add-user NAME --users FILE` makes a token)"
+                f"{self.proxy or self.host} can be reached from other computers: name who may come in with --users "
+                "FILE (`monitor serve --add-user NAME --users FILE` makes a token)"
             )
         if self.certificate is None and self.proxy is None:
             raise InputError(

@@ -78,7 +78,7 @@ class _Room:
                     self._bytes += len(chunk)
                     if self._bytes > UNPACKED_BYTES:
                         raise InputError(
-                            f"the upload holds more than {UNPACKED_BYTES // 2**20} MiB; upload fewer campaigns at a time"
+                            f"the upload holds more than {UNPACKED_BYTES // 2**20} MiB; upload fewer at a time"
                         )
                     out.write(chunk)
         except OSError as error:

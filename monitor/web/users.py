@@ -1,7 +1,7 @@
 """Who may come in: a TOML file of users with a role each and the hash of a token, never the token itself.
 
-A token has 256 random bits, so that a plain SHA-256 of it cannot be turned round by guessing; a slow hash (argon2) is for
-passwords that people think of, and there are none here.
+A token has 256 random bits, so that a plain SHA-256 of it cannot be turned round by guessing; a slow hash (argon2) is
+for passwords that people think of, and there are none here.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ class Users:
         """Return the user whose token this is; every hash is compared, in constant time."""
         digest = _digest(token)
         match = None
-        for known, user in self.by_hash.items():
-            if hmac.compare_digest(known, digest):
+        for stored, user in self.by_hash.items():
+            if hmac.compare_digest(stored, digest):
                 match = user
         return match
 

@@ -128,7 +128,8 @@ def how_far(row: FleetTableRow) -> str:
     if row.attention == ATTENTION[3] and row.slope_per_year is not None:
         return f"{latest}, moving by {number(row.slope_per_year)}{unit} a year"
     if row.attention == ATTENTION[4] and row.sd_pooled:
-        return f"{latest}; days scatter by {number(row.between_days, 2)}{unit}, runs by {number(row.sd_pooled, 2)}{unit}"
+        days, runs = number(row.between_days, 2), number(row.sd_pooled, 2)
+        return f"{latest}; days scatter by {days}{unit}, runs by {runs}{unit}"
     return latest
 
 

@@ -1,8 +1,9 @@
 """The stories of the pages in a real browser: Debian's Chromium, driven by Playwright (``make pages``).
 
-Somebody who has never seen them gets from "it does not fit" to "spindle growth, added, error at the noise floor"; uploads a
-bad folder and sees its faults; goes round by keyboard alone. Every page is kept as a picture in ``pages-output/``: 1440 and
-390 pixels wide, light and dark. No page may be wider than the window, lack a chart, or break the policy with a script.
+Somebody who has never seen them gets from "it does not fit" to "spindle growth, added, error at the noise floor";
+uploads a bad folder and sees its faults; goes round by keyboard alone. Every page is kept as a picture in
+``pages-output/``: 1440 and 390 pixels wide, light and dark. No page may be wider than the window, lack a chart, or
+break the policy with a script.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ PICTURES = Path(os.environ.get("PAGES_OUTPUT", ROOT / "pages-output"))
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 #: Three dimensions without a graphics card; a browser in a container has no sandbox of its own.
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-#: What plotly.js does that the policy forbids and that nothing depends on: style attributes of its notifications, and the
-#: style sheet of its maps.
+#: What plotly.js does that the policy forbids and that nothing depends on: style attributes of its notifications, and
+#: the style sheet of its maps.
 HARMLESS = ("Applying inline style violates", "Canvas2D: Multiple readback")
 PATIENCE_S = 120.0
 PAGES = {
@@ -170,7 +171,8 @@ def test_story_it_does_not_fit_spindle_growth_added_error_at_the_noise_floor(sit
 def _arrow(page: Any) -> float:
     """Length of the first arrow of the scene in mm."""
     length = page.evaluate(
-        """() => { const line = document.getElementById('chart-scene').data.find((trace) => trace.name === 'left by the model');
+        """() => { const data = document.getElementById('chart-scene').data;
+        const line = data.find((trace) => trace.name === 'left by the model');
         return Math.hypot(line.x[1] - line.x[0], line.y[1] - line.y[0], line.z[1] - line.z[0]); }"""
     )
     return float(length)

@@ -1,4 +1,4 @@
-"""The HTTP interface: the documents of the contract in and out, and refusals in plain sentences with the right status."""
+"""The HTTP interface: the documents of the contract in and out, refusals in plain sentences with the right status."""
 
 from __future__ import annotations
 

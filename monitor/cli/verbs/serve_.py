@@ -1,7 +1,7 @@
 """Serve the pages and the HTTP interface: look, compare, add what is missing, in a browser.
 
-On this computer alone, unless users are named with their tokens and the way is encrypted. The process holds the database:
-other verbs wait until it is stopped.
+On this computer alone, unless users are named with their tokens and the way is encrypted. The process holds the
+database: other verbs wait until it is stopped.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def options(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--role", default="engineer", metavar="ROLE",
-        help="of the user to add: viewer, engineer (changes models, imports) or approver (certificates) (default engineer)",
+        help="of the user to add: viewer, engineer (imports, models) or approver (certificates) (default engineer)",
     )  # fmt: skip
 
 

@@ -23,7 +23,7 @@ def scene_chart(residuals: ResidualsAnswer) -> Chart:
     }
     return Chart(
         key="scene",
-        says=f"{len(residuals.run)} residual vectors of {residuals.campaign} at the probed places, model {residuals.model}",
+        says=f"{len(residuals.run)} residuals of {residuals.campaign} at the probed places, model {residuals.model}",
         traces=[],
         layout={
             "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 0.95, "y": -1.15, "z": 0.6}}},
@@ -121,8 +121,9 @@ def falling_chart(
         label = f"with {proposed.effect}"
         traces.append(
             {
-                "type": "scatter", "mode": "markers+lines", "name": "if the best effect is added", "x": [names[-1], label],
-                "y": [fitted[-1], proposed.rms_after_um], "line": {"color": "@teal", "dash": "dot", "shape": "hv"},
+                "type": "scatter", "mode": "markers+lines", "name": "if the best effect is added",
+                "x": [names[-1], label], "y": [fitted[-1], proposed.rms_after_um],
+                "line": {"color": "@teal", "dash": "dot", "shape": "hv"},
                 "marker": {"color": "@teal", "symbol": "square", "size": 10},
             }
         )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,7 +29,8 @@ def correlation_chart(answer: StatisticsAnswer) -> Chart:
             {
                 "type": "heatmap", "x": names, "y": names, "z": [_row(row) for row in matrix.tolist()], "zmin": -1,
                 "zmax": 1, "colorscale": [[0, "@blue"], [0.5, "@paper"], [1, "@orange"]], "xgap": 1, "ygap": 1,
-                "hovertemplate": "%{x}, %{y}: %{z:.2f}<extra></extra>", "colorbar": {"thickness": 12, "title": {"text": "r"}},
+                "hovertemplate": "%{x}, %{y}: %{z:.2f}<extra></extra>",
+                "colorbar": {"thickness": 12, "title": {"text": "r"}},
             }
         ],
         layout={
@@ -46,13 +48,14 @@ def _row(row: Sequence[float]) -> list[float | None]:
 def p_value_chart(name: str, histogram: HistogramAnswer, count: int) -> Chart:
     """Show the histogram of the p-values of the probed coordinates, with the height that equal groups would give."""
     edges = histogram.edges
-    middles = [(low + high) / 2 for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    middles = [(low + high) / 2 for low, high in pairwise(edges)]
     return Chart(
         key=f"p-{name}",
         says=f"p-values of {count} probed coordinates, {name}; flat where the groups are equal",
         traces=[
             {
-                "type": "bar", "x": middles, "y": list(histogram.counts), "width": (edges[-1] - edges[0]) / len(middles),
+                "type": "bar", "x": middles, "y": list(histogram.counts),
+                "width": (edges[-1] - edges[0]) / len(middles),
                 "marker": {"color": "@blue", "line": {"color": "@paper", "width": 1}},
                 "hovertemplate": "p about %{x:.2f}: %{y}<extra></extra>",
             }
@@ -61,7 +64,8 @@ def p_value_chart(name: str, histogram: HistogramAnswer, count: int) -> Chart:
             "xaxis": axis(f"p-value, {name}", range=[0, 1]), "yaxis": axis("coordinates"), "bargap": 0,
             "shapes": [
                 {
-                    "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": histogram.expected, "y1": histogram.expected,
+                    "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": histogram.expected,
+                    "y1": histogram.expected,
                     "line": {"color": "@orange", "dash": "dash"},
                     "label": {"text": "equal groups", "font": {"size": 11, "color": "@orange"}, "textposition": "end"},
                 }

@@ -1,4 +1,4 @@
-"""The history of one parameter on one time axis: runs, tolerance, changes, events, forecast, and the conditions below."""
+"""The history of one parameter on one time axis: runs, tolerance, changes, events, forecast, conditions below."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ from starlette.responses import Response
 from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.web.charts.chart import Chart
 from monitor.web.charts.statistics import correlation_chart, p_value_chart, region_chart
+from monitor.web.desk import Ticket
 from monitor.web.rendering import page
 from monitor.workflow.intake.campaigns import RunsAnswer
 from monitor.workflow.run_statistics.answer import StatisticsAnswer
@@ -38,42 +39,41 @@ def routes() -> APIRouter:
         if row.rows is not None:
             return page(request, "curve.html", row=row)
         runs: RunsAnswer = ask(user, "runs", {"campaign": name})
-        statistics, why_no_statistics = None, ""
-        ticket = desk.ask(user, "statistics", {"campaign": name, "by": by})
-        waiting = [ticket]
-        try:
-            statistics = ticket.answer()
-        except MonitorError as error:
-            why_no_statistics = str(error)
-        regions, why_no_regions, pair = None, "", ("", "")
+        tickets = [desk.ask(user, "statistics", {"campaign": name, "by": by})]
+        statistics, why_no_statistics = _answered(tickets[0])
+        trials = bool(request.query_params.get("trials"))
+        regions, why_no_regions = None, ""
         if first or second:
-            if not (first and second and first != second):
-                raise InputError("choose two different parameters for the ellipse and the rectangle")
-            pair = (first, second)
-            document: dict[str, Any] = {
-                "campaign": name,
-                "method": "both" if request.query_params.get("trials") else "guf",
-            }
-            if run:
-                document["run"] = _number(run)
-            second_ticket = desk.ask(user, "uncertainty", document)
-            waiting.append(second_ticket)
-            try:
-                regions = second_ticket.answer()
-            except MonitorError as error:
-                why_no_regions = str(error)
+            tickets.append(
+                desk.ask(user, "uncertainty", _regions_asked(name, first, second, run, trials=trials))
+            )
+            regions, why_no_regions = _answered(tickets[1])
         return page(
             request, "campaign.html",
             row=row, runs=runs, conditions=_conditions(runs), by=by, run=run,
             statistics=statistics, why_no_statistics=why_no_statistics,
             charts=[] if statistics is None else _charts(statistics),
-            regions=regions, why_no_regions=why_no_regions, first=pair[0], second=pair[1],
-            region=None if regions is None else _region(regions, *pair),
-            trials=bool(request.query_params.get("trials")),
-            waiting=next((ticket for ticket in waiting if not ticket.is_done), None),
+            regions=regions, why_no_regions=why_no_regions, first=first, second=second,
+            region=None if regions is None else _region(regions, first, second),
+            trials=trials, waiting=next((ticket for ticket in tickets if not ticket.is_done), None),
         )  # fmt: skip
 
     return router
+
+
+def _answered(ticket: Ticket) -> tuple[Any, str]:
+    """The answer of a ticket and why there is none; both empty while it is computed."""
+    try:
+        return ticket.answer(), ""
+    except MonitorError as error:
+        return None, str(error)
+
+
+def _regions_asked(name: str, first: str, second: str, run: str, *, trials: bool) -> dict[str, Any]:
+    """The document that asks for the regions of a pair. Raises InputError where it is none."""
+    if not (first and second and first != second):
+        raise InputError("choose two different parameters for the ellipse and the rectangle")
+    return {"campaign": name, "method": "both" if trials else "guf"} | ({"run": _number(run)} if run else {})
 
 
 def _number(text: str) -> int:

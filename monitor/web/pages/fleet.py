@@ -12,10 +12,11 @@ from starlette.responses import RedirectResponse, Response
 from monitor.exceptions import NotFoundError
 from monitor.reporting.health.records import History, ParameterHealth
 from monitor.reporting.svg.sparkline import MOST, sparkline
+from monitor.web.desk import Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
 from monitor.web.words import URGENCIES, Urgency, how_far, since
-from monitor.workflow.fleet import ATTENTION, FleetTableRow
+from monitor.workflow.fleet import ATTENTION, FleetAnswer, FleetTableRow
 from monitor.workflow.history.values import ValuesAnswer
 from monitor.workflow.query import TableAnswer
 
@@ -59,6 +60,21 @@ def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> l
     ]
 
 
+def _summed(request: Request, machines: TableAnswer) -> tuple[FleetAnswer | None, Ticket | None]:
+    """The fleet's answer, None where there is nothing to sum yet, and what the page waits for."""
+    desk = request.app.state.desk
+    answer, ticket = None, None
+    if machines.rows:
+        ticket = desk.ask(request.state.user, "fleet", {"top": 0})
+        try:
+            answer = ticket.answer()
+        except NotFoundError:
+            ticket = None
+    identifying = [other for other in desk.under_way() if other.question == IDENTIFY]
+    waiting = identifying[0] if identifying else ticket
+    return answer, waiting if waiting is not None and not waiting.is_done else None
+
+
 def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
     """How many machines there are of each word, the most urgent first."""
     counts: dict[str, tuple[Urgency, int]] = {}
@@ -81,23 +97,9 @@ def routes() -> APIRouter:
     @router.get("/")
     def fleet(request: Request, state: str = "", plant: str = "", first: int = 0) -> Response:
         """Show the machines; of one state, of one plant."""
-        ask, user = request.app.state.asker, request.state.user
-        machines: TableAnswer = ask(user, "machines")
-        ticket = None
-        rows: list[MachineRow] = []
-        not_identified: tuple[str, ...] = ()
-        empty = not machines.rows
-        if not empty:
-            ticket = request.app.state.desk.ask(user, "fleet", {"top": 0})
-            try:
-                answer = ticket.answer()
-            except NotFoundError:
-                answer, ticket = None, None
-            if answer is not None:
-                rows, not_identified = machine_rows(answer.table, plants_of(machines)), answer.not_identified
-        identifying = [old for old in request.app.state.desk.under_way() if old.question == IDENTIFY]
-        if identifying:
-            ticket = identifying[0]
+        machines: TableAnswer = request.app.state.asker(request.state.user, "machines")
+        answer, waiting = _summed(request, machines)
+        rows = [] if answer is None else machine_rows(answer.table, plants_of(machines))
         listed = {row.machine for row in rows}
         every = [str(row[machines.columns.index("machine")]) for row in machines.rows]
         counts = {label: sum(row.attention == label for row in rows) for label in ATTENTION}
@@ -105,15 +107,14 @@ def routes() -> APIRouter:
         first = min(max(first, 0), max(len(shown) - 1, 0))
         return page(
             request, "fleet.html",
-            empty=empty,
-            waiting=ticket if ticket is not None and not ticket.is_done else None,
+            empty=not machines.rows, waiting=waiting,
             rows=shown[first : first + PAGE_SIZE],
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows),
             states=[(label, URGENCIES[label], count) for label, count in counts.items() if count],
             state=state, plant=plant, plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[name for name in every if name not in listed],
-            not_identified=not_identified,
+            not_identified=() if answer is None else answer.not_identified,
         )  # fmt: skip
 
     @router.post("/fleet/identify")

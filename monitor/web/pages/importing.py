@@ -1,4 +1,4 @@
-"""Import by upload: the folder of a campaign or a zip of it, all or nothing, every fault with its file, line and column."""
+"""Import by upload: the folder of a campaign or a zip of it, all or nothing, every fault with file, line, column."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a machine: one parameter over time with all that is known of it, the others in a table, events, download."""
+"""The page of a machine: one parameter over time with all that is known of it, the others in a table, events."""
 
 from __future__ import annotations
 
@@ -44,15 +44,8 @@ def routes() -> APIRouter:
             values = ask(user, "values", _period(name, since, until))
         if campaign:
             values = _of_campaign(values, campaign)
-            if ticket.is_done and not values.run:
-                raise NotFoundError(
-                    f"machine {name} has no identified run of campaign '{campaign}' in this period"
-                )
         names = list(values.parameters)
-        if parameter and parameter not in names and names:
-            raise NotFoundError(
-                f"machine {name} has no parameter '{parameter}' here; it has {', '.join(names)}"
-            )
+        _check_names(values, parameter, campaign, may_lack=not ticket.is_done)
         shown = (parameter or _most_urgent(request, name, names)) if names else ""
         campaigns = [row for row in ask(user, "campaigns").campaigns if row.machine == name]
         return page(
@@ -83,6 +76,19 @@ def routes() -> APIRouter:
         return RedirectResponse(link("/machine", name=machine), status_code=303)
 
     return router
+
+
+def _check_names(values: ValuesAnswer, parameter: str, campaign: str, *, may_lack: bool) -> None:
+    """Raise NotFoundError for names that the period lacks; while it is being identified it ``may_lack`` a campaign."""
+    machine, names = values.machine, list(values.parameters)
+    if campaign and not values.run and not may_lack:
+        raise NotFoundError(
+            f"machine {machine} has no identified run of campaign '{campaign}' in this period"
+        )
+    if parameter and names and parameter not in names:
+        raise NotFoundError(
+            f"machine {machine} has no parameter '{parameter}' here; it has {', '.join(names)}"
+        )
 
 
 def _asked(name: str, since: str, campaign: str) -> dict[str, Any]:
@@ -151,8 +157,15 @@ def _csv(values: ValuesAnswer) -> str:
         cells = [_cell(value) for _, series in columns for value in (series.values[row], series.u[row])]
         cells += [_cell(column[row]) for column in values.conditions.values()]
         writer.writerow(
-            [at.isoformat(), values.campaign[row], values.method[row], values.run[row], values.day[row]]
-            + [str(values.warm_up[row]).lower(), *cells]
+            [
+                at.isoformat(),
+                values.campaign[row],
+                values.method[row],
+                values.run[row],
+                values.day[row],
+                str(values.warm_up[row]).lower(),
+                *cells,
+            ]
         )
     return text.getvalue()
 

@@ -31,47 +31,29 @@ def routes() -> APIRouter:
     @router.get("/model")
     def model(request: Request, campaign: str, model: str = "", effect: str = "", note: str = "") -> Response:
         """Compare a model with a campaign; with an effect tried beside it."""
-        user, desk, ask = request.state.user, request.app.state.desk, request.app.state.asker
+        ask, user = request.app.state.asker, request.state.user
         row = next((row for row in ask(user, "campaigns").campaigns if row.campaign == campaign), None)
         if row is None:
             raise NotFoundError(f"there is no campaign '{campaign}'; the page Campaigns lists them")
-        asked = {"campaign": campaign, **({"model": model} if model else {})}
-        tickets: dict[str, Ticket] = {"explain": desk.ask(user, "explain", asked)}
-        if row.rows is None:
-            tried = {"effect": effect} if effect else {}
-            tickets["residuals"] = desk.ask(user, "residuals", {**asked, **tried})
-        tickets["compare"] = desk.ask(user, "compare", asked)
-        compare, why = _answered(tickets["compare"])
-        if compare is not None:
-            tickets["history"] = desk.ask(
-                user, "model history", {"campaign": campaign, "model": compare.comparison.model}
-            )
-        answers: dict[str, Any] = {"compare": compare}
-        refusals = {"compare": why, "explain": "", "residuals": "", "history": ""}
-        for name, ticket in tickets.items():
-            if name != "compare":
-                answers[name], refusals[name] = _answered(ticket)
-        explained = answers["explain"]
-        explanation = None if explained is None else explained.explanation
+        answers = _Answers(request, campaign, model, effect, in_machine=row.rows is None)
+        compare, explanation = answers.compare, answers.explanation
         missing = explanation.missing if isinstance(explanation, MachineExplanation) else ()
-        residuals = answers.get("residuals")
-        history = answers.get("history")
+        residuals, steps = answers.residuals, answers.steps
+        label = model if compare is None else compare.comparison.model
         versions = ask(user, "models").models
         return page(
             request, "model.html",
             row=row, campaign=campaign, compare=compare, explanation=explanation,
-            missing=() if explanation is None else explanation.missing, refusals=refusals,
-            model=compare.comparison.model if compare is not None else model,
+            missing=() if explanation is None else explanation.missing, refusals=answers.refusals,
+            model=label,
             effect=effect, note=note, effects=[candidate.effect for candidate in missing],
             scene=None if residuals is None else scene_chart(residuals),
             vectors=None if residuals is None else scene_vectors(residuals),
             residuals=residuals, magnifications=MAGNIFICATIONS,
             failing=[] if compare is None else failing_charts(compare),
             ranking=ranking_chart(missing) if missing else None,
-            falling=None if history is None else falling_chart(history.steps, missing[0] if missing else None),
-            steps=() if history is None else history.steps,
-            versions=versions, current=_version(versions, compare.comparison.model if compare else ""),
-            waiting=next((ticket for ticket in tickets.values() if not ticket.is_done), None),
+            falling=falling_chart(steps, missing[0] if missing else None), steps=steps,
+            versions=versions, current=_version(versions, label), waiting=answers.waiting,
         )  # fmt: skip
 
     @router.post("/model/add")
@@ -96,21 +78,45 @@ def routes() -> APIRouter:
     return router
 
 
+class _Answers:
+    """What the page shows of a model and a campaign, as far as it is computed; ``refusals`` say why a part is not."""
+
+    def __init__(self, request: Request, campaign: str, model: str, effect: str, *, in_machine: bool) -> None:
+        user, desk = request.state.user, request.app.state.desk
+        asked = {"campaign": campaign, **({"model": model} if model else {})}
+        # All are asked before any is waited for.
+        tickets: dict[str, Ticket] = {"explain": desk.ask(user, "explain", asked)}
+        if in_machine:
+            tickets["residuals"] = desk.ask(user, "residuals", asked | ({"effect": effect} if effect else {}))
+        tickets["compare"] = desk.ask(user, "compare", asked)
+        self.refusals = dict.fromkeys(("explain", "residuals", "compare", "history"), "")
+        self.compare = self._take("compare", tickets["compare"])
+        if self.compare is not None:
+            version = {"campaign": campaign, "model": self.compare.comparison.model}
+            tickets["history"] = desk.ask(user, "model history", version)
+        explained = self._take("explain", tickets["explain"])
+        self.explanation = None if explained is None else explained.explanation
+        self.residuals = self._take("residuals", tickets.get("residuals"))
+        history = self._take("history", tickets.get("history"))
+        self.steps = () if history is None else history.steps
+        self.waiting = next((ticket for ticket in tickets.values() if not ticket.is_done), None)
+
+    def _take(self, name: str, ticket: Ticket | None) -> Any:
+        """The answer of a ticket; None while it is computed, and where it was refused."""
+        try:
+            return None if ticket is None else ticket.answer()
+        except MonitorError as error:
+            self.refusals[name] = str(error)
+            return None
+
+
 async def _asked(request: Request, question: str, document: dict[str, Any]) -> Any:
     return await run_in_threadpool(request.app.state.asker, request.state.user, question, document)
 
 
-def _answered(ticket: Ticket) -> tuple[Any, str]:
-    """The answer of a ticket and why there is none; both empty while it is computed."""
-    try:
-        return ticket.answer(), ""
-    except MonitorError as error:
-        return None, str(error)
-
-
-def _back(campaign: str, answer: ChangeModelAnswer, done: str) -> Response:
+def _back(campaign: str, answer: ChangeModelAnswer, what: str) -> Response:
     name = answer.model.version.model
-    note = f"{done}: the model is now {name}"
+    note = f"{what}: the model is now {name}"
     return RedirectResponse(link("/model", campaign=campaign, model=name, note=note), status_code=303)
 
 

@@ -67,7 +67,7 @@ class ValuesAnswer:
 
 
 def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
-    """List the values of a machine's parameters in display units; nothing is computed or stored. Raises NotFoundError."""
+    """List the values of a machine's parameters in display units. Raises NotFoundError; nothing is stored."""
     name, version = None, None
     if request.model is not None:
         stored = resolve(db, request.model)
