@@ -64,7 +64,10 @@ def test_what_the_file_does_not_say_stays_unknown(tmp_path: Path) -> None:
 def test_the_examples_answer_every_question(name: str, made_up: str) -> None:
     found = read_laboratory(Path(__file__).resolve().parents[2] / "examples" / name)
     # What the campaign knows (the machine, the bar's certificate) and what only some laboratories have.
-    optional = {"accreditation", "item_description", "item_identification", "scale_bar"}
+    optional = {
+        "accreditation", "accredited", "item_description", "item_identification", "mark", "scale_bar", "standards",
+        "temperature",
+    }  # fmt: skip
     unanswered = {name for name in found.__dataclass_fields__ if getattr(found, name) is None}
     assert unanswered == optional
     assert found.laboratory is not None
@@ -94,10 +97,11 @@ def test_all_faults_are_listed_together(tmp_path: Path) -> None:
     lines = [line.strip() for line in str(caught.value).splitlines()[1:]]
     assert lines == [
         "authorised_by is a list of persons: begin each with [[authorised_by]]",
-        "there is no section [customers]; there are laboratory, customer, item, method, traceability, statements, "
+        "there is no section [customers]; there are laboratory, accreditation, customer, item, method, traceability, "
+        "standards, temperature, statements, "
         "authorised_by",
         "statements is a section: write [statements] and its keys below",
-        "[laboratory] has no key nam; it has name, address, contact, accreditation, country, language",
+        "[laboratory] has no key nam; it has name, address, contact, accreditation, country, language, mark",
         "laboratory.language is one of de, en, but is 'tlh'",
         'laboratory.address is a list of lines, for example ["1 Example Road", "Town"], but is \'one line\'',
         "customer.name is a text in quotes, but is 3",

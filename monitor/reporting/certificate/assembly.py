@@ -79,7 +79,10 @@ def certificate_record(
         authorised_by=laboratory.authorised_by,
         external_results=laboratory.external_results,
         reproduction=laboratory.reproduction,
-        conditions=_conditions_of(campaign, certified, [result.state for result in results], texts),
+        conditions=(
+            *_conditions_of(campaign, certified, [result.state for result in results], texts),
+            *_temperatures(laboratory, texts),
+        ),
         traceability=laboratory.traceability,
         references=_references(laboratory, campaign, texts),
         adjustment=laboratory.adjustment,
@@ -87,6 +90,9 @@ def certificate_record(
         opinions=laboratory.opinions,
         accreditation=laboratory.accreditation,
         country=laboratory.country,
+        accredited=laboratory.accredited,
+        mark=laboratory.mark,
+        standards=laboratory.standards,
         volumetric=tuple(volumetric),
         language=texts.language,
     )
@@ -163,6 +169,24 @@ def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, 
         Condition(texts("record.plan"), plan),
         Condition(texts("record.artefact"), campaign.artefact.id),
     )
+
+
+def _temperatures(laboratory: LaboratoryFile, texts: Texts) -> tuple[Condition, ...]:
+    """What the laboratory measured of machine and standard, and to which temperature the results refer."""
+    stated = laboratory.temperature
+    if stated is None:
+        return ()
+    values = []
+    for subject in ("machine", "standard"):
+        value = _with_unit(f"{subject}_degC", float(stated[f"{subject}_degC"]), texts)
+        expanded = _with_unit(f"{subject}_degC", float(stated[f"{subject}_U_degC"]), texts)
+        values.append(
+            Condition(
+                texts(f"record.{subject}_temperature"),
+                texts("record.with_uncertainty", value=value, expanded=expanded),
+            )
+        )
+    return (*values, Condition(texts("record.reference_temperature"), str(stated["reference"])))
 
 
 def _in_words(name: str) -> str:

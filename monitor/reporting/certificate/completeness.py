@@ -16,6 +16,11 @@ from monitor.reporting.certificate.results import ResultSet
 
 #: What only a certificate that replaces another has to say.
 AMENDMENT = ("7.8.8.1 and 7.8.8.3", "reference to the certificate that it replaces, with the reason")
+#: What a laboratory need not state, but where it does, whole.
+_STATED = {
+    "accredited": ("8.1 and ILAC P8", "accreditation"),
+    "standards": ("7.8.4.1 c", "reference standards"),
+}
 #: Written where nothing is known: a reader learns no more from it than from a blank. Not "na", which is a name too.
 _PLACEHOLDERS = frozenset({"n/a", "n.a.", "n. a.", "k.a.", "k. a.", "tbd", "tba", "t.b.d."})
 
@@ -48,6 +53,12 @@ def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
     missing: list[MissingItem] = []
     for name, (clause, item) in ITEMS.items():
         missing += [MissingItem(clause, item, part) for part in _gaps(getattr(record, name))]
+    for field, words in _STATED.items():
+        missing += [
+            MissingItem(*words, part)
+            for part in _gaps(getattr(record, field))
+            if getattr(record, field) is not None
+        ]
     if record.replaces is not None:
         missing += [MissingItem(*AMENDMENT, part) for part in _gaps(record.replaces)]
     return tuple(missing)
@@ -64,6 +75,17 @@ def date_faults(record: CertificateRecord) -> tuple[str, ...]:
             faults.append(f"the item was received on {record.received_on}, after the calibration of {first}")
         if record.issued_on is not None and record.issued_on < last:
             faults.append(f"it was issued on {record.issued_on}, before the calibration of {last}")
+        for standard in record.standards or ():
+            if standard.issued_on is not None and standard.issued_on > first:
+                faults.append(
+                    f"the certificate of {standard.name} was issued on {standard.issued_on}, after the calibration "
+                    f"of {first}"
+                )
+            if isinstance(standard.valid_until, date) and standard.valid_until < last:
+                faults.append(
+                    f"the certificate of {standard.name} was valid until {standard.valid_until}, which is before the "
+                    f"calibration of {last}"
+                )
     issued, old = record.issued_on, record.replaces
     if issued is not None and old is not None and old.issued_on is not None and issued < old.issued_on:
         faults.append(
@@ -90,7 +112,7 @@ def _gaps(value: object) -> list[str]:
     if value is None:
         return [""]
     if isinstance(value, str):
-        return _gaps_of_text(value)
+        return gaps_of_text(value)
     if isinstance(value, tuple):
         if not value:
             return [""]
@@ -108,7 +130,7 @@ def _gaps(value: object) -> list[str]:
     return []
 
 
-def _gaps_of_text(text: str) -> list[str]:
+def gaps_of_text(text: str) -> list[str]:
     if not text.strip():
         return [""]
     said = text.strip().casefold()

@@ -14,16 +14,21 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import NotApplicable, Party, Person
+from monitor.reporting.certificate.mark import read_mark
+from monitor.reporting.certificate.record import Accreditation, NotApplicable, Party, Person, Standard
+from monitor.reporting.certificate.samples import sample_faults
 from monitor.reporting.texts import languages
 
 #: Every section and its keys.
 SECTIONS: Mapping[str, tuple[str, ...]] = {
-    "laboratory": ("name", "address", "contact", "accreditation", "country", "language"),
+    "laboratory": ("name", "address", "contact", "accreditation", "country", "language", "mark"),
+    "accreditation": ("body", "number"),
     "customer": ("name", "address", "contact"),
     "item": ("description", "identification", "condition", "place", "received_on"),
     "method": ("document",),
     "traceability": ("statement", "probe", "scale_bar"),
+    "standards": ("name", "identification", "certificate", "issuer", "issued_on", "valid_until"),
+    "temperature": ("machine_degC", "machine_U_degC", "standard_degC", "standard_U_degC", "reference"),
     "statements": (
         "title",
         "sampling",
@@ -43,6 +48,7 @@ MAY_NOT_APPLY = frozenset(
         "item.received_on",
         "traceability.probe",
         "traceability.scale_bar",
+        "standards.valid_until",
         "statements.sampling",
         "statements.deviations",
         "statements.external_results",
@@ -60,7 +66,8 @@ class LaboratoryFile:
     """The answers of a laboratory, None where it gave none.
 
     ``item_*`` replace what the campaign says of the machine; ``probe`` and ``scale_bar`` are the certificates
-    of those standards where the campaign names none.
+    of those standards where the campaign names none. ``mark`` is the laboratory's picture as a data address;
+    ``temperature`` what was measured of machine and standard, by its key.
     """
 
     laboratory: Party | None
@@ -87,6 +94,10 @@ class LaboratoryFile:
     authorised_by: tuple[Person, ...] | None
     country: str | None = None
     language: str | None = None
+    accredited: Accreditation | None = None
+    mark: str | None = None
+    standards: tuple[Standard, ...] | None = None
+    temperature: Mapping[str, float | str] | None = None
 
 
 def read_laboratory(path: str | Path) -> LaboratoryFile:
@@ -104,6 +115,9 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         raise InputError(f"{file} is not TOML: {error}") from error
     faults: list[str] = []
     answers = _answers(tables, faults)
+    mark = read_mark(file, answers.get("laboratory.mark"), faults)
+    _check_temperature(answers, faults)
+    faults += sample_faults(answers)
     if faults:
         raise InputError("\n  ".join([f"{file} was refused:", *faults]))
     people = answers.get("authorised_by")
@@ -123,6 +137,17 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         probe=answers.get("traceability.probe"),
         scale_bar=answers.get("traceability.scale_bar"),
         authorised_by=people,
+        accredited=(
+            Accreditation(answers.get("accreditation.body"), answers.get("accreditation.number"))
+            if "accreditation" in tables
+            else None
+        ),
+        mark=mark,
+        standards=answers.get("standards"),
+        temperature={
+            key: answers[name] for key in SECTIONS["temperature"] if (name := f"temperature.{key}") in answers
+        }
+        or None,
         **{key: answers.get(f"statements.{key}") for key in SECTIONS["statements"]},
     )
 
@@ -133,13 +158,14 @@ def _answers(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
     for section, content in tables.items():
         if section not in SECTIONS:
             faults.append(f"there is no section [{section}]; there are {', '.join(SECTIONS)}")
-        elif section == "authorised_by":
-            if not isinstance(content, list) or not all(isinstance(person, dict) for person in content):
-                faults.append("authorised_by is a list of persons: begin each with [[authorised_by]]")
+        elif section in _LISTS:
+            if not isinstance(content, list) or not all(isinstance(entry, dict) for entry in content):
+                faults.append(f"{section} is a list of {_LISTS[section][0]}: begin each with [[{section}]]")
                 continue
-            people = [_section(section, person, faults) for person in content]
+            entries = [_section(section, entry, faults) for entry in content]
             answers[section] = tuple(
-                Person(person.get(f"{section}.name"), person.get(f"{section}.function")) for person in people
+                _LISTS[section][1](*(entry.get(f"{section}.{key}") for key in SECTIONS[section]))
+                for entry in entries
             )
         elif isinstance(content, dict):
             answers |= _section(section, content, faults)
@@ -192,6 +218,18 @@ def _text_or_left_out(value: Any) -> _Checked:
     return _text(value)
 
 
+def _temperature(value: Any) -> _Checked:
+    if isinstance(value, int | float) and not isinstance(value, bool) and -50.0 <= value <= 100.0:
+        return float(value), ""
+    return None, f"is a temperature in °C between -50 and 100, without quotes, but is {value!r}"
+
+
+def _uncertainty(value: Any) -> _Checked:
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value <= 50.0:
+        return float(value), ""
+    return None, f"is an expanded uncertainty (k = 2) in °C above 0, without quotes, but is {value!r}"
+
+
 def _address(value: Any) -> _Checked:
     if isinstance(value, list) and all(isinstance(line, str) for line in value):
         return tuple(value), ""
@@ -220,7 +258,32 @@ _RULES: Mapping[str, Callable[[Any], _Checked]] = {
     "laboratory.language": _language,
     "laboratory.accreditation": _text_or_left_out,
     "laboratory.country": _text_or_left_out,
+    "standards.issued_on": _day,
+    "standards.valid_until": _day,
+    "temperature.machine_degC": _temperature,
+    "temperature.machine_U_degC": _uncertainty,
+    "temperature.standard_degC": _temperature,
+    "temperature.standard_U_degC": _uncertainty,
 }
+
+
+#: Sections that are lists: what an entry is called, and what it becomes.
+_LISTS: Mapping[str, tuple[str, Callable[..., Any]]] = {
+    "authorised_by": ("persons", Person),
+    "standards": ("standards", Standard),
+}
+
+
+def _check_temperature(answers: Mapping[str, Any], faults: list[str]) -> None:
+    """Note what is missing of the temperatures, where any is stated: one without its uncertainty says too little."""
+    if not any(name.startswith("temperature.") for name in answers):
+        return
+    faults += [
+        f"[temperature] has {key} missing: a temperature is stated with its expanded uncertainty, both of machine and "
+        'standard, and with the reference (for example "results refer to 20 °C")'
+        for key in SECTIONS["temperature"]
+        if f"temperature.{key}" not in answers
+    ]
 
 
 def _shown(value: object) -> str:

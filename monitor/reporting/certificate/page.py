@@ -13,7 +13,13 @@ from monitor.reporting.certificate.grounds import accepted_statements
 from monitor.reporting.certificate.machine_frame import PrintedMachineFrame, printed_machine_frame
 from monitor.reporting.certificate.matrix import Block, correlation_blocks
 from monitor.reporting.certificate.pictures import Picture, beside, map_picture, pictures_of
-from monitor.reporting.certificate.record import CertificateRecord, ConformityStatement, MethodUsed
+from monitor.reporting.certificate.record import (
+    CertificateRecord,
+    ConformityStatement,
+    MethodUsed,
+    NotApplicable,
+    Standard,
+)
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.tables import Row, conformity_rows, result_rows, result_widths
 from monitor.reporting.certificate.volumetric import POINTS_FILE, printed_map
@@ -62,6 +68,7 @@ def certificate_context(record: CertificateRecord) -> dict[str, Any]:
         "performed_on": first if first == last else texts("page.from_to", first=first, last=last),
         "method": _method(record.method, texts),
         "references": [(entry.name, answer(entry.certificate, texts)) for entry in record.references or ()],
+        "standards": [_standard(entry, texts) for entry in record.standards or ()],
         "results": [_printed(result, texts) for result in record.results],
         "maps": [
             (printed_map(entry, texts), map_picture(entry, texts, POINTS_FILE.format(place=number)))
@@ -90,6 +97,18 @@ def _method(method: MethodUsed, texts: Texts) -> list[tuple[str, str]]:
         (texts("page.model"), method.model or ""),
         (texts("page.software"), method.software or ""),
     ]
+
+
+def _standard(standard: Standard, texts: Texts) -> tuple[str, ...]:
+    """A row of the table of standards: what it is, its certificate with issuer and day, and until when it is valid."""
+    valid = standard.valid_until
+    return (
+        standard.name or "",
+        standard.identification or "",
+        f"{standard.certificate}, {standard.issuer}",
+        "" if standard.issued_on is None else texts.day(standard.issued_on),
+        valid.statement if isinstance(valid, NotApplicable) else "" if valid is None else texts.day(valid),
+    )
 
 
 def _ellipsoid(result: ResultSet, sign: str) -> tuple[str, str]:

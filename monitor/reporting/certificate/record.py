@@ -73,6 +73,26 @@ class Reference:
 
 
 @dataclass(frozen=True)
+class Standard:
+    """A reference standard: what it is, its own certificate with issuer and day, and until when that is valid."""
+
+    name: str | None
+    identification: str | None
+    certificate: str | None
+    issuer: str | None
+    issued_on: date | None
+    valid_until: date | NotApplicable | None
+
+
+@dataclass(frozen=True)
+class Accreditation:
+    """The body that accredited the laboratory, and the number under which."""
+
+    body: str | None
+    number: str | None
+
+
+@dataclass(frozen=True)
 class Person:
     """Who authorises the certificate."""
 
@@ -176,7 +196,8 @@ class CertificateRecord:
     ``country`` (ISO 3166-1, two letters) is what a digital certificate asks for besides.
     ``replaces`` is the certificate that this one amends. ``volumetric`` maps follow from the ``results``; they are
     printed where one was asked for. ``accepted`` are the grounds against it that the laboratory answers for; None where
-    there were none.
+    there were none. ``accredited`` and ``mark`` (a picture as a data address) are printed where the laboratory states
+    them, ``standards`` with the traceability.
     """
 
     title: str | None
@@ -208,3 +229,6 @@ class CertificateRecord:
     volumetric: tuple[VolumetricResult, ...] = ()
     language: str = ENGLISH
     accepted: tuple[AcceptedGround, ...] | None = field(default=None, metadata=OMITTED)
+    accredited: Accreditation | None = field(default=None, metadata=OMITTED)
+    mark: str | None = field(default=None, metadata=OMITTED)
+    standards: tuple[Standard, ...] | None = field(default=None, metadata=OMITTED)

@@ -8,7 +8,8 @@ from typing import Any
 
 from markupsafe import Markup
 
-from monitor.reporting.health.pictures import PrintedPictures, map_picture, printed_pictures
+from monitor.reporting.health.answers import URGENT, answers, concern, reason, to_do
+from monitor.reporting.health.pictures import PrintedPictures, against_driver, map_picture, printed_pictures
 from monitor.reporting.health.records import (
     ALARMS,
     STATES,
@@ -22,6 +23,7 @@ from monitor.reporting.health.records import (
     fleet_row,
 )
 from monitor.reporting.health.refusals import PrintedRefusal, printed_refusal
+from monitor.reporting.health.trend_picture import trend_picture
 from monitor.reporting.health.words import day, in_words, micrometres, p_in_words, percent, plain
 from monitor.reporting.numbers import round_result, written
 from monitor.reporting.svg.sparkline import sparkline
@@ -37,6 +39,18 @@ SIGNS = {
     "not measured": "–",
     "in tolerance": "✓",
     "no change seen": "✓",
+}
+#: How a state looks, beside its sign and its word: bad, doubtful, unknown or good.
+LOOKS = {
+    "out of tolerance": "bad",
+    "may be out of tolerance": "doubtful",
+    "not evaluated": "doubtful",
+    "changed": "doubtful",
+    "model fails": "doubtful",
+    "suspect data": "doubtful",
+    "not measured": "unknown",
+    "in tolerance": "good",
+    "no change seen": "good",
 }
 #: Blind spots named on the page; the rest are counted (all stand in the JSON).
 _BLIND_SHOWN = 4
@@ -57,11 +71,22 @@ class FleetLine:
     location: str
     sign: str
     state: str
+    look: str
     alarm: bool
     changed: str
     since: str
     out: str
     next_check: str
+
+
+@dataclass(frozen=True)
+class Card:
+    """A machine that needs attention on the first page: why, what to do, and the history of what is wrong."""
+
+    head: FleetLine
+    reason: str
+    to_do: str
+    picture: Markup
 
 
 @dataclass(frozen=True)
@@ -119,10 +144,26 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
             for state, meaning in STATES.items()
             if state in {row.state for row in fleet.rows}
         ],
+        "answers": answers(fleet),
+        "cards": [_card(health) for health in fleet.attention if health.state in URGENT],
         "imports": [printed_refusal(refusal) for refusal in fleet.refused_imports],
         "alarms": sum(row.state in ALARMS for row in fleet.rows),
         "measured": sum(row.state != "not measured" for row in fleet.rows),
     }
+
+
+def _card(health: MachineHealth) -> Card:
+    return Card(_line(fleet_row(health)), reason(health), to_do(health), _card_picture(health))
+
+
+def _card_picture(health: MachineHealth) -> Markup:
+    """What shows the state: the residual against what drives it where the model fails, else a parameter's history."""
+    if health.state == "model fails" and health.model is not None and health.model.against is not None:
+        return Markup(against_driver(health.model.against))
+    parameter = concern(health)
+    if parameter is None or not parameter.history.times:
+        return Markup()
+    return Markup(trend_picture(health.machine, parameter))
 
 
 def machine_pages(machines: Iterable[MachineHealth]) -> Iterator[PrintedMachine]:
@@ -181,6 +222,7 @@ def _line(row: FleetRow) -> FleetLine:
         location=row.location,
         sign=SIGNS[row.state],
         state=row.state,
+        look=LOOKS[row.state],
         alarm=row.state in ALARMS,
         changed=row.changed,
         since="" if row.since is None else day(row.since),

@@ -56,7 +56,8 @@ class History:
 class Drift:
     """A drift per year, its standard uncertainty and 95 % interval; when the limit is reached (None: no sign of it).
 
-    ``crosses_between`` are the ends of the interval of that time, None where open.
+    ``crosses_between`` are the ends of the interval of that time, None where open. ``at_last`` is the line's value at
+    the last run and ``since`` the first of the runs that it was found from; None in records of older versions.
     """
 
     per_year: float
@@ -65,6 +66,8 @@ class Drift:
     p_value: float
     crosses_at: date | None
     crosses_between: tuple[date | None, date | None]
+    at_last: float | None = field(default=None, metadata=OMITTED)
+    since: datetime | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -219,7 +222,8 @@ class Fleet:
     """The first page: the week, when the report was made, and the machines by urgency.
 
     ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known. ``ended``
-    says whether the week had, by the shop's clock, when the report was made.
+    says whether the week had, by the shop's clock, when the report was made. ``attention`` are the records of the most
+    urgent machines, for the pictures and answers of the first page.
     """
 
     week: str
@@ -231,6 +235,7 @@ class Fleet:
     rows: tuple[FleetRow, ...]
     refused_imports: tuple[RefusedImport, ...] = ()
     ended: bool = True
+    attention: tuple[MachineHealth, ...] = ()
 
 
 def fleet_row(health: MachineHealth) -> FleetRow:

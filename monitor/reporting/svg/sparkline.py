@@ -21,6 +21,7 @@ WIDTH_MM, HEIGHT_MM = 52.0, 7.6
 _SCALE, _EDGE = 10.0, 8.0
 #: Runs at most in one picture; of more, the latest.
 MOST = 80
+_SECONDS_PER_YEAR = 365.25 * 86400.0
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ def sparkline(parameter: ParameterHealth, factor: float) -> str:
     values = np.array(history.values[-MOST:])
     half = factor * np.array(history.u[-MOST:])
     half = np.where(np.isfinite(half), half, 0.0)
-    low, high = _range(values, half, parameter.tolerance)
+    low, high = value_range(values, half, parameter.tolerance)
     width, height = WIDTH_MM * _SCALE, HEIGHT_MM * _SCALE
     inner_width, inner_height = width - 2 * _EDGE, height - 2 * _EDGE
     step = inner_width / max(len(values), 8)
@@ -63,6 +64,7 @@ def sparkline(parameter: ParameterHealth, factor: float) -> str:
         f'<rect x="0" y="0" width="{width:.0f}" height="{height:.0f}" fill="{FAINT}"/>',
         *_levels(parameter.tolerance, low, high),
         *_changes(parameter, points),
+        *_drift(parameter, low, high, points),
         *_runs(points),
     ]
     picture = (
@@ -99,6 +101,20 @@ def _changes(parameter: ParameterHealth, points: _Points) -> Iterator[str]:
             )
 
 
+def _drift(parameter: ParameterHealth, low: float, high: float, points: _Points) -> Iterator[str]:
+    """Yield the line of the drift at the runs that it was found from; between them it is straight in time."""
+    drift, times = parameter.drift, parameter.history.times[-MOST:]
+    if drift is None or drift.at_last is None or drift.since is None:
+        return
+    inner_height, joined = HEIGHT_MM * _SCALE - 2 * _EDGE, []
+    for x, time in zip(points.x, times, strict=True):
+        level = drift.at_last + drift.per_year * (time - times[-1]).total_seconds() / _SECONDS_PER_YEAR
+        if time >= drift.since and low <= level <= high:
+            joined.append(f"{x:.1f} {_EDGE + inner_height * (high - level) / (high - low):.1f}")
+    if len(joined) > 1:
+        yield f'<path d="M{"L".join(joined)}" fill="none" stroke="{ORANGE}" stroke-width="2.4"/>'
+
+
 def _runs(points: _Points) -> Iterator[str]:
     """Yield the bars and dots of the runs, those of this week last.
 
@@ -116,13 +132,19 @@ def _runs(points: _Points) -> Iterator[str]:
             yield f'<path d="{dots}" fill="none" stroke="{ink}" stroke-width="{size}" stroke-linecap="round"/>'
 
 
-def _range(values: Array, half: Array, tolerance: float | None) -> tuple[float, float]:
-    """Return the range of the picture: all values with their bars, and the tolerance where that leaves them legible."""
+def value_range(
+    values: Array, half: Array, tolerance: float | None, *, always: bool = False
+) -> tuple[float, float]:
+    """Return the range of a picture: all values with their bars, and the tolerance where that leaves them legible.
+
+    ``always`` has the tolerance in it all the same: where a forecast is drawn up to it.
+    """
     low, high = float((values - half).min()), float((values + half).max())
     span = max(high - low, 1e-9 * max(abs(high), abs(low)), 1e-30)
     for level in () if tolerance is None else (-tolerance, tolerance):
         # A limit further off than twice the span would press the values into a line.
-        if low - 2.0 * span <= level <= high + 2.0 * span:
+        near = low - 2.0 * span <= level <= high + 2.0 * span
+        if near or (always and level * (low + high) > 0.0):
             low, high = min(low, level), max(high, level)
     margin = 0.06 * max(high - low, span)
     return low - margin, high + margin

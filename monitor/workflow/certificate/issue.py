@@ -8,6 +8,7 @@ from datetime import date
 from typing import Literal
 
 from monitor.documents import to_document
+from monitor.methods import method_named
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.certificate.record import CertificateRecord
@@ -15,7 +16,7 @@ from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signing import sign
-from monitor.reporting.texts import ENGLISH, texts_of
+from monitor.reporting.texts import ENGLISH, Texts, texts_of
 from monitor.store import (
     Database,
     load_certificate,
@@ -70,7 +71,10 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     grounds = grounds_of(campaign, model, [run.run for run in measured])
     accepted = accepted_grounds(grounds, request.accept)
     runs = [certified_run(db, campaign, model, run, request.asked) for run in measured]
-    identity = CertificateIdentity(number, day, label(runs[-1].evaluated.model))
+    identity = CertificateIdentity(
+        number, day, label(runs[-1].evaluated.model),
+        method_name=_method_name(campaign.method, texts_of(stated.language or ENGLISH)),
+    )  # fmt: skip
     record = dataclasses.replace(
         _record(stated, runs, request, identity), replaces=replaced, accepted=accepted or None
     )
@@ -110,6 +114,13 @@ def _save(
         save_certificate(db, str(record.number), state, request.campaign, runs, document, pdf)
         if request.replaces is not None:
             mark_certificate(db, request.replaces, "amended", request.reason, record.number)
+
+
+def _method_name(name: str, texts: Texts) -> str:
+    """The name of a method as people read it, in the certificate's language where that has one, and as campaigns write
+    it."""
+    title = texts.words.get(f"methods.{name}", method_named(name).title)
+    return f"{title} ({name})"
 
 
 def _record(

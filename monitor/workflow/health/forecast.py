@@ -9,7 +9,7 @@ import numpy as np
 
 from monitor.exceptions import DataError, InputError
 from monitor.reporting.health.records import Drift
-from monitor.statistics import Forecast, Trend, forecast
+from monitor.statistics import Forecast, Trend, forecast, predict
 from monitor.workflow.history.calendar import DAYS_PER_YEAR, local_time
 from monitor.workflow.history.drift import PieceDrift
 
@@ -69,4 +69,6 @@ def stated_drift(drift: PieceDrift, ahead: DriftForecast | None) -> Drift | None
         line.p_value,
         None if crossing is None or crossing.at is None else day(crossing.at),
         (day(begin), day(end)),
+        at_last=float(predict(line, [drift.piece.t[-1]])[0][0]),
+        since=local_time(float(drift.piece.t[0]), drift.piece.offset),
     )

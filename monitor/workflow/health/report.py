@@ -44,6 +44,8 @@ KIND = "health"
 #: many machines, since a process starts in the time in which a machine or two are computed.
 MOST_WORKERS = 4
 MACHINES_A_WORKER = 4
+#: Machines that the first page draws: the most urgent, as many as leave room for the table.
+ATTENTION = 3
 
 
 def report(
@@ -77,6 +79,7 @@ def report(
             tuple(row for row, _ in rows),
             refused_elsewhere(db, {name.machine for name in every}, week),
             ended=today > week.last,
+            attention=tuple(stored_health(db, number) for _, number in rows[:ATTENTION]),
         )  # fmt: skip
         files = _write(db, fleet, [number for _, number in rows], request, engine)
     return _answer(fleet, week, files)

@@ -1,0 +1,225 @@
+"""Answers, for the first page, the six questions of someone who runs the shop: one sentence each, from the records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from monitor.reporting.health.records import (
+    ALARMS,
+    STATES,
+    Drift,
+    Fleet,
+    FleetRow,
+    MachineHealth,
+    ParameterHealth,
+    State,
+)
+from monitor.reporting.health.words import day, in_words, percent, plain
+from monitor.reporting.plain_names import plain_name
+
+#: States in which a machine wants something done; in the others nothing is wrong, or nothing is known.
+URGENT: tuple[State, ...] = tuple(list(STATES)[: list(STATES).index("suspect data") + 1])
+#: States in which nothing is wrong.
+FINE: tuple[State, ...] = ("in tolerance", "no change seen")
+#: Names of machines in a sentence; of more, their number.
+_NAMED = 6
+#: A drift is spoken of below this probability of seeing it where there is none.
+_DRIFT_P = 0.05
+_QUIET = "No parameter is out of its tolerance, none changed, and the models explain the measurements."
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A question, its ``kind`` (the same in every report) and the sentence that answers it."""
+
+    kind: str
+    question: str
+    sentence: str
+
+
+def answers(fleet: Fleet) -> tuple[Answer, ...]:
+    """Return the answers of a week in the order in which they are asked."""
+    worst = next((health for health in fleet.attention if health.state in URGENT), None)
+    return (
+        Answer("worst", "Worst machine?", _worst(fleet)),
+        Answer("why", "Why?", _QUIET if worst is None else reason(worst)),
+        Answer("since", "Since when?", "Nothing to date." if worst is None else _since(worst)),
+        Answer("do", "What to do?", _keep_on(fleet) if worst is None else to_do(worst)),
+        Answer("fine", "What is fine?", _fine(fleet.rows)),
+        Answer("unjudged", "Not judged?", _unjudged(fleet)),
+    )
+
+
+def concern(health: MachineHealth) -> ParameterHealth | None:
+    """Return the parameter that makes a machine's state, or is nearest to make it; None without parameters."""
+    parameters = health.parameters
+    if health.state == "changed":
+        noted = [change.at for change in health.changes if change.kind == "change" and change.this_week]
+        changed = [parameter for parameter in parameters if any(at in parameter.changed_at for at in noted)]
+        if changed:
+            return changed[0]
+    return max(parameters, key=_urgency, default=None)
+
+
+def _urgency(parameter: ParameterHealth) -> tuple[float, float, float]:
+    """A drift that reaches its limit counts before one that does not, after the probability to be out already."""
+    out, drift = parameter.probability_out or 0.0, parameter.drift
+    reaches = drift is not None and drift.crosses_at is not None and drift.p_value < _DRIFT_P
+    used = abs(parameter.estimate) / parameter.tolerance if parameter.tolerance else 0.0
+    return (out if out > 0.01 else 0.0), float(reaches), used
+
+
+def reason(health: MachineHealth) -> str:
+    """Return why a machine is in its state, in plain words with numbers."""
+    parameter = concern(health)
+    if health.state in ("out of tolerance", "may be out of tolerance"):
+        sentences = []
+        if parameter is not None and parameter.probability_out:
+            sentences.append(_beyond(parameter))
+        error_map = health.map
+        if error_map is not None and error_map.probability_out and error_map.limit_um is not None:
+            sentences.append(
+                f"the volumetric error reaches {error_map.worst_um:.1f} µm, its limit is "
+                f"{plain(error_map.limit_um)} µm (beyond it with a probability of {percent(error_map.probability_out)})"
+            )
+        return _sentence("; ".join(sentences) or STATES[health.state])
+    if health.state == "not evaluated":
+        return _sentence("; ".join(health.quality.remarks[:1]) or STATES["not evaluated"])
+    if health.state == "model fails" and health.model is not None:
+        missing = health.model.missing
+        size = f", up to {missing[0].peak_um:.1f} µm" if missing and missing[0].peak_um is not None else ""
+        return _sentence(
+            f"the measurements show what the model does not have: {missing[0].meaning} ({missing[0].effect}){size}"
+            if missing
+            else health.model.answer
+        )
+    if health.state == "changed":
+        what = "; ".join(
+            change.what for change in health.changes if change.this_week and change.kind == "change"
+        )
+        name = f" ({plain_name(parameter.name)})" if parameter is not None and parameter.name in what else ""
+        return _sentence(f"{what}{name}")
+    if health.state == "suspect data":
+        count = len(health.quality.suspect)
+        return _sentence(f"{count} bad point{'s' if count != 1 else ''}: {health.quality.suspect[0]}")
+    if parameter is not None and parameter.drift is not None and parameter.drift.p_value < _DRIFT_P:
+        return _sentence(f"{_stands(parameter)}{_moves(parameter, parameter.drift)}")
+    return _sentence(STATES[health.state])
+
+
+def _beyond(parameter: ParameterHealth) -> str:
+    drift = "" if parameter.drift is None else _moves(parameter, parameter.drift)
+    out = percent(parameter.probability_out or 0.0)
+    return f"{_stands(parameter)}{drift}; out of tolerance with a probability of {out}"
+
+
+def _stands(parameter: ParameterHealth) -> str:
+    value, expanded = in_words(parameter.estimate, parameter.expanded, sign=True)
+    limit = "" if parameter.tolerance is None else f", tolerance ± {plain(parameter.tolerance)}"
+    name = plain_name(parameter.name)
+    return f"{name} ({parameter.name}) is {value} {parameter.unit} (U = {expanded}{limit})"
+
+
+def _moves(parameter: ParameterHealth, drift: Drift) -> str:
+    """How much the parameter gets further from zero (grows) or nearer to it a month, where that is no chance."""
+    if drift.p_value >= _DRIFT_P:
+        return ""
+    month, _ = in_words(abs(drift.per_year) / 12.0, drift.u_per_year / 12.0)
+    verb = "grows" if drift.per_year * parameter.estimate > 0.0 else "shrinks"
+    sentence = f" and {verb} by {month} {parameter.unit} a month"
+    last = parameter.history.times[-1].date()
+    if verb == "grows" and drift.crosses_at is not None and drift.crosses_at > last:
+        sentence += f", so that it reaches its tolerance about {drift.crosses_at}"
+    return sentence
+
+
+def _since(health: MachineHealth) -> str:
+    if health.since is None:
+        return "Not known: this is not stated run by run."
+    if health.state in ALARMS:
+        return f"Since {day(health.since)}: every run since then lies beyond the tolerance."
+    if health.state == "model fails":
+        return f"Since {day(health.since)} at the latest, the first run that was compared."
+    span = next(
+        (
+            change.after
+            for change in health.changes
+            if change.this_week and change.kind == "change" and change.at == health.since
+        ),
+        None,
+    )
+    if span is not None and span != health.since:
+        return f"Between {day(span)} and {day(health.since)}."
+    return f"Since {day(health.since)}."
+
+
+def to_do(health: MachineHealth) -> str:
+    """Return what to do on a machine, and by when to measure it again."""
+    parameter = concern(health)
+    name = "its errors" if parameter is None else f"{plain_name(parameter.name)} ({parameter.name})"
+    action = {
+        "out of tolerance": f"adjust or compensate {name} and measure again",
+        "may be out of tolerance": f"measure again with more runs: {name} is too near its limit to be judged",
+        "not evaluated": "mend what its page names and measure again",
+        "changed": "find out what was done or happened then, record it as an event, and measure again",
+        "suspect data": "look at the points that its page names and measure again",
+        "not measured": "measure it",
+    }.get(health.state, "measure again as planned")
+    if health.state == "model fails" and health.model is not None:
+        missing = health.model.missing
+        action = (
+            f"{missing[0].remedy.rstrip('.')}; then measure again"
+            if missing
+            else "look at its page for where the model fails, and measure again"
+        )
+    when = "now" if health.next_check == "now" else f"(next check {health.next_check})"
+    return _sentence(f"{action} {when}")
+
+
+def _worst(fleet: Fleet) -> str:
+    urgent = [row for row in fleet.rows if row.state in URGENT]
+    if not urgent:
+        return "None: no machine that was measured needs attention."
+    first, *others = urgent
+    place = f" ({first.location})" if first.location else ""
+    more = f"; also {_names(others)}" if others else ""
+    return f"{first.machine}{place}: {first.state}{more}."
+
+
+def _keep_on(fleet: Fleet) -> str:
+    checked = next((row for row in fleet.rows if row.state in FINE), None)
+    return "Measure the machines that were not measured." if checked is None else "Measure again as planned."
+
+
+def _fine(rows: Sequence[FleetRow]) -> str:
+    fine = [row for row in rows if row.state in FINE]
+    if not fine:
+        return "No machine could be stated to be fine."
+    return f"{len(fine)} of {len(rows)} machine{'s' if len(rows) != 1 else ''}: {_names(fine)}."
+
+
+def _unjudged(fleet: Fleet) -> str:
+    parts = [
+        f"{words}: {_names(rows)}"
+        for state, words in (
+            ("not measured", "not measured this week"),
+            ("not evaluated", "measured but not evaluated"),
+            ("no change seen", "not against every tolerance"),
+        )
+        if (rows := [row for row in fleet.rows if row.state == state])
+    ]
+    if fleet.refused_imports:
+        parts.append(f"{len(fleet.refused_imports)} refused imports of machines not known here")
+    return _sentence("; ".join(parts)) if parts else "Everything was judged."
+
+
+def _names(rows: Sequence[FleetRow]) -> str:
+    named = ", ".join(row.machine for row in rows[:_NAMED])
+    return named + (f" and {len(rows) - _NAMED} more" if len(rows) > _NAMED else "")
+
+
+def _sentence(text: str) -> str:
+    """A text with a capital at the beginning, unless that is a symbol or a name, and a full stop."""
+    head = text[:1].upper() + text[1:]
+    return head if head.endswith(".") else head + "."

@@ -1,0 +1,146 @@
+"""Draws one parameter over dates: runs with their intervals, tolerance, changes, and the drift up to its limit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from monitor.reporting.health.records import Drift, ParameterHealth
+from monitor.reporting.palette import BLUE, INK, MID, ORANGE
+from monitor.reporting.plain_names import plain_name
+from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, tick_words
+from monitor.reporting.svg.sparkline import value_range
+
+WIDTH_MM, HEIGHT_MM = 104.0, 45.0
+#: Margins around the panel in tenths of a millimetre: numbers, words above, tolerances at the right, dates.
+_LEFT, _TOP, _RIGHT, _BOTTOM = 92.0, 74.0, 78.0, 52.0
+#: A forecast is drawn at most so many times the history's length ahead.
+_AHEAD = 1.0
+#: Steps between dates along the axis, in days, and in months where a month is the least.
+_DAYS = (1, 2, 7, 14)
+_MONTHS = (1, 2, 3, 6, 12, 24, 60, 120)
+_DAYS_PER_MONTH = 365.25 / 12
+
+
+def trend_picture(machine: str, parameter: ParameterHealth) -> str:
+    """Return the history of a parameter of a machine as SVG; no words stand inside the panel.
+
+    The line of the drift is drawn over the runs that it was found from, and dashed ahead to the day on which the
+    tolerance is reached, at most as far ahead as the history is long.
+    """
+    history, drift = parameter.history, parameter.drift
+    half = np.nan_to_num(np.array(history.u) * parameter.expanded / parameter.u, posinf=0.0)
+    first, last = history.times[0], _end(parameter)
+    margin = max((last - first) * 0.03, timedelta(hours=12))
+    reaches = drift is not None and drift.crosses_at is not None
+    low, high = value_range(np.array(history.values), half, parameter.tolerance, always=reaches)
+    on = Drawing(WIDTH_MM, HEIGHT_MM, f"{machine}: {plain_name(parameter.name)} over dates")
+    panel = Panel(
+        _LEFT, _TOP, WIDTH_MM * SCALE - _LEFT - _RIGHT, HEIGHT_MM * SCALE - _TOP - _BOTTOM,
+        (_days(first - margin), _days(last + margin)), (low, high),
+    )  # fmt: skip
+    _words(on, machine, parameter)
+    panel.frame(on, "", "", ticks=4, named=dict(_date_ticks(first - margin, last + margin)))
+    _tolerance(on, panel, parameter.tolerance)
+    for changed in parameter.changed_at:
+        if first <= changed <= last:
+            on.line(panel.x(_days(changed)), _TOP, panel.x(_days(changed)), _TOP + panel.height, ORANGE, 4.0)
+    for week, colour in ((False, MID), (True, BLUE)):
+        rows = [index for index, this_week in enumerate(history.this_week) if this_week == week]
+        middles = [
+            (panel.x(_days(history.times[index])), panel.y(history.values[index]), half[index])
+            for index in rows
+        ]
+        scale = panel.height / (high - low)
+        on.path(
+            "".join(f"M{x:.1f} {y - u * scale:.1f}V{y + u * scale:.1f}" for x, y, u in middles),
+            stroke=colour,
+            width=2.2,
+        )
+        on.dots("".join(f"M{x:.1f} {y:.1f}h0" for x, y, _ in middles), colour, 11.0)
+    if drift is not None and drift.at_last is not None and drift.since is not None:
+        _drift(on, panel, drift, history.times[-1], last)
+    return on.svg()
+
+
+def _end(parameter: ParameterHealth) -> datetime:
+    """The last moment of the picture: the last run, or the day on which the limit is reached."""
+    first, last = parameter.history.times[0], parameter.history.times[-1]
+    if parameter.drift is None or parameter.drift.at_last is None:
+        return last
+    limit = last + (last - first) * _AHEAD
+    crossing = parameter.drift.crosses_at
+    if crossing is None or crossing <= last.date():
+        return last + (last - first) * 0.15
+    return min(limit, datetime.combine(crossing, datetime.min.time()) + timedelta(days=1))
+
+
+def _words(on: Drawing, machine: str, parameter: ParameterHealth) -> None:
+    """Write machine, parameter and unit above the panel, and below them what the line says."""
+    room = int(WIDTH_MM * SCALE / (WIDE * LETTER))
+    name = f"{plain_name(parameter.name)} ({parameter.name}) / {parameter.unit}"
+    title = f"{_shortened(machine, room - len(name) - 2)}: {name}"
+    on.text(0.0, 0.9 * LETTER, title, bold=True)
+    legend = "bars: U; blue: this week"
+    if parameter.changed_at:
+        legend += "; orange: a change"
+    if parameter.drift is not None and parameter.drift.at_last is not None:
+        legend += "; line: drift, dashed: forecast"
+    on.text(0.0, 2.2 * LETTER, legend, colour=MID)
+
+
+def _shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: max(most - 1, 1)] + "…"
+
+
+def _tolerance(on: Drawing, panel: Panel, tolerance: float | None) -> None:
+    """Draw the limits that lie in the panel, dashed, with their values at the right."""
+    right = panel.left + panel.width
+    for limit in () if tolerance is None else (-tolerance, tolerance):
+        if panel.up[0] <= limit <= panel.up[1]:
+            y = panel.y(limit)
+            on.line(panel.left, y, right, y, INK, 3.0, "14 8")
+            words = ("+" if limit > 0 else "") + tick_words(limit)
+            on.text(right + 8, y + 0.36 * LETTER, words, bold=True)
+
+
+def _drift(on: Drawing, panel: Panel, drift: Drift, last: datetime, end: datetime) -> None:
+    """Draw the line of a drift through its value at the last run, cut off where it leaves the panel."""
+    assert drift.at_last is not None
+    assert drift.since is not None
+    level, slope, low, high = drift.at_last, drift.per_year / 365.25, *panel.up
+    begin = max(_days(drift.since), panel.across[0])
+    ahead = _days(end)
+    if slope:
+        edges = sorted((edge - level) / slope + _days(last) for edge in (low, high))
+        begin, ahead = max(begin, edges[0]), min(ahead, edges[1])
+    for start, stop, dash in ((begin, min(_days(last), ahead), ""), (_days(last), ahead, "12 9")):
+        if stop > start:
+            heights = [level + slope * (at - _days(last)) for at in (start, stop)]
+            on.line(
+                panel.x(start), panel.y(heights[0]), panel.x(stop), panel.y(heights[1]), ORANGE, 4.5, dash
+            )
+
+
+def _days(moment: datetime) -> float:
+    return (moment - datetime(1970, 1, 1)) / timedelta(days=1)
+
+
+def _date_ticks(first: datetime, last: datetime) -> Iterator[tuple[float, str]]:
+    """Yield at most seven days, months or years between two moments with what is written there."""
+    days = (last - first) / timedelta(days=1)
+    step = next((step for step in _DAYS if days / step <= 6.5), None)
+    if step is not None:
+        at = first.date() + timedelta(days=1)
+        while (moment := datetime.combine(at, datetime.min.time())) <= last:
+            yield _days(moment), f"{at:%Y-%m-%d}" if days <= 4 or step > 1 else f"{at:%m-%d}"
+            at += timedelta(days=step)
+        return
+    months = next((step for step in _MONTHS if days / _DAYS_PER_MONTH / step <= 6.5), _MONTHS[-1])
+    index = first.year * 12 + first.month  # the first month that begins within the picture
+    index = -(-index // months) * months
+    while (moment := datetime(index // 12, index % 12 + 1, 1)) <= last:
+        yield _days(moment), f"{moment:%Y}" if months % 12 == 0 else f"{moment:%Y-%m}"
+        index += months

@@ -1,0 +1,198 @@
+"""The first page of the weekly report: six questions answered, pictures with dates and limits, no page left empty."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import replace
+from datetime import date, datetime, timedelta
+
+import numpy as np
+import pypdf
+import pytest
+
+from monitor.reporting.health.answers import answers
+from monitor.reporting.health.records import (
+    Change,
+    DataQuality,
+    Drift,
+    Fleet,
+    History,
+    MachineHealth,
+    ParameterHealth,
+    State,
+    by_urgency,
+    fleet_row,
+)
+from monitor.reporting.health.render import health_html, health_pdf
+from monitor.reporting.health.trend_picture import trend_picture
+
+LAST = datetime(2026, 3, 6, 9)
+
+
+def parameter(
+    name: str = "EC0Y",
+    *,
+    value: float = 24.0,
+    per_month: float = 4.0,
+    tolerance: float | None = 20.0,
+    runs: int = 30,
+) -> ParameterHealth:
+    """A run a week on a straight line that ends at ``value``."""
+    times = [LAST - timedelta(days=7 * (runs - 1 - index)) for index in range(runs)]
+    values = [value + per_month * (time - LAST).days / 30.4375 for time in times]
+    beyond = [tolerance is not None and abs(at) > tolerance for at in values]
+    since = times[runs - beyond[::-1].index(False)] if beyond[-1] and not all(beyond) else None
+    crosses = None
+    if tolerance is not None and per_month and abs(value) < 1e6:
+        crosses = (LAST + timedelta(days=(tolerance - value) / per_month * 30.4375)).date()
+    drift = Drift(
+        12 * per_month, 1.2, (12 * per_month - 2.4, 12 * per_month + 2.4), 1e-6 if per_month else 0.6,
+        crosses, (crosses, crosses), at_last=value, since=times[0],
+    )  # fmt: skip
+    out = None if tolerance is None else float(beyond[-1])
+    return ParameterHealth(
+        name, name, "µrad", value, 1.2, 4.0, tolerance, out, since,
+        History(tuple(times), tuple(values), (1.2,) * runs, tuple(time > LAST - timedelta(days=5) for time in times)),
+        (), drift,
+    )  # fmt: skip
+
+
+def machine(name: str, state: State, *parameters: ParameterHealth, **fields: object) -> MachineHealth:
+    measured = state != "not measured"
+    return MachineHealth(
+        **{
+            "machine": name, "description": "a machine", "location": "hall 1", "state": state, "changed": "nothing",
+            "since": parameters[0].out_since if parameters else None, "probability_out": None, "next_check": "now",
+            "run": "run 1" if measured else "",
+            "basis": "repeated runs", "factor": "U = 3.3 u", "parameters": parameters,
+            "changes": (), "conditions": (), "model": None,
+            "quality": DataQuality(1, 62, 0, (), (), (), (), ()), "map": None,
+            **fields,
+        }
+    )  # fmt: skip
+
+
+def fleet(*machines: MachineHealth) -> tuple[Fleet, list[MachineHealth]]:
+    by_state = sorted(machines, key=lambda health: by_urgency(fleet_row(health)))
+    rows = tuple(fleet_row(health) for health in by_state)
+    return Fleet(
+        "2026-W10", date(2026, 3, 2), date(2026, 3, 8), datetime(2026, 3, 9, 6), "software", 0.05, rows,
+        attention=tuple(by_state[:3]),
+    ), by_state  # fmt: skip
+
+
+CHANGED = machine(
+    "Stepped", "changed", parameter("EA0C", value=3.0, per_month=0.0),
+    since=datetime(2026, 3, 4), next_check="by 2026-05-01: EA0C stays in tolerance with 95 % until then",
+    changes=(Change("change", datetime(2026, 2, 27), datetime(2026, 3, 4), "EA0C stepped by +12 µrad", 1e-5, True),),
+)  # fmt: skip
+DRIFTED = machine("Drifted", "out of tolerance", parameter(), probability_out=0.99)
+GOOD = machine("Good", "in tolerance", parameter(value=2.0, per_month=0.0))
+AWAY = machine("Away", "not measured")
+
+
+def pages_of(*machines: MachineHealth) -> list[str]:
+    reader = pypdf.PdfReader(io.BytesIO(health_pdf(*fleet(*machines))))
+    return [" ".join(page.extract_text().split()) for page in reader.pages]
+
+
+def test_the_six_questions_are_answered_in_plain_words_on_page_one() -> None:
+    page = pages_of(GOOD, AWAY, CHANGED, DRIFTED)[0]
+    assert "Worst machine? Drifted (hall 1): out of tolerance; also Stepped." in page
+    assert (
+        "Why? Squareness X-Y (EC0Y) is +24.0 µrad (U = 4.0, tolerance ± 20.0) and grows by 4.00 µrad a month; "
+        "out of tolerance with a probability of > 99.9 %." in page
+    )
+    # 24 µrad less 4 a month: 20 is passed a month before the last run, and the next weekly run is beyond it.
+    assert "Since when? Since 2026-02-06: every run since then lies beyond the tolerance." in page
+    assert "What to do? Adjust or compensate squareness X-Y (EC0Y) and measure again now." in page
+    assert "What is fine? 1 of 4 machines: Good." in page
+    assert "Not judged? Not measured this week: Away." in page
+    # The second machine has its card as well.
+    assert "EA0C stepped by +12 µrad (squareness of axis C to Y)." in page
+    assert "find out what was done or happened then" in page.lower()
+
+
+def test_a_quiet_week_says_so() -> None:
+    page = pages_of(GOOD)[0]
+    assert "Worst machine? None: no machine that was measured needs attention." in page
+    assert "What is fine? 1 of 1 machine: Good." in page
+    assert "Not judged? Everything was judged." in page
+
+
+@pytest.mark.parametrize(
+    ("health", "kind", "sentence"),
+    [
+        (CHANGED, "since", "Between 2026-02-27 and 2026-03-04."),
+        (machine("M", "not evaluated"), "do", "Mend what its page names and measure again now."),
+        (machine("M", "may be out of tolerance"), "since", "Not known: this is not stated run by run."),
+        (AWAY, "worst", "None: no machine that was measured needs attention."),
+        (AWAY, "fine", "No machine could be stated to be fine."),
+        (machine("M", "no change seen"), "unjudged", "Not against every tolerance: M."),
+    ],
+)
+def test_every_state_has_its_answer(health: MachineHealth, kind: str, sentence: str) -> None:
+    assert {answer.kind: answer.sentence for answer in answers(fleet(health)[0])}[kind] == sentence
+
+
+def test_a_drift_that_will_reach_its_limit_is_said_with_the_day() -> None:
+    soon = machine("M", "may be out of tolerance", parameter(value=18.0, per_month=1.0))
+    soon = replace(soon, parameters=(replace(soon.parameters[0], probability_out=0.06),))
+    sentences = {answer.kind: answer.sentence for answer in answers(fleet(soon)[0])}
+    # 2 µrad at 1 a month: two months of 30.4375 days after the sixth of March.
+    assert "grows by 1.00 µrad a month, so that it reaches its tolerance about 2026-05-06" in sentences["why"]
+
+
+def test_the_forecast_is_drawn_up_to_the_limit_and_the_dates_stand_below() -> None:
+    drawn = parameter(value=15.0, per_month=2.0)
+    svg = trend_picture("M", drawn)
+    assert re.findall(r">(20\d\d-\d\d)<", svg)
+    dashed = re.search(r'<path d="M([\d.]+) ([\d.]+)L([\d.]+) ([\d.]+)"[^>]*stroke-dasharray="12 9"', svg)
+    assert dashed is not None
+    limit = re.search(r'<path d="M[\d.]+ ([\d.]+)L[\d.]+ [\d.]+"[^>]*stroke-dasharray="14 8"', svg)
+    assert limit is not None
+    heights = [
+        float(y) for y in re.findall(r'd="M[\d.]+ ([\d.]+)L[\d.]+ [\d.]+"[^>]*stroke-dasharray="14 8"', svg)
+    ]
+    assert float(dashed[4]) == pytest.approx(min(heights), abs=4.0)  # ends on the upper limit (y points down)
+
+
+@pytest.mark.parametrize("runs", [1, 2, 200, 2000])
+@pytest.mark.parametrize("value", [0.0, 1e-9, 1e7, -24.0])
+def test_the_picture_takes_any_history(runs: int, value: float) -> None:
+    svg = trend_picture(
+        "A machine with a name that is longer than any picture is wide " * 2,
+        parameter(value=value, runs=runs),
+    )
+    assert "nan" not in svg
+    assert "inf" not in svg
+    numbers = np.array([float(x) for x in re.findall(r"[MLV ](-?\d+\.\d)", svg)])
+    assert np.all(np.abs(numbers) < 2e3)
+
+
+def test_no_page_but_the_last_is_more_than_half_empty() -> None:
+    machines = [
+        replace(health, machine=f"{health.machine} {index}")
+        for index in range(4)
+        for health in (GOOD, AWAY, CHANGED)
+    ]
+    reader = pypdf.PdfReader(io.BytesIO(health_pdf(*fleet(*machines, DRIFTED))))
+    for page in reader.pages[:-1]:
+        lowest: list[float] = []
+
+        def note(
+            text: str, _cm: object, matrix: list[float], *_: object, lowest: list[float] = lowest
+        ) -> None:
+            if text.strip() and "Page" not in text:
+                lowest.append(matrix[5])
+
+        page.extract_text(visitor_text=note)
+        assert min(y for y in lowest if y > 60.0) < 0.5 * float(page.mediabox.height)
+
+
+def test_a_narrow_screen_gets_one_column_with_the_names_of_the_cells() -> None:
+    html = "".join(health_html(*fleet(DRIFTED, GOOD)))
+    assert "max-width: 700px" in html
+    assert 'data-name="Next check"' in html
+    assert 'name="viewport"' in html
