@@ -34,7 +34,9 @@ _PAGES = (fleet_page, machine_page, campaign_page, model, importing, certificate
 def application(db: Database, settings: ServerSettings, working_folder: Path) -> Gate:
     """Return the server of an open database. Raises InputError for a file of users that is wrong."""
     users = None if settings.users is None else read_users(settings.users)
-    role = Role.VIEWER if settings.reading_only else Role.APPROVER
+    role = Role.APPROVER
+    if settings.reading_only:
+        role, users = Role.VIEWER, None if users is None else users.looking_only()
     # Documentation of FastAPI's own would load scripts from elsewhere; the interface describes itself.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     asker = Asker(db)

@@ -19,10 +19,10 @@ def host_user_name() -> str:
 
 
 @contextmanager
-def opened(path: Path, working_folder: Path, *, read_only: bool = False) -> Iterator[Database]:
+def opened(path: Path, working_folder: Path, *, must_exist: bool = False) -> Iterator[Database]:
     """Open the database; its queries reach files in ``working_folder`` alone. Raises NotFoundError, StoreError."""
-    if read_only and not path.exists():
+    if must_exist and not path.exists():
         raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
-    with Database(path, read_only=read_only, threads=1, actor=host_user_name()) as db:
+    with Database(path, threads=1, actor=host_user_name()) as db:
         db.confine(working_folder)
         yield db

@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
 from monitor import __version__
+from monitor.reporting.plain_names import plain_name
 from monitor.reporting.resources import report_text
 from monitor.web import words
 from monitor.web.faults import Refusal
@@ -51,7 +52,7 @@ def _environment() -> Environment:
     environment.globals |= {
         "version": __version__,
         "link": link,
-        "plain_name": words.plain_name,
+        "plain_name": plain_name,
         "number": words.number,
         "with_u": words.with_u,
         "probability": words.probability,

@@ -40,7 +40,7 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
     """Serve a database; returns when it was stopped. Raises NotFoundError, StoreError, InputError before it listens."""
     with tempfile.TemporaryDirectory(prefix="monitor-serve-") as folder:
         working_folder = Path(folder).resolve()
-        with opened(settings.database, working_folder, read_only=settings.reading_only) as db:
+        with opened(settings.database, working_folder, must_exist=settings.reading_only) as db:
             gate = application(db, settings, working_folder)
             config = uvicorn.Config(
                 gate, host=settings.host, port=settings.port, log_level="warning", server_header=False,

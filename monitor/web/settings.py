@@ -18,7 +18,7 @@ class ServerSettings:
     """The database to serve, the address to listen at, and what protects it.
 
     ``users`` is the file of tokens (None: no log-in, loopback alone). ``certificate`` and ``key`` are PEM files of TLS;
-    ``proxy`` is the name under which a proxy that does TLS is reached. ``reading_only`` lets nobody change anything.
+    ``proxy`` is the name under which a proxy that does TLS is reached. ``reading_only`` makes everybody a viewer.
     """
 
     database: Path

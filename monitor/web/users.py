@@ -51,6 +51,10 @@ class Users:
 
     by_hash: dict[str, User]
 
+    def looking_only(self) -> Users:
+        """Return the same users, each as a viewer."""
+        return Users({digest: User(user.name, Role.VIEWER) for digest, user in self.by_hash.items()})
+
     def of_token(self, token: str) -> User | None:
         """Return the user whose token this is; every hash is compared, in constant time."""
         digest = _digest(token)

@@ -9,7 +9,6 @@ from datetime import datetime
 
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
-from monitor.reporting.symbols import describe
 from monitor.workflow.fleet import ATTENTION, FleetTableRow
 
 
@@ -55,26 +54,6 @@ URGENCIES = dict(
         strict=True,
     )
 )
-
-
-def plain_name(symbol: str) -> str:
-    """Return what a parameter is in plain words: EC0Y is "squareness X-Y" where two linear axes stand so.
-
-    The rotation of a linear axis about the normal of the plane of two others is their squareness (ISO 230-1, 3.6.4).
-    """
-    planes = {
-        ("C", "Y"): "X-Y",
-        ("C", "X"): "X-Y",
-        ("B", "Z"): "X-Z",
-        ("B", "X"): "X-Z",
-        ("A", "Z"): "Y-Z",
-        ("A", "Y"): "Y-Z",
-    }
-    if len(symbol) == 4 and symbol[0] == "E" and symbol[2] == "0":
-        plane = planes.get((symbol[1], symbol[3]))
-        if plane is not None:
-            return f"squareness {plane}"
-    return describe(symbol)
 
 
 def number(value: float | None, digits: int = 3) -> str:

@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from monitor.web.access import FILES, NOT_OFFERED, offered, path_fields, taken_fields
@@ -191,6 +192,42 @@ def test_no_field_of_a_question_names_a_file_of_the_server() -> None:
     for question in offered():
         kind = QUESTIONS[question].request
         assert not path_fields(kind) & set(taken_fields(question))
+
+
+def test_the_residuals_have_the_root_mean_square_that_compare_and_explain_state(local: Any) -> None:
+    campaign = "hidden-spindle-growth"
+    _, residuals = local.ask("residuals", {"campaign": campaign, "effect": "EZC1:const@warmup"})
+    _, compared = local.ask("compare", {"campaign": campaign})
+    weighed = ~np.array(residuals["left_out"])
+    rms = [
+        np.sqrt(np.mean(np.square(np.array(residuals[key])[weighed])))
+        for key in ("residual_um", "with_effect_um")
+    ]
+    assert rms[0] == pytest.approx(compared["rms_um"], rel=1e-5)
+    assert rms[1] == pytest.approx(0.899, abs=5e-4)  # README: 1.01 -> 0.90 µm
+    rows = local.db.rows(
+        "SELECT DISTINCT run, sequence FROM v_probings WHERE campaign = ? ORDER BY ALL", [campaign]
+    )
+    assert sorted(zip(residuals["run"], residuals["sequence"], strict=True)) == rows
+
+
+def test_the_values_are_those_of_the_view_that_people_query(local: Any) -> None:
+    assert local.ask("identify", {"campaign": "hidden-spindle-growth"})[0] == 200
+    _, values = local.ask("values", {"machine": "HU40-T", "parameter": "EB0C"})
+    query = (
+        "SELECT run, value, u FROM v_parameters WHERE campaign = 'hidden-spindle-growth' AND model = 'samba' "
+        "AND parameter = 'EB0C' ORDER BY run"
+    )
+    expected = [row for row in local.db.rows(query) if row[1] is not None]
+    rows = [row for row, name in enumerate(values["campaign"]) if name == "hidden-spindle-growth"]
+    series = values["parameters"]["EB0C"]
+    shown = [(values["run"][row], series["values"][row], series["u"][row]) for row in rows]
+    assert [row[0] for row in shown] == [row[0] for row in expected]
+    assert np.array(shown) == pytest.approx(np.array(expected), rel=1e-12)
+    _, later = local.ask("values", {"machine": "HU40-T", "since": values["started_at"][3]})
+    assert later["started_at"] == values["started_at"][3:]
+    _, earlier = local.ask("values", {"machine": "HU40-T", "until": values["started_at"][3]})
+    assert earlier["started_at"] == values["started_at"][:3]
 
 
 def zipped(folder: Path, replaced: dict[str, bytes] | None = None) -> bytes:

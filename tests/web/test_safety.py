@@ -185,6 +185,11 @@ def test_every_write_is_in_the_audit_with_the_user(guarded: Any) -> None:
     assert "engineer-1" in actors
 
 
+def test_read_only_makes_everybody_a_viewer(tmp_path: Path) -> None:
+    token = add_user(tmp_path / "users.toml", "ada", "approver")
+    assert read_users(tmp_path / "users.toml").looking_only().of_token(token) == User("ada", Role.VIEWER)
+
+
 def test_log_in_and_out(guarded: Any) -> None:
     answer = guarded.client.post("/login", data={"token": guarded.tokens["viewer"], "then": "//evil.example"})
     assert answer.status_code == 303
