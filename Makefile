@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: challenge concurrency kills real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
+.PHONY: challenge concurrency kills pages real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -40,6 +40,10 @@ bench: setup  ## how long things take (tests/benchmarks)
 
 real-data: setup  ## docs/real-data.md and its pictures, from the measured series of NIST
 	@OMP_NUM_THREADS=1 $(RUN) tests/curves/real_data.py $(ARGS)
+
+pages: setup  ## the pages in a real browser; pictures of every page in pages-output/
+	@sh tests/setup/browser.sh
+	@$(PYTEST) -n 0 tests/browser $(ARGS)
 
 trials: setup  ## slow trials over many seeds, an hour; their last results are in docs/trials-*.md
 	@$(PYTEST) $(PARALLEL) --all-seeds --timeout 3600
@@ -81,7 +85,7 @@ wheel-parts: setup
 	@$(RUN) tests/setup/installed_wheel.py tests/cli tests/readers tests/store tests/reporting tests/test_wheel.py $(PARALLEL) $(ARGS)
 
 clean:  ## remove what the others left, except the virtual environment
-	@rm -rf demo-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
+	@rm -rf demo-output pages-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
 	@find monitor migrations reports tests examples -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean  ## remove the virtual environment too

@@ -38,6 +38,7 @@ VERBS = {
     "report": "weekly health report of the fleet, HTML and PDF",
     "certificate": "calibration certificates: issue, show, verify, amend, withdraw, template",
     "event": "record what happened to a machine (crash, repair, compensation)",
+    "serve": "pages in a browser and the HTTP interface",
     "verify": "whether the database is as it was written",
     "audit": "who changed what and when",
     "backup": "a second file with everything, checked",
@@ -49,7 +50,7 @@ VERBS = {
 }
 DEFAULT_DATABASE = "monitor.duckdb"
 #: Verbs that make a database where there is none, or need none; for all others a missing file is a mistyped name.
-WITHOUT_DATABASE = ("demo", "import", "restore", "effects", "simulate", "config", "completion")
+WITHOUT_DATABASE = ("demo", "import", "restore", "effects", "serve", "simulate", "config", "completion")
 
 SUBVERBS_WITHOUT_DATABASE = ("template",)
 

@@ -11,6 +11,7 @@ is therefore computed with ``threads=1`` (or in numpy, in a fixed order).
 from __future__ import annotations
 
 import contextlib
+import copy
 import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,6 +56,7 @@ class Database:
         self.actor = actor
         self._threads = threads
         self._lock = threading.RLock()
+        self._one_writes = threading.RLock()  # of the sessions
         self._in_transaction = False
         check_database_name(self.path)
         self._available = migrations.available()
@@ -111,6 +113,31 @@ class Database:
         """Show the database of one moment in this block: nobody writes meanwhile."""
         with self._lock:
             yield
+
+    def session(self, actor: str) -> Database:
+        """Return a second view of the open file for another user; sessions read at the same time, and write in turn.
+
+        Close it when it is no longer needed; the file stays open until this database is closed.
+        """
+        session = copy.copy(self)
+        session.actor = actor
+        session._lock = threading.RLock()
+        session._in_transaction = False
+        with self._used() as connection:
+            session._connection = connection.cursor()
+        return session
+
+    def confine(self, folder: Path) -> None:
+        """Let queries of this file and its sessions read and write no other files than those below ``folder``.
+
+        DuckDB's SQL reads any file that the process may read; what is asked over a network must not. It holds until
+        the file is closed.
+        """
+        literal = str(folder.resolve()).replace("'", "''")
+        with self._used() as connection:
+            connection.execute(f"SET allowed_directories = ['{literal}']")
+            connection.execute("SET enable_external_access = false")
+            connection.execute("SET lock_configuration = true")
 
     def execute(self, sql: str, parameters: Parameters = ()) -> None:
         """Run a statement. Values are always bound, never written into the text."""
@@ -182,7 +209,8 @@ class Database:
 
         A transaction inside another joins it.
         """
-        with self._lock:
+        # In this order always: a thread that waits for its turn to write holds nothing that the writer needs.
+        with self._one_writes, self._lock:
             if self.read_only:
                 raise StoreError(f"{self.path} was opened for reading only; nothing can be changed")
             if self._in_transaction:

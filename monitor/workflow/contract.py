@@ -1,6 +1,6 @@
 """The contract of the product: every question that can be asked, as a function of a typed request with a typed answer.
 
-The faces (the command line today; a Python interface, HTTP and pages to come) ask nothing else. A question is named by
+The faces (the command line, Python, HTTP and pages) ask nothing else. A question is named by
 the place of its function and loaded when it is asked, so that to list the contract loads neither solver nor engine; its
 types are the annotations of the function.
 """
@@ -81,6 +81,7 @@ QUESTIONS = {
         "remake certificate": "certificate.remaking:remake",
         "remove effect": "model.change:remove_effect",
         "report": "health.report:report",
+        "residuals": "explain.residual_vectors:residual_vectors",
         "restore": "keeping:restore_backup",
         "runs": "intake.campaigns:runs",
         "select": "selections.select:select",
@@ -95,6 +96,7 @@ QUESTIONS = {
         "trend": "trend.trends:trend",
         "uncertainty": "uncertainty.evaluation:uncertainty",
         "use model": "model.use:use_model",
+        "values": "history.values:values_of_machine",
         "verify": "keeping:verify",
         "verify certificate": "certificate.verification:verify_file",
         "withdraw campaign": "intake.withdrawals:withdraw",
