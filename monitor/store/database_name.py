@@ -55,7 +55,10 @@ def check_database_name(path: str) -> None:
 
 
 def _first_bytes(path: str) -> bytes:
+    """The first bytes of a file; none of a pipe or device, which would be waited for."""
     try:
+        if not Path(path).is_file():
+            return b""
         with Path(path).open("rb") as stream:
             return stream.read(len(_SQLITE))
     except (OSError, ValueError):
