@@ -116,6 +116,7 @@ def _broken_by_an_earlier_version(path: Path, folder: Path, environment: dict[st
         connection.execute("DROP TABLE campaign_runs")
         connection.execute("DROP VIEW v_machine_models")
         connection.execute("DROP TABLE machine_model")
+        connection.execute("DROP TABLE parameter_frame")
         for name, table, column in (
             ("run_of_campaign", "run", "campaign_id"),
             ("identification_of_campaign", "identification", "campaign_id"),

@@ -43,7 +43,12 @@ def design(t, channels):
 def test_coefficients_of_independent_runs_are_those_of_statsmodels_ols():
     y, t, _, channels, _ = history(1, 40, 1, 0.0)
     ours = dependence(
-        y, t, channels, unit=MICROMETRE.per(METRE), channel_units=dict.fromkeys(channels, DEGREE_CELSIUS)
+        y,
+        t,
+        channels,
+        unit=MICROMETRE.per(METRE),
+        channel_units=dict.fromkeys(channels, DEGREE_CELSIUS),
+        independent=True,
     )
     theirs = sm.OLS(y, design(t, channels)).fit()
     found = [ours.drift, *ours.coefficients]
@@ -57,7 +62,7 @@ def test_coefficients_of_independent_runs_are_those_of_statsmodels_ols():
 
 def test_coefficients_of_weighted_runs_are_those_of_statsmodels_wls():
     y, t, _, channels, u = history(2, 40, 1, 1.0)
-    ours = dependence(y, t, channels, u=u)
+    ours = dependence(y, t, channels, u=u, independent=True)
     theirs = sm.WLS(y, design(t, channels), weights=1.0 / (u**2 + ours.between**2)).fit()
     found = [ours.drift, *ours.coefficients]
     # The component between the runs is that with which the weighted squares are as large as they should be.
@@ -69,7 +74,7 @@ def test_coefficients_of_weighted_runs_are_those_of_statsmodels_wls():
 
 def test_coefficients_with_a_day_component_are_those_of_statsmodels_gls_and_its_mixed_model():
     y, t, day, channels, u = history(3, 30, 4, 1.5)
-    ours = dependence(y, t, channels, u=u, days=day)
+    ours = dependence(y, t, channels, u=u, days=day, independent=True)
     same = np.equal.outer(day, day)
     theirs = sm.GLS(y, design(t, channels), np.diag((ours.within * u) ** 2) + ours.between**2 * same).fit()
     found = [ours.drift, *ours.coefficients]

@@ -16,6 +16,7 @@ from monitor.workflow.explain.compare_answer import CompareAnswer
 from monitor.workflow.explain.curve_answer import curve_comparison
 from monitor.workflow.explain.machine_answer import machine_comparison
 from monitor.workflow.explain.request import CompareRequest
+from monitor.workflow.figure_files import make_folder
 from monitor.workflow.identify.fitting import fitted
 from monitor.workflow.models import label
 
@@ -28,6 +29,8 @@ def compare(db: Database, request: CompareRequest) -> CompareAnswer:
 
     Raises NotFoundError, DataError where the readings do not suffice, InputError for a folder that cannot be made.
     """
+    if request.figures is not None:
+        make_folder(request.figures)  # a folder that cannot be made leaves no result behind
     fit = fitted(db, request.campaign, request.model)
     model = label(fit.model)
     answer, draw = (

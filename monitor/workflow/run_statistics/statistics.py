@@ -22,6 +22,7 @@ from monitor.store import (
     save_analysis,
 )
 from monitor.units import Unit
+from monitor.workflow.figure_files import make_folder
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import machine_campaign
@@ -170,6 +171,8 @@ def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
         raise DataError(
             f"statistics need at least two runs, but {len(runs)} of campaign {campaign.name} are chosen"
         )
+    if request.figures is not None:
+        make_folder(request.figures)  # a folder that cannot be made leaves no result behind
     identification = _identified(db, campaign, request.model)
     names, units, values = _matrix(identification, runs)
     pooled, tests = pooled_by_group(values, groups, names)
