@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import ModuleType
 
@@ -59,10 +61,41 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = filter(is_run, items)
 
 
+def pytest_collection_finish() -> None:
+    """Look for rubbish rarely: after every 700 new objects, as Python does it, that was a third of the processor time.
+
+    What the modules of the tests hold lives until the end, so it is not searched at all.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(100_000, 20, 20)
+
+
 @pytest.fixture(scope="session")
 def seeds(pytestconfig: pytest.Config) -> Callable[[int, int], range]:
     """``seeds(600, 60)``: numbers for a rate over 600 in ``make trials``, over the first 60 in ``make test``."""
     return lambda count, sample: range(count if pytestconfig.getoption("--all-seeds") else sample)
+
+
+@pytest.fixture(scope="session")
+def pdf_unread() -> Callable[[], AbstractContextManager[None]]:
+    """``with pdf_unread():`` around certificates and reports of which nobody reads the PDF.
+
+    Layout takes a second of processor time each. The template is filled in as ever, with all its refusals, and the page
+    as HTML stands where the PDF would. Reports of several machines may lay out theirs in other processes.
+    """
+
+    def page(html: str, **_: object) -> bytes:
+        return html.encode()
+
+    @contextmanager
+    def unread() -> Iterator[None]:
+        with pytest.MonkeyPatch.context() as patch:
+            for room in ("pdf", "health"):
+                patch.setattr(f"monitor.reporting.{room}.render.pdf_of", page)
+            yield
+
+    return unread
 
 
 @pytest.fixture(scope="session")
