@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
+.PHONY: challenge concurrency kills pages real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -41,12 +41,19 @@ bench: setup  ## how long things take (tests/benchmarks)
 real-data: setup  ## docs/real-data.md and its pictures, from the measured series of NIST
 	@OMP_NUM_THREADS=1 $(RUN) tests/curves/real_data.py $(ARGS)
 
+pages: setup  ## the pages in a real browser; pictures of every page in pages-output/
+	@sh tests/setup/browser.sh
+	@$(PYTEST) -n 0 tests/browser $(ARGS)
+
 trials: setup  ## slow trials over many seeds, an hour; their last results are in docs/trials-*.md
 	@$(PYTEST) $(PARALLEL) --all-seeds --timeout 3600
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_unknown.py --seeds 3 --empties 60
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_empty.py --seeds 300 --seconds 1200
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_statistics.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_days.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_weekly.py
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_ties.py 20
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_dependence.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_robots.py --seeds 10
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_mounts.py --seeds 30
@@ -54,6 +61,21 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_regions.py --replicates 80
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_outliers.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_curve.py --seeds 40
+
+concurrency: setup  ## eight importers and twenty readers at one database for ten minutes (docs/reliability.md)
+	@OMP_NUM_THREADS=1 $(RUN) tests/soak/concurrency.py $(ARGS)
+
+kills: setup  ## twelve verbs killed 500 times at random moments (docs/reliability.md)
+	@OMP_NUM_THREADS=1 $(RUN) tests/soak/kills.py $(ARGS)
+
+# CAMPAIGNS=40 writes and answers fewer of them, DIR=... elsewhere.
+CAMPAIGNS ?= 1000
+DIR ?= demo-output/challenge
+challenge: setup  ## campaigns with sealed truth, answered by ours and four others (docs/challenge.md); hours for 1000
+	@$(RUN) -m pip install --quiet --constraint constraints.txt 'scikit-learn>=1.5' 'knockpy>=1.3'
+	@$(RUN) tests/challenge/generate.py $(DIR) --campaigns $(CAMPAIGNS)
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(RUN) tests/challenge/answer.py $(DIR) $(ARGS)
+	@$(RUN) tests/challenge/score.py $(DIR)
 
 wheel: setup  ## build the wheel and run the tests against it, away from the checkout
 	@$(RUN) tests/setup/installed_wheel.py $(PARALLEL) $(ARGS)
@@ -63,7 +85,7 @@ wheel-parts: setup
 	@$(RUN) tests/setup/installed_wheel.py tests/cli tests/readers tests/store tests/reporting tests/test_wheel.py $(PARALLEL) $(ARGS)
 
 clean:  ## remove what the others left, except the virtual environment
-	@rm -rf demo-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
+	@rm -rf demo-output pages-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
 	@find monitor migrations reports tests examples -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean  ## remove the virtual environment too

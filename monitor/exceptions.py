@@ -2,8 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """Return a hint ("did you mean 'x_mm'? ") where a name that exists is close, else nothing; case does not count."""
+    # Loaded here, on the way to a refusal: every start of the command waits for this file.
+    import difflib
+
+    by_folded = {candidate.casefold(): candidate for candidate in names}
+    close = difflib.get_close_matches(name[:100].casefold(), list(by_folded), n=1, cutoff=0.7)
+    return f"did you mean '{by_folded[close[0]]}'? " if close else ""
 
 
 class MonitorError(Exception):
@@ -34,6 +45,18 @@ class StoreError(InputError):
     """A database that cannot be opened, is newer than the software, or was altered."""
 
 
+class TakenNumberError(InputError):
+    """The number of a certificate that another one has by now."""
+
+
+class UnfinishedLogError(StoreError):
+    """A log beside the database that only somebody who may write can bring into it."""
+
+
+class BusyError(StoreError):
+    """The database is in use by another process, for longer than one would wait."""
+
+
 @dataclass(frozen=True)
 class Fault:
     """One fault of an input file.
@@ -60,8 +83,9 @@ class CampaignError(InputError):
     """A campaign folder that was refused as a whole; ``faults`` holds everything that is wrong with it."""
 
     SHOWN_IN_FULL = 20
-    #: More faults with the same message in one column are listed once, with their number.
+    #: More faults of a column whose messages differ in quoted texts and numbers alone are listed once, with how many.
     ALIKE_IN_FULL = 5
+    _OWN_WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[-+]?[0-9][0-9.,]*")
 
     def __init__(self, folder: str, faults: Sequence[Fault]) -> None:
         self.folder = folder
@@ -70,7 +94,8 @@ class CampaignError(InputError):
         lines = [f"{folder} was refused, nothing of it was kept: {count} fault{'s' if count != 1 else ''}."]
         alike: dict[tuple[str, str | None, str], list[Fault]] = {}
         for fault in self.faults:
-            alike.setdefault((fault.file, fault.column, fault.message), []).append(fault)
+            kind = self._OWN_WORDS.sub("", fault.message)
+            alike.setdefault((fault.file, fault.column, kind), []).append(fault)
         groups: list[list[Fault]] = []
         for group in alike.values():
             groups += [group] if len(group) > self.ALIKE_IN_FULL else [[fault] for fault in group]

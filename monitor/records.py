@@ -7,6 +7,7 @@ unit that their name ends in (``ambient_degC``, ``warm_up_min``).
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -74,6 +75,26 @@ def topology_of(axes: Sequence[ChainAxis]) -> str:
         f"({axis.name})" if axis.kind == "spindle" else axis.name for axis in axes if axis.branch == "tool"
     ]
     return " ".join(["w", *reversed(work), "b", *tool, "t"])
+
+
+#: ISO 10791-6 puts H or V (the spindle is horizontal or vertical) and brackets around the structural code, a prime
+#: behind axes on the work side, and S for the spindle.
+_STRUCTURAL_CODE = re.compile(r"\s*(?P<spindle>[HV])?\s*\[(?P<chain>[^\[\]]*)\]\s*")
+_SPINDLE = re.compile(r"\(?S\d*\)?(?=\s*t)")
+
+
+def plain_topology(text: str) -> tuple[str, Vector | None]:
+    """A topology in the letters of ISO 10791-1, and the direction of gravity where the spelling states it.
+
+    ``V [w C A Y X b Z S t]`` (ISO 10791-6) is ``w C A Y X b Z (C1) t`` with gravity along -Z; of a horizontal
+    spindle (H) gravity is along -Y: ISO 841 gives Z to the spindle and Y to the vertical direction then.
+    """
+    code = _STRUCTURAL_CODE.fullmatch(text)
+    chain = re.sub("(?<=[A-Z0-9])['′’]", "", text if code is None else code["chain"])
+    names = re.findall(r"C\d*", chain)
+    spindle = next(name for name in ("C1", "C2", "C3", "C4", "C5", "C6", "C7") if name not in names)
+    down = {"V": (0.0, 0.0, -1.0), "H": (0.0, -1.0, 0.0)}.get((code["spindle"] or "") if code else "")
+    return _SPINDLE.sub(f"({spindle})", chain), down
 
 
 @dataclass(frozen=True)

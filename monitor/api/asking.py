@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from monitor.api.answer import Answer
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, did_you_mean
 from monitor.store import Database
 from monitor.workflow.contract import QUESTIONS
 
@@ -24,6 +23,7 @@ class Ask:
         asked = QUESTIONS[question]
         request = asked.request
         arguments = [] if request is None else [_request(request, values)]
+        self.db.forget_campaigns()
         return asked.load()(*([self.db] if asked.needs_database else []), *arguments)
 
 
@@ -31,9 +31,9 @@ def _request(kind: Any, values: dict[str, Any]) -> Any:
     names = [field.name for field in fields(kind) if field.init]
     for name in values:
         if name not in names:
-            near = difflib.get_close_matches(name, names, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
-            raise InputError(f"there is no option '{name}': {hint}")
+            raise InputError(
+                f"there is no option '{name}'; {did_you_mean(name, names)}there are {', '.join(names)}"
+            )
     return kind(**values)
 
 

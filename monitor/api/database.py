@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import getpass
 from collections.abc import Sequence
 from contextlib import suppress
@@ -15,7 +14,7 @@ from monitor.api.answer import Answer
 from monitor.api.asking import Ask, drawn
 from monitor.api.campaign import Campaign
 from monitor.api.tables import main_table, table_of
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError, NotFoundError, did_you_mean
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,13 +28,15 @@ if TYPE_CHECKING:
 
 
 class Database:
-    """An open database; close it, or use it in a ``with`` statement: other processes wait meanwhile."""
+    """An open database, which holds its file only while it reads or writes. Close it, or use a ``with`` statement."""
 
-    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+    def __init__(self, path: Path, *, read_only: bool = False, wait_s: float = 300.0) -> None:
         actor = ""
         with suppress(OSError, KeyError):  # a container may run under a number that has no name
             actor = getpass.getuser()
-        self._store = store.Database(path, read_only=read_only, threads=1, actor=actor)
+        self._store = store.SharedDatabase(
+            path, read_only=read_only, threads=1, actor=actor, patience=store.Patience(wait_s)
+        )
         self._ask = Ask(self._store)
         self.path = Path(path)
 
@@ -52,10 +53,19 @@ class Database:
         self._store.close()
 
     def add(self, *folders: str | Path) -> Answer[ImportAnswer]:
-        """Import campaign folders, all or nothing each. Raises CampaignError with every fault of a folder."""
+        """Import campaign folders, all or nothing each.
+
+        Raises CampaignError with every fault of a folder; of several InputError with all that were refused, once the
+        others are imported.
+        """
         if not folders:
             raise InputError("name a campaign folder or more")
-        return Answer(self._ask("import", folders=[Path(folder) for folder in folders]))
+        answer = self._ask("import", folders=[Path(folder) for folder in folders])
+        if answer.refused:
+            whys = "\n".join(refused.why for refused in answer.refused)
+            imported = ", ".join(folder.campaign for folder in answer.imported) or "none"
+            raise InputError(f"{whys}\nImported or unchanged: {imported}")
+        return Answer(answer)
 
     def machines(self) -> pd.DataFrame:
         """Return the machines: topology, manufacturer, number of campaigns, latest run."""
@@ -102,7 +112,8 @@ class Database:
         from monitor.workflow.contract import QUESTIONS
 
         if question not in QUESTIONS:
-            raise InputError(f"there is no question '{question}'; there are {', '.join(QUESTIONS)}")
+            hint = did_you_mean(question, QUESTIONS)
+            raise InputError(f"there is no question '{question}'; {hint}there are {', '.join(QUESTIONS)}")
         return Answer(self._ask(question, **options))
 
     def __repr__(self) -> str:
@@ -114,22 +125,20 @@ class Database:
 
 
 def _no_campaign(name: str, names: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name, names, n=1)
-    if near:
-        return f"there is no campaign '{name}'; did you mean '{near[0]}'?"
     listed = ", ".join(names) if names else "none yet: add(FOLDER) imports one"
-    return f"there is no campaign '{name}'; there are {listed}"
+    return f"there is no campaign '{name}'; {did_you_mean(name, names)}there are {listed}"
 
 
-def open(path: str | Path, *, new: bool = False, read_only: bool = False) -> Database:
-    """Open a database file; ``new`` makes one where there is none.
+def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s: float = 300.0) -> Database:
+    """Open a database file; ``new`` makes one where there is none; another process that has it is waited for.
 
-    Raises NotFoundError for a file that is not there, StoreError for one that is no database or is in use.
+    Raises NotFoundError for a file that is not there, StoreError for one that is no database or is in use for longer
+    than ``wait_s``.
     """
     path = Path(path)
     if not new and not path.exists():
         raise NotFoundError(f"there is no database {path}; open('{path}', new=True) makes one")
-    return Database(path, read_only=read_only)
+    return Database(path, read_only=read_only, wait_s=wait_s)
 
 
 def simulate(out: str | Path, **options: Any) -> Answer[SimulateAnswer]:

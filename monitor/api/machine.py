@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from monitor.records import Array
+from monitor.records import Array, plain_topology
 from monitor.workflow.kinematics import PosesAnswer, PosesRequest, poses
 
 Point = tuple[float, float, float]
@@ -81,5 +82,5 @@ class Machine:
 
 def _first_axis(topology: str) -> str:
     """Return the first axis of a topology as typed, for a pose at zero."""
-    names = [part.strip("()") for part in topology.replace("[", " ").replace("]", " ").split()]
-    return next((name for name in names if name[:1].isupper() and name not in ("V",)), "X")
+    names = re.findall(r"[A-Z]\d*", plain_topology(topology)[0])
+    return names[0] if names else "X"

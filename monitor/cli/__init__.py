@@ -9,7 +9,7 @@ import contextlib
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from monitor.cli.parser import parse
 from monitor.exceptions import InputError, MonitorError
@@ -45,10 +45,26 @@ def _run(typed: Sequence[str]) -> int:
         if not text.isprintable() and any("\ud800" <= sign <= "\udfff" for sign in text):
             raise InputError(f"{text!a} is not UTF-8 text; rename it, or type it in UTF-8")
     options = parse(typed)
-    status = int(options.run(options))
+    if options.quiet and options.json:
+        raise InputError("--quiet says nothing and --json says all: choose one")
+    with _muted() if options.quiet else contextlib.nullcontext():
+        status = int(options.run(options))
     # What is still in the buffer is written now, where a reader who went away is no fault.
     sys.stdout.flush()
     return status
+
+
+@contextlib.contextmanager
+def _muted() -> Iterator[None]:
+    """Discard what the block would print, and show no progress."""
+    from monitor.cli import output
+
+    with (
+        open(os.devnull, "w", encoding="utf-8") as nowhere,
+        contextlib.redirect_stdout(nowhere),
+        output.without_progress(),
+    ):
+        yield
 
 
 def _unexpected(error: Exception) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import sys
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,12 +14,37 @@ if TYPE_CHECKING:
     from monitor.store import Database
 
 
-def opened(options: Namespace, *, threads: int | None = None) -> Database:
-    """The open database; the audit says who changed it. Raises StoreError."""
-    # Loaded here: `monitor --help` answers without a database engine.
-    from monitor.store import Database
+#: How long a verb waits for another process that has the database, in s; ``--wait`` says otherwise.
+PATIENCE_S = 300.0
 
-    return Database(options.db, threads=threads, actor=_user())
+
+def opened(options: Namespace, *, threads: int | None = None) -> Database:
+    """The open database, held only while it is read or written; the audit says who changed it. Raises StoreError."""
+    # Loaded here: `monitor --help` answers without a database engine.
+    from monitor.store import Holder, Patience, SharedDatabase
+
+    def report(holder: Holder, seconds: float) -> None:
+        print(
+            f"monitor: {options.db} is in use by {holder}; waiting up to {seconds:.0f} s more",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    patience = Patience(options.wait, report)
+    return SharedDatabase(options.db, threads=threads, actor=_user(), patience=patience)
+
+
+def seconds_to_wait(text: str) -> float:
+    """Read the value of ``--wait``. Raises InputError where it is no number of seconds."""
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = -1.0
+    if not 0 <= seconds <= 86400:
+        raise InputError(
+            f"--wait {text}: how many seconds to wait for the database, a number from 0 to 86400"
+        )
+    return seconds
 
 
 def check_path(path: str, *, may_be_new: bool) -> None:
@@ -28,6 +54,11 @@ def check_path(path: str, *, may_be_new: bool) -> None:
     """
     if not path.strip() or path.startswith(":memory:"):
         raise InputError(f"--db '{path}' names no file; name one, for example --db monitor.duckdb")
+    if not may_be_new and not Path(path).exists():
+        # Loaded here, on the way to a refusal: `monitor --help` answers without a database engine.
+        from monitor.store import check_database_name
+
+        check_database_name(path)
     if not may_be_new and Path(path).parent.is_dir() and not Path(path).exists():
         raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
 

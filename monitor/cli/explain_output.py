@@ -14,6 +14,7 @@ from monitor.workflow.explain.explain_answer import (
     MachineExplanation,
     MachineMissing,
 )
+from monitor.workflow.explain.ties import Tie, TieBreak
 
 #: So many blind spots are named.
 NAMED_BLIND_SPOTS = 6
@@ -97,6 +98,24 @@ def _advice(effect: MachineMissing | CurveMissing, data: str) -> None:
                 for pose in effect.tell_apart_by
             )
             output.say(f"   to tell them apart, probe also at {poses}")
+        if isinstance(effect, MachineMissing):
+            for tie in effect.ties:
+                if tie.broken_by is not TieBreak.POSES:
+                    output.say(f"   {_tie(effect.effect, tie)}")
+
+
+def _tie(effect: str, tie: Tie) -> str:
+    """What to do about rivals that the poses above do not rule out."""
+    rivals, drivers = ", ".join(tie.rivals), " and ".join(tie.drivers)
+    if tie.broken_by is TieBreak.DRIVERS and len(tie.drivers) == 2:
+        return f"to tell {rivals} apart, measure runs in which {drivers} do not go together, and record both"
+    if tie.broken_by is TieBreak.DRIVERS:
+        return f"to tell {rivals} apart, measure runs at several values of {drivers}, and record it"
+    if tie.broken_by is TieBreak.INDEXATIONS:
+        return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"
+    if tie.broken_by is TieBreak.PLAN:
+        return f'to tell {rivals} apart: monitor plan CAMPAIGN --separate "{effect},{tie.rivals[0]}"'
+    return f"no touch of these targets tells {rivals} apart: they move the tip alike, and one correction serves both"
 
 
 def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> None:
@@ -114,10 +133,23 @@ def _machine_effect(effect: MachineMissing, explanation: MachineExplanation) -> 
     if effect.reversal_value is not None:
         output.say(f"   {reversal_words(effect.reversal_value)}")
     searched = effect.searched
-    if searched is not None:
+    if searched is not None and searched.u is None:
+        limit = (
+            "" if searched.at_least is None else f": only that it is longer than {searched.at_least:.2g} min"
+        )
+        output.say(f"   {searched.what} not determined by these data{limit}")
+    elif searched is not None:
         u = "" if searched.u is None else f" ± {output.two_digits(searched.u)}"
         unit = "" if searched.unit == "1" else f" {searched.unit}"
         output.say(f"   {searched.what} {output.rounded(searched.value, searched.u)}{u}{unit}")
+    if effect.travelled_periods is not None:
+        output.say(
+            f"   the axis turned {effect.travelled_periods:.2f} of its period: over a part of a turn an offset, a "
+            "tilt or flexure looks alike"
+        )
+    if effect.within_its_shape:
+        symbol = effect.effect.partition(":")[0]
+        output.say(f"   not separable from the shape of {symbol}: {', '.join(effect.within_its_shape)}")
     um = output.micrometres
     poses = ""
     if effect.heldout_poses_after_um is not None:

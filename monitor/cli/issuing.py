@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from datetime import date
 from pathlib import Path
 from typing import Any
 
+from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.cli.behind import add_behind, further_sources
+from monitor.cli.configuration import configuration
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
@@ -22,7 +25,10 @@ PIN = "MONITOR_TOKEN_PIN"
 def add_issuing(parser: ArgumentParser) -> None:
     """The options of a certificate that is to be issued."""
     parser.add_argument(
-        "--laboratory", type=Path, required=True, metavar="FILE", help="what the laboratory states"
+        "--laboratory",
+        type=Path,
+        metavar="FILE",
+        help="what the laboratory states (else that of the configuration)",
     )
     parser.add_argument(
         "--as-left", type=int, metavar="N",
@@ -121,7 +127,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
 
         axes = read_linear_axes(options.linear_axes)
     return {
-        "laboratory": options.laboratory,
+        "laboratory": _laboratory(options.laboratory),
         "as_left": options.as_left,
         "out": options.out,
         "number": options.number,
@@ -138,6 +144,15 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "key": _key(options),
         "accept": dict(options.accept),
     }
+
+
+def _laboratory(typed: Path | None) -> Path:
+    stated = typed or configuration().laboratory
+    if stated is None:
+        raise InputError(
+            "--laboratory FILE says what the laboratory states; `monitor certificate template` writes one to fill in"
+        )
+    return stated
 
 
 def _process(texts: list[str]) -> dict[str, float]:
@@ -178,10 +193,20 @@ def _key(options: Namespace) -> Key | None:
     )
 
 
+def _warn_of_readers(file: Path) -> None:
+    """Say where others than its owner may read a secret."""
+    if os.stat(file).st_mode & 0o077:
+        print(
+            f"monitor: {file} holds a secret and may be read by others than its owner; `chmod 600` keeps them out",
+            file=sys.stderr,
+        )
+
+
 def _passphrase(file: Path | None) -> str | None:
     if file is None:
         return None
     try:
-        return (file.read_text(encoding="utf-8").splitlines() or [""])[0]
+        _warn_of_readers(file)
+        return (read_bounded(file, LARGEST_SETTINGS).decode("utf-8").splitlines() or [""])[0]
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"the passphrase file {file} cannot be read: {error}") from error

@@ -11,6 +11,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import is_dataclass
 from typing import Any
 
@@ -25,6 +26,7 @@ from rich.progress import (
     SpinnerColumn,
     TextColumn,
     TimeElapsedColumn,
+    TimeRemainingColumn,
 )
 from rich.table import Table
 from rich.text import Text
@@ -35,6 +37,8 @@ from monitor.documents import to_document
 PIPE_WIDTH = 10_000
 # Words longer than this may be broken over lines in a narrow window; numbers and names never are.
 LONGEST_UNBROKEN = 24
+#: With these begins what a spreadsheet runs (OWASP, CSV injection).
+_FORMULA_STARTS = "=+-@\t\r"
 _MOMENT = re.compile(r"(\d{4}-\d\d-\d\d)T(\d\d:\d\d:\d\d)(?:\.\d+)?(Z?)")
 
 
@@ -50,6 +54,11 @@ def _plain(answer: object) -> Any:
     if isinstance(answer, (list, tuple)):
         return [_plain(element) for element in answer]
     return to_document(answer) if is_dataclass(answer) else answer
+
+
+def csv_cell(cell: object) -> object:
+    """Return a cell as CSV has it: a text that a spreadsheet would run as a formula begins with an apostrophe."""
+    return "'" + cell if isinstance(cell, str) and cell[:1] in _FORMULA_STARTS and cell else cell
 
 
 def say(text: str = "") -> None:
@@ -155,10 +164,27 @@ def listing(records: Sequence[object], empty: str, columns: Sequence[str] | None
     table("", names, [[flat(row[name]) for name in names] for row in rows], text_columns=len(names))
 
 
+_QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
+
+
+@contextmanager
+def without_progress() -> Iterator[None]:
+    """Show no progress within the block, whatever the terminal."""
+    token = _QUIET.set(True)
+    try:
+        yield
+    finally:
+        _QUIET.reset(token)
+
+
+def _shows_progress() -> bool:
+    return sys.stderr.isatty() and not _QUIET.get()
+
+
 @contextmanager
 def working(activity: str) -> Iterator[None]:
     """Show a sign of life on a terminal for what takes longer than a second; nothing elsewhere."""
-    if not sys.stderr.isatty():
+    if not _shows_progress():
         yield
         return
     with Progress(
@@ -172,12 +198,12 @@ def working(activity: str) -> Iterator[None]:
 @contextmanager
 def stepping(activity: str, total: int) -> Iterator[Callable[[str], None]]:
     """Show a bar on a terminal for work of ``total`` pieces; call what it yields with a piece's name before each."""
-    if not sys.stderr.isatty():
+    if not _shows_progress():
         yield lambda name: None
         return
     started = itertools.count()
     with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=Console(stderr=True), transient=True,
     ) as progress:  # fmt: skip
         task = progress.add_task(activity, total=total)

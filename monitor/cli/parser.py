@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from monitor import __version__
-from monitor.cli.database import check_path
+from monitor.cli.database import PATIENCE_S, check_path, seconds_to_wait
+from monitor.exceptions import did_you_mean
 
 #: Verb: what it does in a few words. The file of the same name in ``monitor.cli.verbs`` has the rest.
 VERBS = {
@@ -27,32 +29,46 @@ VERBS = {
     "uncertainty": "results after JCGM 102, stored",
     "compare": "model against measurement: where it fails",
     "explain": "which physical effect is missing",
+    "predict": "what a fitted model says of rows that took no part in its fit",
     "model": "models and their versions: list, show, add, remove, history",
     "effects": "the catalogue of effects, searchable",
     "map": "volumetric error over the stroke with its uncertainty; compensation tables",
     "plan": "expected uncertainties, blind spots, best next poses",
     "simulate": "a virtual campaign folder, to rehearse",
     "report": "weekly health report of the fleet, HTML and PDF",
-    "certificate": "calibration certificates: issue, show, verify, amend, withdraw",
+    "certificate": "calibration certificates: issue, show, verify, amend, withdraw, template",
     "event": "record what happened to a machine (crash, repair, compensation)",
+    "serve": "pages in a browser and the HTTP interface",
     "verify": "whether the database is as it was written",
     "audit": "who changed what and when",
     "backup": "a second file with everything, checked",
     "restore": "a database from a backup",
     "sql": "a query of your own, which may only read",
-    "export": "all tables as CSV or Parquet files",
+    "export": "tables as CSV or Parquet files, or as one workbook of Excel",
+    "config": "the configuration of this place: show, check, init",
+    "completion": "completion of verbs and options by the tab key, for bash, zsh or fish",
 }
 DEFAULT_DATABASE = "monitor.duckdb"
 #: Verbs that make a database where there is none, or need none; for all others a missing file is a mistyped name.
-WITHOUT_DATABASE = ("demo", "import", "restore", "effects", "simulate")
+WITHOUT_DATABASE = ("demo", "import", "restore", "effects", "serve", "simulate", "config", "completion")
+
+SUBVERBS_WITHOUT_DATABASE = ("template",)
 
 
 class Parser(argparse.ArgumentParser):
     """An argument parser whose refusal is one plain message."""
 
     def error(self, message: str) -> NoReturn:
-        print(f"{self.prog}: {message}; `{self.prog} --help` shows how", file=sys.stderr)
+        print(f"{self.prog}: {message}; {self._hint(message)}`{self.prog} --help` shows how", file=sys.stderr)
         sys.exit(2)
+
+    def _hint(self, message: str) -> str:
+        """Return the nearest option or choice to the one that a message of argparse refuses."""
+        if choice := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)$", message):
+            return did_you_mean(choice[1], re.findall(r"[\w.-]+", choice[2]))
+        if option := re.search(r"unrecognized arguments:.*?(--[\w-]+)", message):
+            return did_you_mean(option[1], self._option_string_actions)
+        return ""
 
 
 def _help() -> str:
@@ -68,8 +84,15 @@ def common(parser: argparse.ArgumentParser, *, database: bool = True) -> None:
     """Add the options that every verb has."""
     if database:
         parser.add_argument("--db", metavar="PATH", default=argparse.SUPPRESS, help="the database file")
+        parser.add_argument(
+            "--wait", metavar="SECONDS", default=argparse.SUPPRESS,
+            help=f"how long to wait for another process that has the database (default {PATIENCE_S:g})",
+        )  # fmt: skip
     parser.add_argument(
         "--json", action="store_true", help="one JSON document on standard output, nothing else"
+    )
+    parser.add_argument(
+        "--quiet", action="store_true", help="nothing but messages of what went wrong, and the exit status"
     )
 
 
@@ -95,12 +118,16 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         usage="monitor [--db PATH] VERB ...",
     )
-    default = os.environ.get("MONITOR_DB") or DEFAULT_DATABASE
     first.add_argument(
         "--db",
         metavar="PATH",
-        default=default,
-        help=f"the database file (else $MONITOR_DB, else {DEFAULT_DATABASE})",
+        help=f"the database file (else $MONITOR_DB, else that of the configuration, else {DEFAULT_DATABASE})",
+    )
+    first.add_argument(
+        "--wait",
+        metavar="SECONDS",
+        default=os.environ.get("MONITOR_WAIT") or f"{PATIENCE_S:g}",
+        help=f"how long to wait for another process that has the database (else $MONITOR_WAIT, else {PATIENCE_S:g})",
     )
     first.add_argument("--version", action="version", version=f"monitor {__version__}")
     first.add_argument("verb", nargs="?", metavar="VERB", help=argparse.SUPPRESS)
@@ -110,9 +137,12 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         first.print_help()
         sys.exit(2 if arguments else 0)
     if head.verb not in VERBS:
-        first.error(f"there is no verb '{head.verb}'; there are {', '.join(VERBS)}")
+        hint = did_you_mean(head.verb, VERBS)
+        first.error(f"there is no verb '{head.verb}'; {hint}there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
-    database = argparse.Namespace(db=head.db)
+    database = argparse.Namespace(
+        db=_default_database(head.verb) if head.db is None else head.db, wait=head.wait
+    )
     try:
         # People write options before, between and behind the other words.
         options = parser.parse_intermixed_args(head.rest, database)
@@ -121,7 +151,28 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         options = parser.parse_args(head.rest, database)
     if not hasattr(options, "run"):
         options.run = run
-    check_path(options.db, may_be_new=head.verb in WITHOUT_DATABASE)
+    options.wait = seconds_to_wait(options.wait)
+    needs_none = head.verb in WITHOUT_DATABASE or getattr(options, "what", None) in SUBVERBS_WITHOUT_DATABASE
+    check_path(options.db, may_be_new=needs_none)
+    return options
+
+
+def _default_database(verb: str) -> str:
+    """The database where none is typed: of the environment, of the configuration, or the usual one."""
+    named = os.environ.get("MONITOR_DB")
+    if named or verb in ("config", "completion"):
+        return named or DEFAULT_DATABASE
+    from monitor.cli.configuration import configuration
+
+    configured = configuration().database
+    return DEFAULT_DATABASE if configured is None else str(configured)
+
+
+def verb_options(verb: str) -> Callable[[argparse.ArgumentParser], None]:
+    """Return what adds the options of a verb to a parser."""
+    options: Callable[[argparse.ArgumentParser], None] = importlib.import_module(
+        f"monitor.cli.verbs.{verb}_"
+    ).options
     return options
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from monitor.cli import output
-from monitor.workflow.history import agreement
+from monitor.workflow.history import agreement, weekly_looks
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
@@ -69,9 +69,26 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from _backtest(answer)
     yield from _resemblance(answer)
     yield from dict.fromkeys(parameter.drift.why for _, parameter in parameters if parameter.drift.why)
+    if answer.weekly_looks is not None:
+        yield from weekly_lines(answer.weekly_looks)
     for event in answer.events:
         yield f"event {event.at[:10]}: {event.kind}, {event.description}"
     yield from answer.figures or ()
+
+
+def weekly_lines(looks: weekly_looks.WeeklyNotices, *, machines: bool = False) -> Iterator[str]:
+    """What weekly looks noticed, a sentence each, with the name of the machine where there are several."""
+    for notice in looks.notices:
+        yield (
+            f"{notice.machine}: {weekly_looks.sentence(notice)}"
+            if machines
+            else weekly_looks.sentence(notice)
+        )
+    yield (
+        f"weekly looks: {looks.weeks} weeks, {looks.machines} machine{'' if looks.machines == 1 else 's'}, "
+        f"{looks.series} series in the last; of all notices at most {100 * looks.false_discovery_rate:g} % false on "
+        f"average{'' if looks.notices else '; nothing was noticed'}"
+    )
 
 
 def _size(answer: TrendAnswer) -> str:
@@ -146,14 +163,11 @@ def _change(name: str, change: DatedChange) -> str:
 
 def _event_step(name: str, step: StepAtEvent) -> str:
     size = f"{output.rounded(step.size, step.u)} {step.unit} (u = {output.two_digits(step.u)} {step.unit})"
-    by = (
-        ""
-        if step.scatter_of == "days"
-        else "; by the scatter of the runs, too few days to know how days differ"
-    )
+    event = f"the event of {_minute(step.at)} UTC, {step.kind}: {step.description}"
+    if step.scatter_of == "days":
+        return f"{name} stepped by {size} at {event} (p = {output.probability(step.p_value)})"
     return (
-        f"{name} stepped by {size} at the event of {_minute(step.at)} UTC, {step.kind}: {step.description} "
-        f"(p = {output.probability(step.p_value)}{by})"
+        f"{name} differs by {size} before and after {event}; u is of the runs alone, {agreement.NOT_DECIDED}"
     )
 
 
@@ -323,6 +337,9 @@ def _resemblance(answer: TrendAnswer) -> Iterator[str]:
             f"{name}: autocorrelation between days {widest.correlation:.2g}, up to {widest.allowed_for:.2g} is allowed "
             f"for: the slope's interval is {widest.widening:.2g} times as wide as with independent days"
         )
+    names = dict.fromkeys(drift.temperature for drift in stated.values() if drift.temperature)
+    if names:
+        yield f"what goes with {', '.join(names)} is allowed for beside the slopes"
     seasons = {drift.season for drift in stated.values()}
     if Season.NOT_TOLD in seasons:
         yield "the history does not cover the year: a drift is not told from what the season does"

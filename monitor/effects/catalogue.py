@@ -80,7 +80,10 @@ def of_tracker(
     ``ratios`` are gear ratios by axis, as for ``of_drives``.
     """
     frame = [f"tracker:{motion}@{driver}" for driver in drivers for motion in ("shift", "turn")]
-    return (*of_drives(chain, ratios), *frame)
+    # Only reflectors beside the robot tell a base that moves from a tracker that does.
+    first = chain.tool[0].name
+    base = [f"E{component}0{first}@{driver}" for driver in drivers for component in COMPONENTS]
+    return (*of_drives(chain, ratios), *frame, *base)
 
 
 def of_drives(chain: Chain, ratios: Mapping[str, float] | None = None) -> tuple[str, ...]:

@@ -56,7 +56,11 @@ class Load(DescribedDriver):
 
 @dataclass(frozen=True)
 class LinkWeights(DescribedDriver):
-    """The torques of weights fixed to the axis itself and to each one further out, each anywhere on its link."""
+    """The torques of weights fixed to the axis itself and to each one further out, each anywhere on its link.
+
+    A weight off a turning axis along this axis is a weight on the link before it: it has no column of its own, nor has
+    it on the first link where it causes no torque.
+    """
 
     error: JointError
 
@@ -65,17 +69,28 @@ class LinkWeights(DescribedDriver):
         return _phrase("the weight of all that it carries", self.error)
 
     def labels(self, context: Context) -> tuple[str, ...]:
-        carried = _carried(context, context.chain.index(self.error.name))
-        return tuple(f".{context.chain.joints[link].name}{axis}" for link in carried for axis in "xyz")
+        moments = self._moments(context, context.chain.index(self.error.name))
+        return tuple(f".{context.chain.joints[link].name}{'xyz'[axis]}" for link, axis in moments)
+
+    def _moments(self, context: Context, joint: int) -> list[tuple[int, int]]:
+        """The links and directions of their frames that have a column."""
+        joints = context.chain.joints
+        return [
+            (link, axis)
+            for link in _carried(context, joint)
+            for axis in range(3)
+            if not joints[link].turns
+            or axis != joints[link].main
+            or (link == joint and self.error.term.component - 3 != axis)
+        ]
 
     def columns(self, context: Context, joint: int | None) -> Array:
         assert joint is not None
         torques = []
-        for link in _carried(context, joint):
+        for link, axis in self._moments(context, joint):
             at_origin = torques_in_joint_frames(context.chain, context.positions, link, np.zeros(3))
-            for axis in np.eye(3):
-                off_origin = torques_in_joint_frames(context.chain, context.positions, link, axis)
-                torques.append((off_origin - at_origin)[:, joint, self.error.term.component - 3])
+            off_origin = torques_in_joint_frames(context.chain, context.positions, link, np.eye(3)[axis])
+            torques.append((off_origin - at_origin)[:, joint, self.error.term.component - 3])
         return np.column_stack(torques)
 
     def unit(self) -> Unit:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from monitor.exceptions import EffectError
+from monitor.exceptions import EffectError, did_you_mean
 from monitor.machine.topology import Chain
 from monitor.units import MICROMETRE, MICRORADIAN, Unit
 
@@ -43,8 +43,15 @@ def parse_term(symbol: str, chain: Chain) -> Term:
     names = sorted((joint.name for joint in chain.joints), key=len, reverse=True)
     match = re.fullmatch(rf"E([{COMPONENTS}])(0?)({'|'.join(map(re.escape, names))})", symbol)
     if match is None:
+        symbols = (
+            f"E{component}{location}{joint}"
+            for component in COMPONENTS
+            for location in ("0", "")
+            for joint in names
+        )
         raise EffectError(
-            f"'{symbol}' is no geometric error of '{chain.topology}': write E, a direction X Y Z A B C, "
+            f"'{symbol}' is no geometric error of '{chain.topology}': {did_you_mean(symbol, symbols)}"
+            "write E, a direction X Y Z A B C, "
             f"0 for a location error, and one of its axes {', '.join(joint.name for joint in chain.joints)}, "
             f"for example EX0{chain.joints[-1].name} or EY{chain.joints[0].name}"
         )

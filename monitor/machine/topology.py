@@ -2,7 +2,8 @@
 
 ``w C B X b Z Y (C1) t`` (ISO 10791-1) is read from the workpiece to the tool: ``b`` is the bed, an axis in
 brackets the spindle. X, Y, Z (and U, V, W parallel to them) are linear, A, B, C rotary about X, Y, Z; a digit
-after the letter tells axes of the same letter apart. The letters are a short form: they are first written out
+after the letter tells axes of the same letter apart. ``V [w C B X b Z S t]`` (ISO 10791-6) is read,
+too. The letters are a short form: they are first written out
 as axes that pass through the machine's origin along X, Y or Z, and one function makes the chain of either.
 """
 
@@ -13,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from monitor.exceptions import TopologyError
-from monitor.records import Branch, ChainAxis, Kind, Vector, topology_of
+from monitor.records import Branch, ChainAxis, Kind, Vector, plain_topology, topology_of
 
 X: Vector = (1.0, 0.0, 0.0)
 Y: Vector = (0.0, 1.0, 0.0)
@@ -179,7 +180,8 @@ def parse_topology(text: str, signs: Mapping[str, int] | None = None, gravity: V
     TopologyError, with what would be right, for a string that cannot be parsed, an axis named twice, a
     spindle that is not next to the tool, or a chain without any axis.
     """
-    tokens = _tokens(text)
+    plain, down = plain_topology(text)
+    tokens = _tokens(plain)
     names = [name for name, _ in tokens]
     if names.count("w") != 1 or names.count("b") != 1 or names.count("t") != 1:
         raise TopologyError(
@@ -195,4 +197,4 @@ def parse_topology(text: str, signs: Mapping[str, int] | None = None, gravity: V
         raise TopologyError(f"topology '{text}': the spindle in brackets belongs just before t; {EXAMPLE}")
     axes = [_letter_axis(text, name, spin, "work") for name, spin in reversed(tokens[1:bed])]
     axes += [_letter_axis(text, name, spin, "tool") for name, spin in tokens[bed + 1 : -1]]
-    return chain_of_axes(axes, signs, gravity)
+    return chain_of_axes(axes, signs, down if gravity is None else gravity)

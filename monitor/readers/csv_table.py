@@ -6,7 +6,9 @@ import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from monitor.readers.faults import Faults, near, one_of, quoted
+from monitor.exceptions import did_you_mean
+from monitor.readers.faults import Faults, one_of, quoted
+from monitor.readers.spreadsheet import plain_csv
 
 #: Longest line, in characters; a row of the examples has 70.
 LONGEST_LINE = 65_536
@@ -31,11 +33,14 @@ class CsvTable:
 
 
 def parse_csv(file: str, text: str, faults: Faults) -> CsvTable | None:
-    """Parse RFC 4180 with one line a row. None where the header cannot be used; the faults are noted."""
+    """Parse RFC 4180 with one line a row, or what a spreadsheet of a country with decimal commas writes.
+
+    None where the header cannot be used; the faults are noted.
+    """
     if text.count("\n") > MOST_LINES:
         faults.add(file, None, None, f"the file has more than {MOST_LINES} lines; split the campaign")
         return None
-    lines = text.split("\n")
+    lines = plain_csv(text).split("\n")
     while lines and not lines[-1].strip("\r"):
         lines.pop()
     longest = max(range(len(lines)), key=lambda index: len(lines[index]), default=None)
@@ -60,7 +65,7 @@ def refuse_missing(table: CsvTable, required: Sequence[str], faults: Faults) -> 
     for column in required:
         if column not in table.columns:
             unused = [name for name in table.columns if name not in required]
-            hint = near(column, unused).replace("did you mean", "is it")
+            hint = did_you_mean(column, unused).replace("did you mean", "is it")
             message = f"the column is missing; {hint}the header needs {one_of(required)}"
             faults.add(table.file, 1, column, message)
 

@@ -117,7 +117,10 @@ def what_is_wrong(cell: str) -> str | None:
         return f"{shown} is not a number: its minus is a typographic sign; write the plain '-'"
     if re.fullmatch(r"[+-]?[0-9]+,[0-9]+", cell):
         point = cell.replace(",", ".")[:40]
-        return f"{shown} is not a number: write a decimal point, {point}, and no thousands separators"
+        return (
+            f"{shown} is not a number: it has a decimal comma; write a decimal point, {point}, and no thousands "
+            "separators"
+        )
     if re.fullmatch(r"[+-]?[0-9]{1,3}([,'_ \u00a0\u2009\u202f\u2019][0-9]{3})+(\.[0-9]*)?", cell):
         return f"{shown} is not a number: write it without thousands separators"
     return f"{shown} is not a number; write digits with a decimal point, such as -12.345"

@@ -24,6 +24,8 @@ FULL_TURN = 6.3
 INDEX_DEG, INDEX_TOLERANCE_DEG = 5.0, 0.03
 #: Declared places are set up by hand: a few millimetres on 100 mm are usual.
 DISTANCE_TOLERANCE = 0.05
+#: Rows of a run whose distances are taken: all pairs of a million rows would need 4 TB. Plans have 60 to 10 000.
+MOST_ROWS = 2000
 #: Pairs beyond the tolerance from which on it is no single ball that was moved.
 TELLING_SHARE = 0.2
 #: What columns were taken for each other: metres or micrometres for millimetres, inches, a shifted decimal point.
@@ -156,7 +158,7 @@ def _places(campaign: Campaign) -> Iterator[str]:
 def _pairs(campaign: Campaign, declared: Mapping[str, Array]) -> tuple[Array, Array]:
     """Steps (n, 3) of X, Y, Z between targets probed at one pose of one run, and their declared distances (n,)."""
     probings = campaign.probings
-    rows = np.flatnonzero(probings.run == probings.run[0])
+    rows = np.flatnonzero(probings.run == probings.run[0])[:MOST_ROWS]
     fixed = [
         values[rows] for axis, values in probings.readings.items() if not campaign.machine.is_linear(axis)
     ]

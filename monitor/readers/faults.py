@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 from monitor.exceptions import Fault
@@ -50,10 +49,3 @@ def quoted(value: object) -> str:
 def one_of(names: Iterable[str]) -> str:
     """Return names in a row, for the end of a message."""
     return ", ".join(names) or "none"
-
-
-def near(name: str, names: Iterable[str]) -> str:
-    """Return a hint ("did you mean 'x_mm'? ") where a known name is close, else nothing."""
-    by_folded = {candidate.casefold(): candidate for candidate in names}
-    close = difflib.get_close_matches(name[:100].casefold(), list(by_folded), n=1, cutoff=0.7)
-    return f"did you mean '{by_folded[close[0]]}'? " if close else ""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import stat
 from pathlib import Path
 
+from monitor.bounded import read_bounded
 from monitor.readers.faults import Faults
 
 #: Largest CSV file, in bytes. A five-day campaign has 86 kB; a year of such days has 5 MB.
@@ -22,18 +24,22 @@ def read_bytes(folder: Path, name: str, largest: int, faults: Faults) -> bytes |
             faults.add(name, None, None, "this is not a regular file; a text file is needed")
             return None
         if status.st_size <= largest:
-            with path.open("rb") as stream:
-                content = stream.read(largest + 1)
-            if len(content) <= largest:
-                return content
+            return read_bounded(path, largest)
     except FileNotFoundError:
         faults.add(name, None, None, f"the file is missing; the folder holds {_what_is_there(folder)}")
         return None
     except OSError as error:
+        if error.errno == errno.EFBIG:
+            faults.add(name, None, None, _too_large(largest))
+            return None
         faults.add(name, None, None, f"the file cannot be read: {error.strerror or error}")
         return None
-    faults.add(name, None, None, f"the file is larger than {largest // 1024**2} MiB; split the campaign")
+    faults.add(name, None, None, _too_large(largest))
     return None
+
+
+def _too_large(largest: int) -> str:
+    return f"the file is larger than {largest // 1024**2} MiB; split the campaign"
 
 
 def decode(name: str, content: bytes, faults: Faults) -> str | None:

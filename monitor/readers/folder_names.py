@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+from monitor.bounded import read_bounded
 from monitor.readers.files import LARGEST_TOML
 
 _FILE = "campaign.toml"
@@ -13,10 +14,7 @@ _FILE = "campaign.toml"
 def names_in(folder: Path) -> tuple[str | None, str | None]:
     """Return the names of campaign and machine in ``campaign.toml``; None where it cannot be read that far."""
     try:
-        path = folder / _FILE
-        if not path.is_file() or path.stat().st_size > LARGEST_TOML:
-            return None, None
-        document = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        document = tomllib.loads(read_bounded(folder / _FILE, LARGEST_TOML).decode("utf-8-sig"))
     except (OSError, ValueError, RecursionError):  # not TOML and not UTF-8 are ValueErrors
         return None, None
     machine = document.get("machine")

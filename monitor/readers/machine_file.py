@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from monitor.exceptions import did_you_mean
 from monitor.readers.axes import FARTHEST_MM, Axis, axes_of
 from monitor.readers.chain_tables import read_chain, unit_vector
-from monitor.readers.faults import near, one_of, quoted
+from monitor.readers.faults import one_of, quoted
 from monitor.readers.toml_table import Table
-from monitor.records import AxisSettings, ChainAxis, Machine, topology_of
+from monitor.records import AxisSettings, ChainAxis, Machine, plain_topology, topology_of
 
 # ISO 230-1:2012, 3.4: E, then the direction (X, Y, Z) or rotation (A, B, C), then the axis; 0 for a location.
 TERM = re.compile(r"E([XYZABC])(0?)([A-Za-z][A-Za-z0-9]*)")
@@ -37,6 +38,7 @@ def read_machine(top: Table) -> MachinePart:
     identity = table.text("id", required=True, example='"HU40-T"')
     free = [key for key in ("work_chain", "tool_chain") if key in table.data]
     topology = table.text("topology", required=not free, example='"w C B X b Z Y (C1) t"')
+    topology, down = (topology, None) if topology is None else plain_topology(topology)
     chain = read_chain(table)
     plate = {key: table.text(key) for key in ("manufacturer", "model", "serial_number", "location")}
     if free:
@@ -46,7 +48,7 @@ def read_machine(top: Table) -> MachinePart:
     signed = {axis.name for axis in chain or () if axis.sign is not None}
     settings, strokes = _settings(table, axes, signed)
     tolerances = _tolerances(table, axes)
-    gravity = unit_vector(table, "gravity") if table.raw("gravity", required=False, example="") else None
+    gravity = unit_vector(table, "gravity") if table.raw("gravity", required=False, example="") else down
     table.finish()
     if identity is None or topology is None or axes is None:
         return MachinePart(None, axes, strokes)
@@ -98,7 +100,7 @@ def _settings(
     for name in outer.data:
         axis = by_name.get(name)
         if axis is None:
-            hint = near(name, by_name)
+            hint = did_you_mean(name, by_name)
             outer.fault(
                 name, f"the topology has no axis {quoted(name)}; {hint}its axes are {one_of(by_name)}"
             )

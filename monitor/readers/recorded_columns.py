@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from monitor.exceptions import did_you_mean
 from monitor.readers.csv_table import CsvTable
-from monitor.readers.faults import Faults, near, quoted
+from monitor.readers.faults import Faults, quoted
 from monitor.units import CONDITION_SUFFIXES, column_unit
 
 
@@ -33,7 +34,7 @@ def recorded_columns(
             columns.append(column)
             continue
         ends = ", ".join(f"_{suffix}" for suffix in suffixes)
-        hint = near(column, [*taken, *plain]) or near(column.rpartition("_")[2], suffixes)
+        hint = did_you_mean(column, [*taken, *plain]) or did_you_mean(column.rpartition("_")[2], suffixes)
         faults.add(
             table.file,
             1,

@@ -9,9 +9,10 @@ from types import MappingProxyType
 
 import numpy as np
 
+from monitor.exceptions import did_you_mean
 from monitor.readers.axes import FARTHEST_MM
 from monitor.readers.chain_tables import LETTERS, unit_vector
-from monitor.readers.faults import near, one_of, quoted
+from monitor.readers.faults import one_of, quoted
 from monitor.readers.toml_table import Table
 from monitor.records import Branch, Probe, Probings, Setup, Vector
 from monitor.units import METRE, MICROMETRE, MICRORADIAN
@@ -86,7 +87,7 @@ def _setup(table: Table) -> Setup | None:
     if kind is not None and kind not in FORMATS:
         table.fault(
             "reading",
-            f"{quoted(kind)} is no kind of reading; {near(kind, FORMATS)}the kinds are {one_of(FORMATS)}",
+            f"{quoted(kind)} is no kind of reading; {did_you_mean(kind, FORMATS)}the kinds are {one_of(FORMATS)}",
         )
     if kind is None or kind not in FORMATS or identity is None:
         return None

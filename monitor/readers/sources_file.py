@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeVar
 
-from monitor.exceptions import InputError
+from monitor.exceptions import InputError, did_you_mean
 from monitor.readers.axes import Axis
-from monitor.readers.faults import Faults, near, one_of, quoted
+from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.files import LARGEST_TOML, decode, read_bytes
 from monitor.readers.toml_lines import line_of, lines_of_keys
 from monitor.readers.toml_table import Table, parse_toml
@@ -137,7 +137,7 @@ def _quantity(table: Table) -> Quantity | None:
     else:
         table.fault(
             "quantity",
-            f"{quoted(value)} is not known; {near(value, words)}the quantities are {one_of(words)}",
+            f"{quoted(value)} is not known; {did_you_mean(value, words)}the quantities are {one_of(words)}",
         )
     return None
 
@@ -148,7 +148,9 @@ def _word(table: Table, key: str, kind: type[Word], default: Word) -> Word | Non
         return None if key in table.data else default
     words = [word.value for word in kind]
     if value not in words:
-        table.fault(key, f"{quoted(value)} is not known; {near(value, words)}write one of {one_of(words)}")
+        table.fault(
+            key, f"{quoted(value)} is not known; {did_you_mean(value, words)}write one of {one_of(words)}"
+        )
         return None
     return kind(value)
 

@@ -8,7 +8,8 @@ import tomllib
 from collections.abc import Iterable
 from typing import Any
 
-from monitor.readers.faults import Faults, near, one_of, quoted
+from monitor.exceptions import did_you_mean
+from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.toml_lines import Path, line_of, lines_of_keys
 
 #: Longest name or text that a key may hold.
@@ -133,7 +134,7 @@ class Table:
         """Refuse every key that was not asked for."""
         for key in self.data:
             if key not in self._asked_for:
-                hint = near(key, self._asked_for)
+                hint = did_you_mean(key, self._asked_for)
                 self.fault(key, f"this key is not known; {hint}the keys here are {one_of(self._asked_for)}")
 
     def _number(

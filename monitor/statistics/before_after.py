@@ -1,16 +1,16 @@
 """Did a quantity change between two stretches of runs by the same method, before and after an event?
 
 Whatever both share, as the scale of the bar or the form of the probe, drops out of their difference and has no part in
-its
-uncertainty: what is left is the scatter of the runs, divided by their number, and that of the days where a side has
-several. Judged by E_n with the expanded uncertainty at 95 % for the degrees of freedom that there are, so that of
-machines that did not change one in twenty is said to have. Compare results of different methods, which share less, with
-``normalised_error``.
+its uncertainty: what is left is the scatter of the means of days, whatever makes days differ. It is estimated from the
+days of both sides and, where these are few, from other days of the same machine. One day a side and no other day cannot
+tell a change from days that differ, however many runs there are: then nothing is decided. Judged by E_n with the
+expanded uncertainty at 95 % for the degrees of freedom that there are, so that of machines that did not change one in
+twenty is said to have. Compare results of different methods, which share less, with ``normalised_error``.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,20 +19,41 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_vector
-from monitor.statistics.mixed import fit_with_days
 from monitor.statistics.sums import label_groups
 
 #: Probability with which the expanded uncertainty holds the difference of a machine that did not change.
 LEVEL = 0.95
+#: With fewer degrees of freedom of their own days than this, both sides lean on the machine's other days. It depends on
+#: the plan alone, so that no rate moves by the choice.
+ENOUGH = 8
+#: From so many degrees of freedom on, the means of the machine's other campaigns say how campaigns differ, which days
+#: that follow each other do not show; a change then has to exceed that, too.
+CAMPAIGNS_THAT_SAY = 3
+
+
+@dataclass(frozen=True)
+class OtherDays:
+    """Runs (k,) of the machine's other days: ``values``, their ``days``, the ``stretches`` between its changes, and
+    their ``campaigns``.
+
+    The days of a stretch scatter about the mean of that stretch; what differs between stretches is no scatter.
+    """
+
+    values: npt.ArrayLike
+    days: npt.ArrayLike
+    stretches: npt.ArrayLike
+    campaigns: npt.ArrayLike
 
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """``difference`` of the means, after less before, in the unit of the values; ``u`` with ``dof``, ``k`` for 95 %.
+    """``difference`` of the means of the days, after less before, in the unit of the values; ``u`` with ``dof``, ``k``
+    for 95 %.
 
-    ``u_before`` and ``u_after`` are those of the two means. ``between`` is the standard deviation of the days, None
-    where
-    each side has one: then the difference of the machine and that of the two days are one, and ``u`` is of runs alone.
+    ``u_before`` and ``u_after`` are those of the two means. ``between`` is the standard deviation of the days beyond
+    their runs, None where no two days are alike: then the difference of the machine and that of two days are one, ``u``
+    is of runs alone, and nothing is ``decided``. ``other_days`` of the machine took part in the estimate; of so many
+    ``other_campaigns`` the means differ by more than that, and ``u``, ``dof`` and ``k`` are theirs (0: they do not).
     """
 
     before: float
@@ -44,64 +65,192 @@ class BeforeAfter:
     dof: float
     k: float
     between: float | None
+    other_days: int
+    other_campaigns: int = 0
+
+    @property
+    def decided(self) -> bool:
+        """Whether the days say what a change has to exceed."""
+        return self.between is not None
 
     @property
     def expanded(self) -> float:
-        """Expanded uncertainty of the difference."""
+        """Expanded uncertainty of the difference; where nothing is decided, by the runs alone and so too small."""
         return self.k * self.u
 
     @property
-    def e_n(self) -> float:
-        """The difference in units of its expanded uncertainty."""
-        return self.difference / self.expanded
+    def e_n(self) -> float | None:
+        """The difference in units of its expanded uncertainty; None where nothing is decided."""
+        return self.difference / self.expanded if self.decided else None
 
     @property
-    def agree(self) -> bool:
-        """Whether the difference is no larger than its expanded uncertainty."""
-        return abs(self.e_n) <= 1.0
+    def agree(self) -> bool | None:
+        """Whether the difference is no larger than its expanded uncertainty; None where nothing is decided."""
+        return None if self.e_n is None else abs(self.e_n) <= 1.0
 
 
-def before_after(
-    before: npt.ArrayLike, after: npt.ArrayLike, days_before: npt.ArrayLike, days_after: npt.ArrayLike
-) -> BeforeAfter:
-    """Compare runs (n,) before with runs (m,) after an event, of the days (n,) and (m,).
+@dataclass(frozen=True)
+class _Means:
+    """Means of d days with their numbers of runs, the stretch of each from 0 (before), 1 (after) on, and the sum of
+    squares within the days."""
 
-    A day that the event cuts in two counts on both sides: its two halves share what is of the day only in part, which
-    is neglected. Raises ``DataError`` where no day has two runs and neither side two days, or where nothing scatters.
-    Measured: docs/trials-statistics.md.
-    """
-    x, y = as_vector(before, "before"), as_vector(after, "after")
-    sides = [label_groups(days, len(column))[1] for days, column in ((days_before, x), (days_after, y))]
-    day = np.concatenate([sides[0], sides[1] + int(sides[0].max()) + 1])
-    values = np.concatenate([x, y])
-    # Of each side its own mean: what the two columns have for coefficients, and uncertainties.
-    is_after = np.arange(len(values)) >= len(x)
-    design = np.column_stack([~is_after, is_after]).astype(np.float64)
-    count = int(day.max()) + 1
-    if len(values) - 2 < 1 or len(values) == 2:
-        raise DataError(
-            f"{len(x)} run(s) before and {len(y)} after say nothing of their scatter; three are needed."
-        )
-    # One day a side: of the days nothing is known, and every run counts for itself.
-    fit = fit_with_days(values, design, None, day if count > 2 else np.arange(len(values)))
-    means = fit.coefficients
-    u = float(np.sqrt(fit.covariance[0, 0] + fit.covariance[1, 1] - 2.0 * fit.covariance[0, 1]))
-    if np.ptp(x) == 0.0 and np.ptp(y) == 0.0:
-        raise DataError("no run differs from the others of its side; the difference has no uncertainty.")
-    dof = _dof(fit.covariance, fit.dof)
-    return BeforeAfter(
-        before=float(means[0]),
-        after=float(means[1]),
-        u_before=float(fit.u[0]),
-        u_after=float(fit.u[1]),
-        difference=float(means[1] - means[0]),
-        u=u,
-        dof=dof,
-        k=-float(scipy.special.stdtrit(dof, (1.0 - LEVEL) / 2.0)),
-        between=float(fit.between) if count > 2 else None,
+    mean: Array
+    runs: Array
+    stretch: npt.NDArray[np.intp]
+    within: float
+
+    @property
+    def dof_days(self) -> int:
+        return len(self.mean) - len(np.unique(self.stretch))
+
+    @property
+    def dof_runs(self) -> int:
+        return int(self.runs.sum()) - len(self.mean)
+
+
+def _means(values: Array, day: npt.NDArray[np.intp], stretch: npt.NDArray[np.intp]) -> _Means:
+    runs = np.bincount(day).astype(np.float64)
+    # About one of the values: a large value common to all would cost digits.
+    away = values - values[0]
+    mean = np.bincount(day, away) / runs
+    of_day = np.zeros(len(runs), dtype=np.intp)
+    of_day[day] = stretch
+    return _Means(mean + values[0], runs, of_day, float(((away - mean[day]) ** 2).sum()))
+
+
+def _joined(columns: list[tuple[Array, npt.ArrayLike, npt.NDArray[np.intp]]]) -> _Means:
+    """Means of the days of several parts, whose days differ although their labels may be alike."""
+    day, count = [], 0
+    for values, days, _ in columns:
+        index = label_groups(days, len(values))[1]
+        day.append(index + count)
+        count += int(index.max()) + 1
+    return _means(
+        np.concatenate([values for values, _, _ in columns]),
+        np.concatenate(day),
+        np.concatenate([stretch for _, _, stretch in columns]),
     )
 
 
-def _dof(covariance: Array, dof: Array) -> float:
-    """Degrees of freedom of the difference: those of the two means, which rest on one estimate of the scatter."""
-    return float(dof[int(np.argmax(np.diag(covariance)))])
+def before_after(
+    before: npt.ArrayLike,
+    after: npt.ArrayLike,
+    days_before: npt.ArrayLike,
+    days_after: npt.ArrayLike,
+    others: OtherDays | None = None,
+) -> BeforeAfter:
+    """Compare runs (n,) before with runs (m,) after an event, of the days (n,) and (m,), every day alike.
+
+    Where the days of both sides leave fewer than ``ENOUGH`` degrees of freedom, those of ``others`` are added. Exact
+    for independent normal days of as many runs, whatever the day component; with unequal numbers of runs the scatter of
+    the runs makes up what the means of a side scatter more than those of the others (Satterthwaite). A day that the
+    event cuts in two counts on both sides: its two halves share what is of the day only in part, which is neglected.
+    Raises ``DataError`` for fewer than three runs, or where nothing scatters. Measured: docs/trials-statistics.md.
+    """
+    x, y = as_vector(before, "before"), as_vector(after, "after")
+    if len(x) + len(y) < 3:
+        raise DataError(
+            f"{len(x)} run(s) before and {len(y)} after say nothing of their scatter; three are needed."
+        )
+    sides = [(x, days_before, np.zeros(len(x), np.intp)), (y, days_after, np.ones(len(y), np.intp))]
+    own = _joined(sides)
+    means, other_days = own, 0
+    if others is not None and own.dof_days < ENOUGH and len(np.asarray(others.values)):
+        values = as_vector(others.values, "others")
+        stretch = label_groups(others.stretches, len(values))[1] + 2
+        every = _joined([*sides, (values, others.days, stretch)])
+        if every.dof_days > own.dof_days:
+            means, other_days = every, len(every.mean) - len(own.mean)
+    if np.ptp(x) == 0.0 and np.ptp(y) == 0.0:
+        raise DataError("no run differs from the others of its side; the difference has no uncertainty.")
+    result = _judged(own, means, other_days)
+    return result if others is None else _beside_campaigns(result, others)
+
+
+def _beside_campaigns(result: BeforeAfter, others: OtherDays) -> BeforeAfter:
+    """The same with what the means of other campaigns differ by, where that asks for more than the days do."""
+    means, stretch = _campaign_means(others)
+    dof = len(means) - len(np.unique(stretch))
+    if dof < CAMPAIGNS_THAT_SAY:
+        return result
+    squares = sum(
+        float(((means[stretch == i] - means[stretch == i].mean()) ** 2).sum()) for i in set(stretch)
+    )
+    u, k = float(np.sqrt(2.0 * squares / dof)), _factor(dof)
+    if k * u <= result.expanded and result.decided:
+        return result
+    of_side = u / np.sqrt(2.0)
+    between = of_side if result.between is None else result.between
+    return replace(
+        result, u_before=of_side, u_after=of_side, u=u, dof=float(dof), k=k, between=between,
+        other_campaigns=len(means),
+    )  # fmt: skip
+
+
+def _campaign_means(others: OtherDays) -> tuple[Array, npt.NDArray[np.intp]]:
+    """Means of the means of days of each campaign, and its stretch; one that an event cuts in two is two."""
+    values = np.asarray(others.values, dtype=np.float64)
+    if not len(values):
+        return np.empty(0), np.empty(0, dtype=np.intp)
+    campaign, stretch, day = (
+        label_groups(labels, len(values))[1] for labels in (others.campaigns, others.stretches, others.days)
+    )
+    parts, part = np.unique(np.column_stack([stretch, campaign]), axis=0, return_inverse=True)
+    of_days, of_day = np.unique(np.column_stack([part.ravel(), day]), axis=0, return_inverse=True)
+    by_day = np.bincount(of_day.ravel(), values) / np.bincount(of_day.ravel())
+    means = np.bincount(of_days[:, 0], by_day) / np.bincount(of_days[:, 0])
+    return np.asarray(means), parts[:, 0]
+
+
+def _factor(dof: float) -> float:
+    """Coverage factor of Student's distribution for ``LEVEL``."""
+    return -float(scipy.special.stdtrit(dof, (1.0 - LEVEL) / 2.0))
+
+
+def _judged(own: _Means, means: _Means, other_days: int) -> BeforeAfter:
+    """The difference of the two sides of ``own`` by the scatter of the days of ``means``."""
+    sides = [own.stretch == side for side in (0, 1)]
+    first, second = (float(own.mean[side].mean()) for side in sides)
+    days = np.array([float(side.sum()) for side in sides])
+    # Mean of 1/n over the days of a side: what the scatter of its runs adds to the variance of a day.
+    share = np.array([float((1.0 / own.runs[side]).mean()) for side in sides])
+    of_runs = means.within / means.dof_runs if means.dof_runs else 0.0
+    if means.dof_days == 0:
+        # Nothing is known of the days: what the runs say, as a lower bound.
+        variances, dof, between = of_runs * share / days, float(means.dof_runs), None
+    else:
+        of_days, expected = _scatter_of_days(means)
+        by_runs = of_runs * float(np.maximum(share - expected, 0.0) @ (1.0 / days))
+        by_days = of_days * float((1.0 / days).sum())
+        total = by_days + by_runs
+        variances = (of_days + of_runs * np.maximum(share - expected, 0.0)) / days
+        parts = by_days**2 / means.dof_days + (by_runs**2 / means.dof_runs if means.dof_runs else 0.0)
+        dof = total**2 / parts if parts > 0.0 else float(means.dof_days)
+        between = float(np.sqrt(max(of_days - of_runs * expected, 0.0)))
+    u = float(np.sqrt(variances.sum()))
+    if u == 0.0:
+        raise DataError("no day differs from the others of its side; the difference has no uncertainty.")
+    return BeforeAfter(
+        before=first,
+        after=second,
+        u_before=float(np.sqrt(variances[0])),
+        u_after=float(np.sqrt(variances[1])),
+        difference=second - first,
+        u=u,
+        dof=dof,
+        k=_factor(dof),
+        between=between,
+        other_days=other_days,
+    )
+
+
+def _scatter_of_days(means: _Means) -> tuple[float, float]:
+    """Variance of the means of days about those of their stretches, pooled, and the share of the variance of a run that
+    it is expected to hold."""
+    squares = expected = 0.0
+    for stretch in np.unique(means.stretch):
+        inside = means.stretch == stretch
+        count = int(inside.sum())
+        squares += float(((means.mean[inside] - means.mean[inside].mean()) ** 2).sum())
+        expected += (count - 1) * float((1.0 / means.runs[inside]).mean())
+    return squares / means.dof_days, expected / means.dof_days

@@ -27,12 +27,13 @@ from monitor.records import Array
 DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS = 16, 4, 20
 #: A line and its scatter need so many blocks.
 FEWEST_BLOCKS = 3
-#: Margin on the correlation of neighbouring blocks, times the root of the number of days, and the days from which on
-#: all of it is added (with fewer, so little is left of the scatter that its few degrees of freedom allow for the
-#: rest): the
-#: smallest, to a tenth, that keeps false alarms of a slope at 5 % below 8 % for correlations up to 0.8, day components
-#: up to twice the scatter of a run and 3 to 250 days (docs/trials-statistics.md).
-MARGIN, FULL_MARGIN = 1.1, 10.0
+#: Margin on the correlation of neighbouring blocks, times the root of the number of days: its values at some numbers of
+#: days, between which it is interpolated, and the days from which on all of it is added (with fewer, so little is left
+#: of the scatter that its few degrees of freedom allow for the rest). The smallest, to a tenth, that keep false alarms
+#: of a slope at 5 % below 7.5 % for correlations up to 0.8, day components up to twice the scatter of a run and 3 to
+#: 250 days (docs/trials-statistics.md); around 20 days, where blocks begin to hold two days, it has to be the largest.
+MARGIN_DAYS, MARGINS = (12.0, 16.0, 20.0, 24.0, 40.0), (1.1, 1.2, 1.35, 1.3, 1.1)
+FULL_MARGIN = 10.0
 #: Correlations at which the variances are computed; between them they are interpolated. Beyond the last one some
 #: dozens of blocks have no line.
 CORRELATIONS = np.linspace(0.0, 0.95, 20)
@@ -315,7 +316,8 @@ def block_lines(blocks: Blocks, *, cycle: float | None = None) -> BlockLines:
     square = np.einsum("cb,cb->c", residual, residual)
     product = np.einsum("cb,cb->c", residual[:, 1:], residual[:, :-1]) / np.where(square > 0.0, square, 1.0)
     seen_place, seen_share = _between(tables.neighbours[plan], product)
-    margin = MARGIN * np.minimum(1.0, blocks.days / FULL_MARGIN) / np.sqrt(np.maximum(blocks.days, 1.0))
+    margin = np.interp(blocks.days, MARGIN_DAYS, MARGINS) / np.sqrt(np.maximum(blocks.days, 1.0))
+    margin *= np.minimum(1.0, blocks.days / FULL_MARGIN)
     place, share = _between(tables.neighbours[plan], product + margin)
     inside, trace, dof = (
         _at(table, plan, place, share) for table in (tables.inside, tables.trace, tables.dof)

@@ -18,6 +18,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
 from monitor.statistics.day_evidence import shows_wide_days
+from monitor.statistics.day_steps import day_step_p_value
 from monitor.statistics.scan import Scan, Scanner
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
 from monitor.statistics.sums import label_groups
@@ -148,12 +149,24 @@ def _change(series: _Series, best: Scan, base: Base, offset: int) -> Change:
 DAYS_THAT_SHOW = 8
 
 
+#: Fewer parameters than this do not show among them how wide days are (``day_evidence``): with few days a step or a
+#: trend then has to be one of the means of the days by themselves as well (``day_steps``).
+PARAMETERS_THAT_SHOW = 4
+
+
+def _of_days(column: Array, day: npt.NDArray[np.intp]) -> bool:
+    """Whether a column (n,) differs more from day to day than within its days, as no warm-up of a morning does."""
+    mean = np.bincount(day, column) / np.bincount(day)
+    return bool(np.var(mean[day]) > 0.5 * np.var(column))
+
+
 class _Search:
     """One search that reuses its scanners: parameters with the same plan share the preparation."""
 
     def __init__(self, rng: np.random.Generator, trials: int) -> None:
         self.rng, self.trials = rng, trials
         self.wide: set[str] = set()
+        self.by_means = False
         self._kept: dict[tuple[object, ...], Scanner] = {}
 
     def scanner(self, series: _Series, base: Base) -> Scanner:
@@ -188,12 +201,20 @@ class _Search:
     def scan(self, series: _Series, base: Base, level: float) -> Scan:
         many = series.day is not None and int(series.day.max()) + 1 >= DAYS_THAT_SHOW
         wide = many or series.name in self.wide
-        return self.scanner(series, base).scan(series.y, self.rng, self.trials, level, wide)
+        best = self.scanner(series, base).scan(series.y, self.rng, self.trials, level, wide)
+        if many or series.day is None or not self.by_means or best.p_value > level:
+            return best
+        if best.kind == "transient" and not _of_days(best.column, series.day):
+            return best
+        return replace(
+            best, p_value=max(best.p_value, day_step_p_value(series.y, series.day, self.rng, self.trials))
+        )
 
     def pieces(self, parts: Sequence[tuple[_Series, int]], level: float) -> tuple[list[Change], list[Change]]:
         """Return changes and trends of all pieces, each with the index of its first run."""
         self.look([part for part, _ in parts])
         self.wide = self.wide_days([part for part, _ in parts])
+        self.by_means = len({part.name for part, _ in parts}) < PARAMETERS_THAT_SHOW
         changes: list[Change] = []
         trends: list[Change] = []
         for part, start in parts:

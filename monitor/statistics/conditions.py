@@ -1,13 +1,14 @@
 """What a parameter depends on: temperature, warm-up time, any recorded channel, cycles of day and year.
 
 All coefficients are estimated together with the drift, so a machine that was measured in ever warmer weeks
-shows neither as the other; where they cannot be separated the correlation of the estimates says so.
+shows neither as the other; where they cannot be separated the correlation of the estimates says so. Days that resemble
+each other are allowed for, as in ``trend``: what follows the weather follows it for days.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
 from monitor.statistics.checks import as_positive, as_probability, as_vector
 from monitor.statistics.mixed import MixedFit, fit_with_days
 from monitor.statistics.sums import label_groups
@@ -90,6 +92,80 @@ def _per(unit: Unit | None, channel: Unit | None) -> Unit | None:
     return unit.per(KELVIN if channel == DEGREE_CELSIUS else channel)
 
 
+#: Blocks of a period of a cycle: longer ones would average it away. Beyond so many blocks, as of the cycle of the day
+#: over a year, the slow resemblance of days has next to no part in a cycle so fast, and they are taken as independent.
+BLOCKS_OF_PERIOD, MOST_BLOCKS = 10, 200
+
+
+def _widened(
+    fit: MixedFit, design: Array, day: npt.NDArray[np.intp], t: Array, periods: Sequence[float | None]
+) -> MixedFit:
+    """The fit with covariance and degrees of freedom for days that resemble their neighbours.
+
+    Of every coefficient the part of its variance that rests on the days is widened as the slope of a line over its own
+    column is, beside all others (``block_lines``). Left as it is where so few days allow no such line. ``periods`` (q,)
+    are those of the columns that are waves.
+    """
+    count = np.bincount(day)
+    order = np.argsort(np.bincount(day, t) / count, kind="stable")
+    means = np.column_stack([np.bincount(day, column) / count for column in design.T])[order]
+    residual = (np.bincount(day, fit.residual) / count)[order]
+    times = (np.bincount(day, t) / count)[order]
+    weight = fit.weight[order]
+    factor, dof = np.ones(len(fit.coefficients)), fit.dof.copy()
+    by_day = _mean_square(np.arange(len(times)), weight, means, residual)
+    for at in range(1, design.shape[1]):
+        place = _blocks_of(times, periods[at])
+        if place is None:
+            continue
+        # Blocks of several days scatter more than as many independent days would.
+        by_block = _mean_square(place, weight, means, residual)
+        swollen = max(by_block / by_day, 1.0) if by_day > 0.0 and np.isfinite(by_block) else 1.0
+        beside = np.delete(means, [0, at], axis=1)
+        lines = block_lines(_cut(place, weight, means[:, at], residual, beside))
+        widening, freedom = float(lines.widening[0]), float(lines.dof[0])
+        if not np.isfinite(widening):
+            continue
+        inside = fit.inside[at]
+        of_days = (1.0 - inside) * max(widening**2, 1.0) * swollen
+        factor[at] = np.sqrt(inside + of_days)
+        within = inside**2 / max(len(day) - len(count), 1) + of_days**2 / min(freedom, max(fit.dof[at], 1.0))
+        dof[at] = np.clip(factor[at] ** 4 / within, 1.0, fit.dof[at])
+    return replace(fit, covariance=fit.covariance * np.outer(factor, factor), dof=dof)
+
+
+def _mean_square(place: npt.NDArray[np.intp], weight: Array, columns: Array, value: Array) -> float:
+    """Mean square of what weighted block means (place (d,) of each day) leave over columns (d, q); NaN without any."""
+    total = np.asarray(np.bincount(place, weight), dtype=np.float64)
+    both = np.column_stack([np.bincount(place, weight * column) for column in (*columns.T, value)])
+    rows = both / np.sqrt(total)[:, np.newaxis]
+    solution, _, rank, _ = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=1e-9)
+    free = len(rows) - int(rank)
+    return float(((rows[:, -1] - rows[:, :-1] @ solution) ** 2).sum()) / free if free > 0 else np.nan
+
+
+def _blocks_of(times: Array, period: float | None) -> npt.NDArray[np.intp] | None:
+    """Block (d,) of each day in the order of time, from 0, none empty; None where a cycle needs too many of them."""
+    count = int(block_count(len(times)))
+    if period is not None:
+        count = max(count, int(np.ceil(BLOCKS_OF_PERIOD * np.ptp(times) / period)))
+        if count > MOST_BLOCKS:
+            return None
+    index = block_of(times, count, float(times.min()), float(times.max()))
+    return np.asarray(np.unique(index, return_inverse=True)[1])
+
+
+def _cut(place: npt.NDArray[np.intp], weight: Array, along: Array, value: Array, beside: Array) -> Blocks:
+    """Blocks whose line goes along a column instead of time."""
+    total = np.asarray(np.bincount(place, weight), dtype=np.float64)
+
+    def mean(column: Array) -> Array:
+        return np.asarray(np.bincount(place, weight * column) / total)[np.newaxis]
+
+    columns = np.stack([mean(column) for column in beside.T], axis=2) if beside.shape[1] else None
+    return Blocks(total[np.newaxis], mean(along), mean(value), np.array([float(len(place))]), columns)
+
+
 def _design(
     t: Array, channels: Mapping[str, npt.ArrayLike], cycles: Mapping[str, float], drift: bool
 ) -> tuple[tuple[str, ...], Array]:
@@ -130,6 +206,7 @@ def dependence(
     unit: Unit | None = None,
     channel_units: Mapping[str, Unit] | None = None,
     level: float = 0.95,
+    independent: bool = False,
 ) -> Dependence:
     """Coefficients of ``values`` (n,) on ``channels`` (each (n,)) and on ``cycles`` (name to period).
 
@@ -138,6 +215,8 @@ def dependence(
     ``DataError`` for a channel that never varies, terms that are exactly dependent, a cycle seen over less
     than half its period, too few runs, or non-finite values. Errors in the channels themselves are
     neglected: they pull a coefficient towards zero by the ratio of their variance to that of the channel.
+    Days that resemble each other are allowed for, unless they are known to be ``independent``. Measured false alarms:
+    docs/trials-statistics.md.
     """
     y = as_vector(values, "values", least=4)
     t = as_vector(times, "times", length=len(y))
@@ -147,6 +226,10 @@ def dependence(
     origin = float(t.mean())
     terms, design = _design(t, channels, cycles or {}, drift)
     fit = fit_with_days(y, design, run_u, index)
+    if not independent:
+        waves = [period for period in (cycles or {}).values() for _ in range(2)]
+        periods = [None] * (design.shape[1] - len(waves)) + waves
+        fit = _widened(fit, design, index, t, periods)
     weight = np.ones_like(y) if run_u is None else 1.0 / run_u**2
     about = y - np.average(y, weights=weight)
     total = float((weight * about**2).sum())

@@ -10,7 +10,7 @@ import operator
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from itertools import pairwise
 from typing import Any
 
@@ -69,7 +69,7 @@ def _value(text: str, column: str, kind: str) -> object:
         except ValueError:
             raise DataError(f"{column} is compared with {word!r}; it holds ISO 8601 times.") from None
         if moment.tzinfo is not None:
-            raise DataError(f"{column} is compared with {word!r}; give the time without an offset, in UTC.")
+            moment = moment.astimezone(UTC).replace(tzinfo=None)
         return np.datetime64(moment)
     return word
 

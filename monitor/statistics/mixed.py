@@ -31,6 +31,7 @@ class MixedFit:
     days in the unit of the values; ``repeated``: a day has several runs, so that the two are told apart. ``weight``
     (d,)
     are the weights of the days with it, in an arbitrary unit; ``residual`` (n,) is value less fitted line.
+    ``inside`` (q,) is the share of the variance of each coefficient that the scatter within days gives it.
     """
 
     coefficients: Array
@@ -42,6 +43,7 @@ class MixedFit:
     repeated: bool
     weight: Array
     residual: Array
+    inside: Array
 
     @property
     def u(self) -> Array:
@@ -154,6 +156,7 @@ def fit_with_days(y: Array, design: Array, u: Array | None, day: npt.NDArray[np.
         repeated=repeated,
         weight=np.asarray(total / (1.0 + variance * total)),
         residual=y - design @ coefficients,
+        inside=np.clip(within_part, 0.0, 1.0),
     )
 
 

@@ -64,6 +64,22 @@ def _reference(
     return (x - reference_runs.mean(axis=0)) / scale, inverse, m, neighbours
 
 
+#: A limit needs so many points more than parameters.
+POINTS_BEYOND_PARAMETERS = 4
+
+
+def _points_of(m: int, p: int, correlation: float) -> float:
+    """Points that a reference of ``m`` with a correlation of neighbours counts for in the limit of T².
+
+    Half-way from m to those that know a variance as well, (m - 1) (1 - r²) / (1 + r²) + 1 (M. S. Bartlett, J. R. Stat.
+    Soc. Suppl. 8 (1946) 27): alarms come in clusters, so that all of the way would leave next to none
+    (docs/trials-statistics.md).
+    """
+    square = correlation**2
+    effective = (m - 1.0) * (1.0 - square) / (1.0 + square) + 1.0
+    return min(float(m), max(0.5 * (m + effective), p + POINTS_BEYOND_PARAMETERS))
+
+
 def _quadratic(z: Array, inverse: Array) -> tuple[Array, Array]:
     """Quadratic form (n,) and what it loses without each parameter (n, p)."""
     turned = z @ inverse
@@ -76,16 +92,18 @@ def t_squared_chart(
     """T² of ``values`` (n, p) about a ``reference`` period (m, p), in any units; 1 / arl alarms a run.
 
     The limit is exact for new runs: p (m + 1) (m - 1) / (m (m - p)) F. Raises ``DataError`` unless
-    m >= p + 2. ``correlated``: neighbouring points may resemble each other. Source: N. D. Tracy, J. C. Young and R. L.
+    m >= p + 2. ``correlated``: neighbouring points may resemble each other, and the reference period then counts for
+    fewer points (``_points_of``). Source: N. D. Tracy, J. C. Young and R. L.
     Mason, J. Qual. Technol. 24 (1992) 88.
     """
-    z, inverse, m, _ = _reference(values, reference, correlated)
+    z, inverse, runs, neighbours = _reference(values, reference, correlated)
     p = z.shape[1]
     _wanted(arl)
     statistic, shares = _quadratic(z, inverse)
+    m = _points_of(runs, p, neighbours)
     factor = p * (m + 1.0) * (m - 1.0) / (m * (m - p))
     limit = float(factor * scipy.special.fdtri(p, m - p, 1.0 - 1.0 / arl))
-    return VectorChart("T²", m, statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
+    return VectorChart("T²", runs, statistic, limit, arl, np.flatnonzero(statistic > limit), shares)
 
 
 def mewma_chart(

@@ -16,7 +16,7 @@ from monitor.store.analyses import (
     save_analysis,
     stored_analyses,
 )
-from monitor.store.audit import AuditEntry, last_entries
+from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_entries
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
@@ -39,12 +39,14 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.curves import curve_names, is_curve, load_curve
+from monitor.store.database_name import check_database_name
 from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
 from monitor.store.history import MachineHistory, latest_tolerances, machine_history
 from monitor.store.identifications import (
     identification_by_number,
+    identification_numbers,
     list_identifications,
     list_parameters,
     load_identification,
@@ -77,14 +79,18 @@ from monitor.store.models import (
     list_models,
     load_model,
     model_history,
+    next_version,
     save_model,
 )
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
+from monitor.store.sharing import SharedDatabase
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
+from monitor.store.turns import Holder, Patience
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
+from monitor.store.workbook import export_workbook
 
 __all__ = [
     "NOTE",
@@ -94,14 +100,17 @@ __all__ = [
     "CampaignRow",
     "Database",
     "FleetSums",
+    "Holder",
     "Imported",
     "MachineDescription",
     "MachineEvent",
     "MachineHistory",
     "MachineModel",
+    "Patience",
     "QueryResult",
     "RecordedRun",
     "RunRow",
+    "SharedDatabase",
     "StoredAnalysis",
     "StoredCertificate",
     "StoredEvent",
@@ -114,23 +123,28 @@ __all__ = [
     "Withdrawal",
     "WithdrawnCampaign",
     "analysis_text",
+    "anchored_entry",
     "campaign_machines",
     "campaign_notes",
     "campaign_readings",
     "campaign_tolerances",
     "certificate_numbers",
+    "chain_faults",
     "check_analysis",
     "check_campaigns",
+    "check_database_name",
     "clear_refusals",
     "column_comments",
     "curve_names",
     "described_machines",
     "export_tables",
+    "export_workbook",
     "find_certificate",
     "find_selection",
     "fleet_sums",
     "followed_by",
     "identification_by_number",
+    "identification_numbers",
     "identified_runs",
     "import_campaign",
     "import_curve",
@@ -167,6 +181,7 @@ __all__ = [
     "machines_of_method",
     "mark_certificate",
     "model_history",
+    "next_version",
     "not_identified",
     "probing_counts",
     "record_event",

@@ -18,6 +18,8 @@ from monitor.store.connection import Database, utc_now
 
 #: What stands in the first entry for the hash of the entry before.
 NO_ENTRY_BEFORE = "0" * 64
+#: How far from its place an entry is looked for that was put elsewhere.
+_NEAR = 500
 
 _COLUMNS = (
     "entry, made_at, actor, action, subject, key, content_sha256, software_version, "
@@ -64,20 +66,45 @@ def last_entries(db: Database, count: int) -> tuple[AuditEntry, ...]:
 
 
 def chain_faults(db: Database) -> tuple[str, ...]:
-    """Return what is wrong with the chain, entry by entry; empty where nothing is."""
+    """Return what is wrong with the chain: which entry was edited, removed or put elsewhere; empty where nothing is."""
+    rows = db.rows(f"SELECT {_COLUMNS} FROM audit ORDER BY entry")
+    entry_of = {entry_sha256: values[0] for *values, entry_sha256 in rows}
     faults = []
-    previous = NO_ENTRY_BEFORE
-    for expected, row in enumerate(db.rows(f"SELECT {_COLUMNS} FROM audit ORDER BY entry"), start=1):
-        *values, entry_sha256 = row
-        if values[0] != expected:
-            faults.append(f"audit entry {expected} is missing")
-            break
+    previous, before = NO_ENTRY_BEFORE, 0
+    for *values, entry_sha256 in rows:
+        entry, follows = values[0], values[-1]
+        if entry != before + 1:
+            missing = f"{before + 1}" if entry == before + 2 else f"{before + 1} to {entry - 1}"
+            faults.append(f"audit entry {missing} is missing: it was removed, or given another number")
         if digest(*values) != entry_sha256:
-            faults.append(f"audit entry {expected} was altered")
-        if values[-1] != previous:
-            faults.append(f"audit entry {expected} does not follow the one before it")
-        previous = entry_sha256
+            number = _number_before(values, entry_sha256)
+            how = (
+                "it was edited" if number is None else f"it was written as entry {number}, and put elsewhere"
+            )
+            faults.append(f"audit entry {entry} was altered: {how}")
+        elif follows != previous and entry == before + 1:
+            place = f"entry {entry_of[follows]}" if follows in entry_of else "one that is gone"
+            faults.append(
+                f"audit entry {entry} does not follow the one before it: it was written behind {place}"
+            )
+        previous, before = entry_sha256, entry
     return tuple(faults)
+
+
+def _number_before(values: list[Any], entry_sha256: str) -> int | None:
+    """The number with which an entry fits its hash, among the next ones; None where it has none."""
+    near = range(max(1, values[0] - _NEAR), values[0] + _NEAR)
+    return next((number for number in near if digest(number, *values[1:]) == entry_sha256), None)
+
+
+def anchored_entry(db: Database, anchor: str) -> AuditEntry | None:
+    """Return the entry that a hash kept elsewhere is of; None where no entry has it."""
+    entries = db.records(
+        AuditEntry,
+        "SELECT entry, made_at, actor, action, subject, key, software_version FROM audit WHERE entry_sha256 = ?",
+        [anchor.strip().lower()],
+    )
+    return entries[0] if entries else None
 
 
 def _plain(value: Any) -> Any:

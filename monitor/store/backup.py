@@ -10,6 +10,7 @@ import hashlib
 import json
 import os
 import shutil
+import stat
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ import duckdb
 from monitor import __version__
 from monitor.exceptions import StoreError
 from monitor.store.connection import Database, utc_now
+from monitor.store.database_name import check_database_name
+from monitor.store.opening import sync_folder
 
 _MANIFEST_END = ".manifest.json"
 
@@ -44,18 +47,24 @@ def take_backup(db: Database, target: str | Path) -> Backup:
     Raises StoreError where the target exists or cannot be written, or the copy differs from the original.
     """
     target = Path(target)
+    check_database_name(str(target))
     _refuse_existing(target)
     partial = target.with_name(target.name + ".partial")
     _remove(partial)
     try:
         tables = _copy(db, partial)
+        os.chmod(partial, _mode(db.path))
         backup = Backup(
             target.name, _file_sha256(partial), utc_now().isoformat(), __version__, duckdb.__version__, tables
         )
-        _manifest(target).write_text(
-            json.dumps(asdict(backup), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-        )
+        # Both are on the disk before either has its name; the file has it last: without a manifest it is no backup.
+        manifest = _manifest(partial)
+        manifest.write_text(json.dumps(asdict(backup), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        for path in (partial, manifest):
+            _sync(path)
+        os.replace(manifest, _manifest(target))
         os.replace(partial, target)
+        sync_folder(target.absolute().parent)
     except (OSError, duckdb.Error) as fault:
         raise StoreError(f"the backup {target} could not be written: {fault}") from fault
     finally:
@@ -82,6 +91,7 @@ def restore(source: str | Path, target: str | Path) -> Backup:
     Raises StoreError without a manifest, where a byte differs from it, or where this software cannot open it.
     """
     source, target = Path(source), Path(target)
+    check_database_name(str(target))
     if not source.is_file():
         raise StoreError(f"there is no backup {source}")
     if not _manifest(source).is_file():
@@ -91,6 +101,7 @@ def restore(source: str | Path, target: str | Path) -> Backup:
     _refuse_existing(target)
     manifest = _read_manifest(_manifest(source))
     partial = target.with_name(target.name + ".partial")
+    _remove(partial)
     try:
         shutil.copyfile(source, partial)
         if _file_sha256(partial) != manifest.sha256:
@@ -102,7 +113,10 @@ def restore(source: str | Path, target: str | Path) -> Backup:
                 raise StoreError(
                     f"{source} is not what its manifest says: its tables differ; use another backup"
                 )
+        os.chmod(partial, 0o600)
+        _sync(partial)
         os.replace(partial, target)
+        sync_folder(target.absolute().parent)
     except OSError as fault:
         raise StoreError(f"{target} could not be written: {fault}") from fault
     finally:
@@ -160,8 +174,18 @@ def _refuse_existing(target: Path) -> None:
 
 
 def _remove(partial: Path) -> None:
-    for path in (partial, partial.with_name(partial.name + ".wal")):
+    for path in (partial, partial.with_name(partial.name + ".wal"), _manifest(partial)):
         path.unlink(missing_ok=True)
+
+
+def _mode(path: str) -> int:
+    """Who may read the database may read its backup; that of one in memory is its owner's."""
+    return 0o600 if path == ":memory:" else stat.S_IMODE(os.stat(path).st_mode) & 0o666
+
+
+def _sync(path: Path) -> None:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
 
 
 def _file_sha256(path: Path) -> str:

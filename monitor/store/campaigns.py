@@ -14,6 +14,7 @@ from monitor import __version__
 from monitor.exceptions import CampaignError, DataError, Fault
 from monitor.records import Campaign, CurveCampaign, Run, SourceFile
 from monitor.store import audit, campaign_runs, probings, record_json
+from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.curves import METHOD as CURVE
@@ -92,7 +93,7 @@ def import_campaign(db: Database, campaign: Campaign, notes: Sequence[str] = ())
         campaign_runs.insert_runs(db, campaign_id)
         probings.insert(db, campaign_id, rows)
         keep_fingerprints(db, campaign_id, run_fingerprints(campaign.probings))
-        audit.record(db, "import", "campaign", campaign.name, content)
+        _record(db, campaign.name, campaign_id, content)
         keep_notes(db, campaign_id, notes)
     return imported
 
@@ -109,9 +110,14 @@ def import_curve(db: Database, curve: CurveCampaign) -> Imported:
             if faults:
                 raise CampaignError(curve.name, faults)
             return Imported(curve.name, "unchanged", 0, 0, len(curve))
-        insert_curve(db, db.next_number("imported_campaign", "campaign_id"), curve, content)
-        audit.record(db, "import", "campaign", curve.name, content)
+        campaign_id = db.next_number("imported_campaign", "campaign_id")
+        insert_curve(db, campaign_id, curve, content)
+        _record(db, curve.name, campaign_id, content)
     return Imported(curve.name, "imported", 0, 0, len(curve))
+
+
+def _record(db: Database, name: str, campaign_id: int, content: str) -> None:
+    audit.record(db, "import", "campaign", name, with_bookkeeping(db, "campaign", campaign_id, content))
 
 
 def load_campaign(db: Database, name: str) -> Campaign:

@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from monitor.documents import IN_UTC, OMITTED
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import DataError, NotFoundError, did_you_mean
 from monitor.records import Machine
 from monitor.store.campaign_runs import imported_campaigns
 from monitor.store.connection import Database
@@ -108,9 +108,15 @@ def campaign_number(db: Database, name: str) -> int:
     numbers = db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [name])
     if not numbers:
         raise NotFoundError(
-            f"there is no campaign {name!r}; {_withdrawn(db, name)}{_what_is_there(db, 'campaign')}"
+            f"there is no campaign {name!r}; {_withdrawn(db, name)}{_what_is_there(db, 'campaign', name)}"
         )
-    return int(numbers[0][0])
+    number = int(numbers[0][0])
+    if not db.is_same_campaign(name, number):
+        raise DataError(
+            f"campaign {name!r} was withdrawn and imported again by somebody else meanwhile; what was computed of the "
+            "campaign of before is not stored: type the command again"
+        )
+    return number
 
 
 def _withdrawn(db: Database, name: str) -> str:
@@ -163,11 +169,16 @@ def _has_event(db: Database, machine: str) -> bool:
 
 
 def _no_machine(db: Database, machine: str) -> NotFoundError:
-    return NotFoundError(f"there is no machine {machine!r}; {_what_is_there(db, 'machine')}")
+    return NotFoundError(f"there is no machine {machine!r}; {_what_is_there(db, 'machine', machine)}")
 
 
-def _what_is_there(db: Database, table: str) -> str:
-    names = [name for (name,) in db.rows(f"SELECT {table} FROM {table} ORDER BY {table} LIMIT 21")]
+def _what_is_there(db: Database, table: str, name: str) -> str:
+    """What a table has instead of ``name``: the nearest, and the first twenty."""
+    names = [name for (name,) in db.rows(f"SELECT {table} FROM {table} ORDER BY {table}")]
     if not names:
         return f"the database {db.path} is still empty"
-    return "there are " + ", ".join(names[:20]) + (" and more" if len(names) > 20 else "")
+    return (
+        f"{did_you_mean(name, names)}there are "
+        + ", ".join(names[:20])
+        + (" and more" if len(names) > 20 else "")
+    )

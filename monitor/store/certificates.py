@@ -14,7 +14,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any, Literal
 
 from monitor import __version__
-from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.exceptions import DataError, InputError, NotFoundError, TakenNumberError
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
@@ -71,11 +71,13 @@ def save_certificate(
     runs: Sequence[int],
     record: Mapping[str, Any],
     pdf: bytes,
+    *,
+    unused: bool = False,
 ) -> None:
-    """Keep a document: a draft as often as one likes, an issued one once.
+    """Keep a document: a draft as often as one likes, an issued one once; ``unused`` asks for a number of its own.
 
-    Raises InputError where the number is issued, amended or withdrawn already, DataError for a record that is
-    not JSON, NotFoundError for an unknown campaign.
+    Raises TakenNumberError where a number that has to be unused is in use by now, InputError where it is issued,
+    amended or withdrawn already, DataError for a record that is not JSON, NotFoundError for an unknown campaign.
     """
     if not number.strip():
         raise InputError("a certificate needs a number")
@@ -85,6 +87,8 @@ def save_certificate(
         raise DataError(f"the record of certificate {number} cannot be kept as JSON: {fault}") from fault
     with db.transaction():
         campaign_id = campaign_number(db, campaign)
+        if unused and db.rows("SELECT 1 FROM certificate WHERE number = ? LIMIT 1", [number]):
+            raise TakenNumberError(f"the number {number} was given to another certificate meanwhile")
         _check_step(db, number, state)
         document = [text, pdf, hashlib.sha256(pdf).hexdigest()]
         _append(db, number, state, campaign_id, [int(run) for run in runs], document, "", None)

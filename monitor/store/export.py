@@ -2,42 +2,77 @@
 
 A folder with a file for every table and view, ``columns.csv`` with the meaning and unit of every column, and
 the imported files, byte for byte, under ``source_files/NUMBER OF THE CAMPAIGN/``. In CSV the maps and lists
-are text, and bytes are left out; Parquet has everything.
+are text, bytes are left out, and text that a spreadsheet would run as a formula begins with an apostrophe; Parquet
+has everything as it is. The folder gets its name when it is whole.
 """
 
 from __future__ import annotations
 
+import contextlib
+import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 import duckdb
 
-from monitor.exceptions import InputError, StoreError
+from monitor.exceptions import InputError, NotFoundError, StoreError, did_you_mean
+from monitor.store.catalogue import check_machine
 from monitor.store.connection import Database
 
+#: Texts that spreadsheets run as formulas (OWASP, CSV injection).
+_FORMULA = r"^[=+\-@\t\r]"
 _OPTIONS = {"csv": "FORMAT csv, HEADER", "parquet": "FORMAT parquet, COMPRESSION zstd"}
 
 
 def export_tables(
-    db: Database, folder: str | Path, form: Literal["csv", "parquet"] = "csv"
+    db: Database,
+    folder: str | Path,
+    form: Literal["csv", "parquet"] = "csv",
+    *,
+    tables: Sequence[str] | None = None,
+    machine: str | None = None,
 ) -> tuple[Path, ...]:
     """Write all tables, views and imported files into a new or empty folder; the files written.
 
-    Raises InputError for another form or a folder that is not empty, StoreError where it cannot be written.
+    With ``tables`` those alone; with ``machine`` the rows of one machine of those that name it. Imported files come
+    with a whole export only. Raises InputError for another form or a folder that is not empty, NotFoundError for a
+    table or machine that is not there, StoreError where it cannot be written.
     """
     if form not in _OPTIONS:
         raise InputError(f"a database is exported as csv or parquet, not {form!r}")
     folder = Path(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} is not an empty folder; name a new one")
+    if machine is not None:
+        check_machine(db, machine)
+    chosen = _chosen(db, tables, machine)
+    partial = folder.with_name(folder.name + ".partial")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        written = [_copy(db, name, folder, form) for name in _names(db)]
-        written.append(_columns(db, folder))
-        written += _source_files(db, folder)
-    except (OSError, duckdb.IOException) as fault:
+        _remove(partial)
+        partial.mkdir(parents=True, mode=0o700)
+        (partial / _MARK).touch()
+        written = [_copy(db, name, partial, form, machine) for name in chosen]
+        written.append(_columns(db, partial))
+        if tables is None and machine is None:
+            written += _source_files(db, partial)
+        (partial / _MARK).unlink()
+        partial.replace(folder)
+    except (OSError, StoreError, duckdb.IOException) as fault:
+        with contextlib.suppress(OSError):
+            _remove(partial)
         raise StoreError(f"the export to {folder} could not be written: {fault}") from fault
-    return tuple(written)
+    return tuple(folder / file.relative_to(partial) for file in written)
+
+
+def _remove(partial: Path) -> None:
+    """Remove what an export left that was killed; nothing that is not marked as such."""
+    if (partial / _MARK).is_file() and not partial.is_symlink():
+        shutil.rmtree(partial)
+
+
+#: In a folder that is not whole yet.
+_MARK = ".unfinished-export"
 
 
 def _names(db: Database) -> list[str]:
@@ -50,7 +85,31 @@ def _names(db: Database) -> list[str]:
     ]
 
 
-def _copy(db: Database, name: str, folder: Path, form: str) -> Path:
+def _chosen(db: Database, tables: Sequence[str] | None, machine: str | None) -> list[str]:
+    """The tables that are asked for; of one machine without names every view that has a machine."""
+    names = _names(db)
+    if tables is None and machine is not None:
+        return [name for name in names if name.startswith("v_") and _has_machine(db, name)]
+    chosen = [name if name in names else f"v_{name}" for name in (names if tables is None else tables)]
+    for asked, name in zip(tables or names, chosen, strict=True):
+        if name not in names:
+            raise NotFoundError(
+                f"there is no table {asked!r}; {did_you_mean(asked, names)}there are {', '.join(names)}"
+            )
+    return chosen
+
+
+def _has_machine(db: Database, name: str) -> bool:
+    return bool(
+        db.rows(
+            "SELECT 1 FROM duckdb_columns() WHERE database_name = current_database() AND table_name = ? "
+            "AND column_name = 'machine'",
+            [name],
+        )
+    )
+
+
+def _copy(db: Database, name: str, folder: Path, form: str, machine: str | None) -> Path:
     path = folder / f"{name}.{form}"
     columns = []
     for column, kind in db.rows(
@@ -60,13 +119,25 @@ def _copy(db: Database, name: str, folder: Path, form: str) -> Path:
     ):
         if form == "csv" and kind == "BLOB":
             continue
-        columns.append(
-            f'to_json("{column}") AS "{column}"' if form == "csv" and "MAP" in kind else f'"{column}"'
-        )
-    # The names come from the catalogue; the path is the only text of the user's.
+        columns.append(_column(column, kind) if form == "csv" else f'"{column}"')
+    # The names come from the catalogue; path and machine, which COPY cannot bind, are quoted.
     literal = str(path).replace("'", "''")
-    db.execute(f"COPY (SELECT {', '.join(columns)} FROM \"{name}\") TO '{literal}' ({_OPTIONS[form]})")
+    where = ""
+    if machine is not None and _has_machine(db, name):
+        where = " WHERE machine = '{}'".format(machine.replace("'", "''"))
+    db.execute(f"COPY (SELECT {', '.join(columns)} FROM \"{name}\"{where}) TO '{literal}' ({_OPTIONS[form]})")
     return path
+
+
+def _column(column: str, kind: str) -> str:
+    """A column as CSV has it: maps as JSON, and no text that a spreadsheet takes for a formula."""
+    if "MAP" in kind:
+        return f'to_json("{column}") AS "{column}"'
+    if kind == "VARCHAR":
+        quote = "''''"  # one apostrophe, as SQL writes it
+        is_formula = f"regexp_matches(\"{column}\", '{_FORMULA}')"
+        return f'CASE WHEN {is_formula} THEN {quote} || "{column}" ELSE "{column}" END AS "{column}"'
+    return f'"{column}"'
 
 
 def _columns(db: Database, folder: Path) -> Path:

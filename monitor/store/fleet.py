@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -357,6 +358,15 @@ def fleet_sums(
     2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the last bits from one time to the next.
     ``cut`` says how the history of a machine is cut into blocks. Raises NotFoundError where nothing was identified.
     """
+    with db.reading():
+        epoch_d, columns, of_blocks = _summed(db, model, version, cut)
+    return _sums(columns, _blocks(of_blocks, columns), epoch_d)
+
+
+def _summed(
+    db: Database, model: str | None, version: int | None, cut: BlockCut
+) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """First day, columns of all cells and of their blocks, by way of tables that live as long as the connection."""
     for statement in (_MACHINES, _HEADINGS, _MODELS, _OWN):
         db.execute(statement)
     db.execute(_CHOSEN, {"model": model, "version": version})
@@ -374,7 +384,7 @@ def fleet_sums(
     )
     for name in _TABLES:
         db.execute(f"DROP TABLE IF EXISTS fleet_{name}")
-    return _sums(columns, _blocks(of_blocks, columns), epoch_d)
+    return epoch_d, columns, of_blocks
 
 
 def _blocks(

@@ -13,6 +13,7 @@ import numpy as np
 from monitor import __version__
 from monitor.exceptions import NotFoundError
 from monitor.store import audit, identified_values
+from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.results import (
@@ -56,11 +57,13 @@ def save_identification(db: Database, identification: StoredIdentification) -> i
         for run in identification.runs:
             _insert_run(db, number, run)
         _insert_values(db, number, identification)
+        _insert_frames(db, number, identification)
         identified_values.insert_values(db, number, identification)
         _insert_residuals(db, number, identification.runs)
-        audit.record(
-            db, "save", "identification", str(number), identification_content(number, identification)
+        content = with_bookkeeping(
+            db, "identification", number, identification_content(number, identification)
         )
+        audit.record(db, "save", "identification", str(number), content)
     return number
 
 
@@ -119,6 +122,9 @@ def identification_by_number(db: Database, number: int) -> StoredIdentification:
         tuple(parameters),
         tuple(Unit(name, factor) for name, factor in zip(units, factors, strict=True)),
         _runs(db, number, len(parameters)),
+        dict(
+            db.rows("SELECT parameter, refers_to FROM parameter_frame WHERE identification_id = ?", [number])
+        ),
     )
 
 
@@ -140,6 +146,18 @@ def list_parameters(
         "ORDER BY started_at, campaign, run, model, model_version, parameter",
         {"machine": machine, "campaign": campaign, "parameter": parameter},
     )
+
+
+def identification_numbers(db: Database, software_version: str) -> list[int]:
+    """Return the numbers of the identifications that a version made of campaigns that count."""
+    return [
+        int(number)
+        for (number,) in db.rows(
+            "SELECT identification_id FROM identification AS i JOIN campaign USING (campaign_id) "
+            "WHERE i.software_version = ? ORDER BY ALL",
+            [software_version],
+        )
+    ]
 
 
 def stored_identification_content(db: Database, number: int) -> str:
@@ -180,6 +198,14 @@ def _insert_run(db: Database, number: int, run: StoredRun) -> None:
 def _insert_values(db: Database, number: int, identification: StoredIdentification) -> None:
     incoming = _values(identification)
     db.insert("INSERT INTO parameter_value SELECT ?, * FROM incoming", incoming, [number])
+
+
+def _insert_frames(db: Database, number: int, identification: StoredIdentification) -> None:
+    if identification.refers_to:
+        names = np.array(list(identification.refers_to), dtype=object)
+        words = np.array(list(identification.refers_to.values()), dtype=object)
+        incoming = {"parameter": names, "refers_to": words}
+        db.insert("INSERT INTO parameter_frame SELECT ?, * FROM incoming", incoming, [number])
 
 
 def _values(identification: StoredIdentification) -> dict[str, Any]:

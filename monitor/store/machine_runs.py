@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import NotFoundError, did_you_mean
 from monitor.store.campaign_runs import run_rows
 from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
@@ -96,7 +96,8 @@ def check_campaigns(db: Database, campaigns: tuple[str, ...]) -> None:
     names = [str(name) for (name,) in db.rows("SELECT campaign FROM campaign ORDER BY campaign")]
     for name in campaigns:
         if name not in names:
-            raise NotFoundError(f"there is no campaign '{name}'; there are {', '.join(names[:20])}")
+            hint = did_you_mean(name, names)
+            raise NotFoundError(f"there is no campaign '{name}'; {hint}there are {', '.join(names[:20])}")
 
 
 def campaign_tolerances(db: Database, campaign: str) -> dict[str, float]:

@@ -9,6 +9,7 @@ Two statements are not run as their files have them: see ``gathering``.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import re
 from collections.abc import Sequence
@@ -151,7 +152,9 @@ def _apply(connection: duckdb.DuckDBPyConnection, migration: Migration) -> None:
         )
         connection.commit()
     except duckdb.Error as fault:
-        connection.rollback()
+        # A commit that found the disk full has rolled back already.
+        with contextlib.suppress(duckdb.Error):
+            connection.rollback()
         raise StoreError(f"the migration {migration.name} failed and left nothing: {fault}") from fault
 
 

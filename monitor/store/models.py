@@ -8,8 +8,9 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from monitor import __version__
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError, NotFoundError, did_you_mean
 from monitor.store import audit
+from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.connection import Database, utc_now
 
 if TYPE_CHECKING:
@@ -36,6 +37,39 @@ class StoredModel:
 _SELECT = "SELECT model, version, parent, parent_version, effects, added, removed, note, created_at FROM model WHERE "
 
 
+def next_version(
+    db: Database,
+    name: str,
+    effects: Sequence[str],
+    *,
+    parent: tuple[str, int] | None = None,
+    note: str = "",
+) -> StoredModel:
+    """Return the version that ``save_model`` would store: the next of its name, or the one that is there already.
+
+    Raises InputError for an empty name or an effect listed twice, NotFoundError for an unknown parent.
+    """
+    if not name.strip():
+        raise InputError("a model needs a name")
+    twice = sorted({effect for effect in effects if list(effects).count(effect) > 1})
+    if twice:
+        raise InputError(f"the model {name} lists an effect twice: {', '.join(twice)}")
+    versions = _select(db, "model = ? ORDER BY version DESC", [name])
+    if versions and versions[0].effects == tuple(effects):
+        return versions[0]
+    before = load_model(db, *parent).effects if parent else ()
+    return StoredModel(
+        name,
+        versions[0].version + 1 if versions else 1,
+        parent,
+        tuple(effects),
+        tuple(effect for effect in effects if effect not in before) if parent else (),
+        tuple(effect for effect in before if effect not in effects),
+        note,
+        utc_now(),
+    )
+
+
 def save_model(
     db: Database,
     name: str,
@@ -46,28 +80,12 @@ def save_model(
 ) -> StoredModel:
     """Store a model under the next version of its name; the same effects again are the version that is there.
 
-    Raises InputError for an empty name or an effect listed twice, NotFoundError for an unknown parent.
+    Raises as ``next_version``.
     """
-    if not name.strip():
-        raise InputError("a model needs a name")
-    twice = sorted({effect for effect in effects if list(effects).count(effect) > 1})
-    if twice:
-        raise InputError(f"the model {name} lists an effect twice: {', '.join(twice)}")
     with db.transaction():
-        versions = _select(db, "model = ? ORDER BY version DESC", [name])
-        if versions and versions[0].effects == tuple(effects):
-            return versions[0]
-        before = load_model(db, *parent).effects if parent else ()
-        model = StoredModel(
-            name,
-            versions[0].version + 1 if versions else 1,
-            parent,
-            tuple(effects),
-            tuple(effect for effect in effects if effect not in before) if parent else (),
-            tuple(effect for effect in before if effect not in effects),
-            note,
-            utc_now(),
-        )
+        model = next_version(db, name, effects, parent=parent, note=note)
+        if _select(db, "model = ? AND version = ?", [name, model.version]):
+            return model
         parent_name, parent_version = parent or (None, None)
         db.execute(
             "INSERT INTO model VALUES (?, ?, ?, ?, ?::VARCHAR[], ?::VARCHAR[], ?::VARCHAR[], ?, ?, ?)",
@@ -84,7 +102,8 @@ def save_model(
                 model.created_at,
             ],
         )
-        audit.record(db, "save", "model", model_key(name, model.version), model_content(model))
+        key = model_key(name, model.version)
+        audit.record(db, "save", "model", key, with_bookkeeping(db, "model", key, model_content(model)))
     return model
 
 
@@ -100,7 +119,7 @@ def load_model(db: Database, name: str, version: int | None = None) -> StoredMod
     existing = (
         f"there are {', '.join(names)}" if names else "there is none yet; `monitor identify` makes the first"
     )
-    raise NotFoundError(f"there is no model {name!r}; {existing}")
+    raise NotFoundError(f"there is no model {name!r}; {did_you_mean(name, names)}{existing}")
 
 
 def model_history(db: Database, name: str, version: int | None = None) -> tuple[StoredModel, ...]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +37,10 @@ class StoredRun:
 
 @dataclass(frozen=True)
 class StoredIdentification:
-    """An identification of a campaign by a version of a model: ``parameters`` and display ``units``, k each."""
+    """An identification of a campaign by a version of a model: ``parameters`` and display ``units``, k each.
+
+    ``refers_to`` says in words, by name, what the errors of the chain are stated relative to.
+    """
 
     campaign: str
     model: str
@@ -45,6 +49,7 @@ class StoredIdentification:
     parameters: tuple[str, ...]
     units: tuple[Unit, ...]
     runs: tuple[StoredRun, ...]
+    refers_to: Mapping[str, str] = field(default_factory=dict)
 
 
 def identification_content(number: int, identification: StoredIdentification) -> str:
@@ -69,6 +74,8 @@ def identification_content(number: int, identification: StoredIdentification) ->
             ]
             for run in identification.runs
         ],
+        # Nothing is added for those of before frames were stored: their hashes are the old ones.
+        *([sorted(identification.refers_to.items())] if identification.refers_to else []),
     )
 
 

@@ -12,7 +12,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from monitor import __version__
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError, NotFoundError, did_you_mean
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
@@ -73,9 +73,10 @@ def find_selection(db: Database, name: str, campaign: str | None = None) -> Stor
             f"{other} (of {owner})"
             for other, owner in db.rows("SELECT selection, campaign FROM v_selections ORDER BY ALL LIMIT 21")
         ]
+        others = [other for (other,) in db.rows("SELECT DISTINCT selection FROM v_selections")]
         of = "" if campaign is None else f" of campaign {campaign}"
         raise NotFoundError(
-            f"there is no selection {name!r}{of}; "
+            f"there is no selection {name!r}{of}; {did_you_mean(name, others)}"
             + (
                 f"there are {', '.join(existing[:20])}{' and more' if len(existing) > 20 else ''}"
                 if existing

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from monitor.exceptions import MonitorError
 from monitor.store import audit
 from monitor.store.analyses import analysis_content
+from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.campaign_runs import run_list_faults
 from monitor.store.campaigns import stored_content
 from monitor.store.certificates import certificate_faults
@@ -26,6 +27,7 @@ from monitor.store.indexes import index_faults
 from monitor.store.machine_models import machine_model_content
 from monitor.store.models import all_models, model_content, model_key
 from monitor.store.refusals import cleared_content, refusal_content
+from monitor.store.schema import schema_faults
 from monitor.store.selections import selection_content
 from monitor.store.withdrawals import withdrawal_content
 
@@ -53,6 +55,7 @@ def verify_audit(db: Database) -> Verification:
         *_machine_faults(db),
         *run_list_faults(db),
         *index_faults(db),
+        *schema_faults(db),
     ]
     audited = {}
     imports: Counter[str] = Counter()
@@ -61,21 +64,37 @@ def verify_audit(db: Database) -> Verification:
             imports[key] += 1
             key = _of_several(key, imports[key])
         audited[subject, key] = content
-    stored = dict(_contents(db))
+    stored = {(content.subject, content.key): content for content in _contents(db)}
     for subject, key in sorted(audited.keys() | stored.keys()):
         name = f"{subject} {key}"
         if (subject, key) not in stored:
             faults.append(f"{name} is in the audit, but no longer in the database")
         elif (subject, key) not in audited:
             faults.append(f"{name} is in the database, but not in the audit")
-        elif audited[subject, key] != stored[subject, key]:
+        elif audited[subject, key] not in stored[subject, key].hashes(db):
             faults.append(f"{name} was altered after it was stored")
     last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
     entries, last_sha256 = last[0] if last else (0, audit.NO_ENTRY_BEFORE)
     return Verification(entries, last_sha256, tuple(faults))
 
 
-def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
+@dataclass(frozen=True)
+class _Content:
+    """What is stored of a subject of the audit: its key there, its number in the tables, the hash of its content."""
+
+    subject: str
+    key: str
+    sha256: str
+    number: int | str = ""
+
+    def hashes(self, db: Database) -> tuple[str, ...]:
+        """Return the hashes that an entry may hold: with the books, and as before without; none of the unreadable."""
+        return (
+            (with_bookkeeping(db, self.subject, self.number, self.sha256), self.sha256) if self.sha256 else ()
+        )
+
+
+def _contents(db: Database) -> Iterator[_Content]:
     imports: Counter[str] = Counter()
     for number, name in db.rows("SELECT campaign_id, campaign FROM imported_campaign ORDER BY campaign_id"):
         imports[name] += 1
@@ -84,35 +103,36 @@ def _contents(db: Database) -> Iterator[tuple[tuple[str, str], str]]:
         except (MonitorError, ValueError, KeyError, TypeError):
             # What can no longer be read was altered, too; the empty hash agrees with nothing.
             content = ""
-        yield ("campaign", _of_several(name, imports[name])), content
+        yield _Content("campaign", _of_several(name, imports[name]), content, number)
     for model in all_models(db):
-        yield ("model", model_key(model.name, model.version)), model_content(model)
+        key = model_key(model.name, model.version)
+        yield _Content("model", key, model_content(model), key)
     for (number,) in db.rows("SELECT identification_id FROM identification ORDER BY ALL"):
         try:
             content = stored_identification_content(db, number)
         except (MonitorError, ValueError, KeyError, TypeError):
             content = ""
-        yield ("identification", str(number)), content
+        yield _Content("identification", str(number), content, number)
     for (number,) in db.rows("SELECT analysis_id FROM analysis ORDER BY ALL"):
-        yield ("analysis", str(number)), analysis_content(db, number)
+        yield _Content("analysis", str(number), analysis_content(db, number))
     for (number,) in db.rows("SELECT event_id FROM event ORDER BY ALL"):
-        yield ("event", str(number)), event_content(db, number)
+        yield _Content("event", str(number), event_content(db, number))
     for (number,) in db.rows("SELECT selection_id FROM selection ORDER BY ALL"):
-        yield ("selection", str(number)), selection_content(db, number)
+        yield _Content("selection", str(number), selection_content(db, number))
     for (number,) in db.rows("SELECT choice_id FROM machine_model ORDER BY ALL"):
-        yield ("machine model", str(number)), machine_model_content(db, number)
+        yield _Content("machine model", str(number), machine_model_content(db, number))
     for (number,) in db.rows("SELECT refusal_id FROM refused_import ORDER BY ALL"):
-        yield ("refused import", str(number)), refusal_content(db, number)
+        yield _Content("refused import", str(number), refusal_content(db, number))
     for (number,) in db.rows("SELECT refusal_id FROM refusal_cleared ORDER BY ALL"):
-        yield ("cleared refusal", str(number)), cleared_content(db, number)
+        yield _Content("cleared refusal", str(number), cleared_content(db, number))
     for (number,) in db.rows("SELECT DISTINCT campaign_id FROM import_note ORDER BY ALL"):
-        yield ("import notes", str(number)), notes_content(db, number)
+        yield _Content("import notes", str(number), notes_content(db, number))
     for (number,) in db.rows("SELECT campaign_id FROM withdrawn_campaign ORDER BY ALL"):
-        yield ("withdrawn campaign", str(number)), withdrawal_content(db, number)
+        yield _Content("withdrawn campaign", str(number), withdrawal_content(db, number))
     for number, entry, content in db.rows(
         "SELECT number, entry, entry_sha256 FROM certificate ORDER BY entry"
     ):
-        yield ("certificate", f"{number} entry {entry}"), content
+        yield _Content("certificate", f"{number} entry {entry}", content)
 
 
 def _of_several(name: str, nth: int) -> str:

@@ -49,6 +49,7 @@ def withdraw_campaign(db: Database, name: str, reason: str) -> Withdrawal:
             "SELECT number FROM v_certificates WHERE campaign_id = ? AND state IN ('draft', 'issued') ORDER BY number",
             [campaign_id],
         )
+    db.forget_campaigns()
     return Withdrawal(name, machine, reason.strip(), at, tuple(str(number) for (number,) in resting))
 
 

@@ -1,6 +1,6 @@
 """The contract of the product: every question that can be asked, as a function of a typed request with a typed answer.
 
-The faces (the command line today; a Python interface, HTTP and pages to come) ask nothing else. A question is named by
+The faces (the command line, Python, HTTP and pages) ask nothing else. A question is named by
 the place of its function and loaded when it is asked, so that to list the contract loads neither solver nor engine; its
 types are the annotations of the function.
 """
@@ -53,6 +53,7 @@ QUESTIONS = {
         "audit": "keeping:audit",
         "backup": "keeping:backup",
         "campaigns": "intake.campaigns:campaigns",
+        "certificate template": "certificate.template:write_template",
         "certificates": "certificate.states:list_certificates",
         "compare": "explain.compare:compare",
         "digital certificate": "certificate.states:write_digital",
@@ -75,10 +76,12 @@ QUESTIONS = {
         "models": "model.show:list_all_models",
         "plan": "plan.plan:plan",
         "poses": "kinematics:poses",
+        "predict": "predict.predict:predict",
         "readings": "query:readings",
         "remake certificate": "certificate.remaking:remake",
         "remove effect": "model.change:remove_effect",
         "report": "health.report:report",
+        "residuals": "explain.residual_vectors:residual_vectors",
         "restore": "keeping:restore_backup",
         "runs": "intake.campaigns:runs",
         "select": "selections.select:select",
@@ -86,11 +89,14 @@ QUESTIONS = {
         "selections side by side": "selections.side_by_side:side_by_side",
         "show certificate": "certificate.states:show_certificate",
         "simulate": "simulation:simulate",
+        "simulate like a folder": "likeness:simulate_like",
+        "simulate like a campaign": "likeness:simulate_like_stored",
         "sql": "query:sql",
         "statistics": "run_statistics.statistics:stats",
         "trend": "trend.trends:trend",
         "uncertainty": "uncertainty.evaluation:uncertainty",
         "use model": "model.use:use_model",
+        "values": "history.values:values_of_machine",
         "verify": "keeping:verify",
         "verify certificate": "certificate.verification:verify_file",
         "withdraw campaign": "intake.withdrawals:withdraw",

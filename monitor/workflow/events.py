@@ -25,7 +25,7 @@ class EventRequest:
     def __post_init__(self) -> None:
         if self.at is not None and self.at.tzinfo is None:
             at = self.at.isoformat()
-            raise InputError(f"--at {at} lacks its offset from UTC: write for example {at}-05:00")
+            raise InputError(f"the moment {at} lacks its offset from UTC, such as {at}-05:00")
         if self.text is None:
             return
         if not self.text.strip():
@@ -48,6 +48,9 @@ def event(db: Database, request: EventRequest) -> EventAnswer:
     check_machine(db, request.machine)
     if request.text is not None:
         if request.at is None:
-            raise InputError("say when it happened: --at 2026-03-05T07:00:00-05:00")
+            raise InputError(
+                "say when it happened: --at 2026-03-05T07:00:00-05:00, or --at '2026-03-05 07:00' "
+                "in the time of this computer"
+            )
         record_event(db, request.machine, request.at, request.kind, request.text)
     return EventAnswer(list_events(db, request.machine))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
@@ -33,6 +34,7 @@ from monitor.store import (
 from monitor.units import MICROMETRE
 from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.drift import SHORTEST_DAYS
+from monitor.workflow.history.weekly_looks import WeeklyNotices, weekly_notices
 from monitor.workflow.models import resolve
 from monitor.workflow.trend.volumetric import VOLUMETRIC
 
@@ -54,11 +56,13 @@ STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
 class FleetRequest:
     """Every machine and parameter under a model (by default that which each machine is followed by).
 
-    ``top`` rows are listed (0: all).
+    ``top`` rows are listed (0: all). ``weekly_looks`` adds what looks at all of them every week noticed, each
+    machine by the model that it is followed by.
     """
 
     model: str | None = None
     top: int = 20
+    weekly_looks: bool = False
 
     def __post_init__(self) -> None:
         if self.top < 0:
@@ -113,6 +117,7 @@ class FleetAnswer:
     attention: Mapping[str, int]
     not_identified: tuple[str, ...]
     table: tuple[FleetTableRow, ...]
+    weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
 
 
 def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
@@ -290,6 +295,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         table=tuple(
             replace(row, rank=rank) for rank, row in enumerate(ranked[: request.top or None], start=1)
         ),
+        weekly_looks=weekly_notices(db) if request.weekly_looks else None,
     )
 
 

@@ -2,43 +2,94 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from monitor.documents import OMITTED
 from monitor.exceptions import InputError
 from monitor.store import (
     AuditEntry,
     Database,
+    anchored_entry,
+    chain_faults,
     export_tables,
+    export_workbook,
     last_entries,
     restore,
     take_backup,
     verify_audit,
 )
+from monitor.workflow.recomputed import recompute
 
 
 @dataclass(frozen=True)
 class VerifyAnswer:
-    """Whether the database is as it was written, with the hash of the last audit entry to be noted elsewhere."""
+    """Whether the database is as it was written, with the hash of the last audit entry to be noted elsewhere.
+
+    ``anchored_entry`` is the entry that the hash kept elsewhere is of, ``recomputed`` how many identifications were
+    computed anew.
+    """
 
     ok: bool
     entries: int
     last_sha256: str
     faults: tuple[str, ...]
+    anchored_entry: int | None = None
+    recomputed: int = 0
 
 
-def verify(db: Database) -> VerifyAnswer:
-    """Hash everything that is stored anew and compare it with the audit."""
-    verification = verify_audit(db)
-    return VerifyAnswer(verification.ok, verification.entries, verification.last_sha256, verification.faults)
+@dataclass(frozen=True)
+class VerifyRequest:
+    """What is verified besides the database itself.
+
+    ``anchor`` is a hash of the chain that was kept elsewhere: on paper, on a certificate or in a report. ``recompute``
+    is how many identifications, drawn by the last hash, are computed anew. Raises InputError for what is no hash or
+    number.
+    """
+
+    anchor: str | None = None
+    recompute: int = 3
+
+    def __post_init__(self) -> None:
+        if self.anchor is not None and not re.fullmatch(r"\s*[0-9a-fA-F]{64}\s*", self.anchor):
+            raise InputError(f"--anchor {self.anchor}: a hash of the audit has 64 hexadecimal digits")
+        if not 0 <= self.recompute < 2**31:
+            raise InputError(f"--recompute {self.recompute}: how many identifications, 0 for none")
+
+
+def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
+    """Hash everything that is stored anew, compare it with the audit, and compute some identifications again."""
+    with db.reading():
+        verification = verify_audit(db)
+        faults = list(verification.faults)
+        entry = None
+        if request.anchor is not None:
+            anchored = anchored_entry(db, request.anchor)
+            entry = None if anchored is None else anchored.entry
+            if anchored is None:
+                faults.append(
+                    f"no entry of the audit has the hash {request.anchor.strip()}, which was kept elsewhere: the "
+                    "database was rewritten since, put back to an earlier state, or it is another database"
+                )
+    # Computed outside: nobody waits for a fit.
+    recomputed, different = recompute(db, verification.last_sha256, request.recompute)
+    faults += different
+    return VerifyAnswer(
+        not faults, verification.entries, verification.last_sha256, tuple(faults), entry, recomputed
+    )
 
 
 @dataclass(frozen=True)
 class AuditRequest:
-    """How many of the last entries to list. Raises InputError where it is not a whole number from 1 on."""
+    """How many of the last entries to list, and whether to ``check`` the chain of all.
+
+    Raises InputError where ``last`` is not a whole number from 1 on.
+    """
 
     last: int
+    check: bool = False
 
     def __post_init__(self) -> None:
         if not 0 < self.last < 2**63:
@@ -47,14 +98,15 @@ class AuditRequest:
 
 @dataclass(frozen=True)
 class AuditAnswer:
-    """Entries of the audit, the newest first."""
+    """Entries of the audit, the newest first; ``faults`` names entries that were edited, removed or put elsewhere."""
 
     entries: tuple[AuditEntry, ...]
+    faults: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 
 
 def audit(db: Database, request: AuditRequest) -> AuditAnswer:
-    """List the last entries of the audit, the newest first."""
-    return AuditAnswer(last_entries(db, request.last))
+    """List the last entries of the audit, the newest first, and what is wrong with the chain where that is asked."""
+    return AuditAnswer(last_entries(db, request.last), chain_faults(db) if request.check else None)
 
 
 @dataclass(frozen=True)
@@ -76,7 +128,8 @@ class BackupAnswer:
 
 def backup(db: Database, request: BackupRequest) -> BackupAnswer:
     """Copy everything into a second file. Raises StoreError where it exists or cannot be written."""
-    copy = take_backup(db, request.target)
+    with db.reading():
+        copy = take_backup(db, request.target)
     rows = sum(count for count, _ in copy.tables.values())
     return BackupAnswer(
         file=request.target,
@@ -112,10 +165,20 @@ def restore_backup(request: RestoreRequest) -> RestoreAnswer:
 
 @dataclass(frozen=True)
 class ExportRequest:
-    """A new or empty folder for the tables, and their format."""
+    """A new or empty folder for the tables, and their format; a workbook (xlsx) may be named itself.
+
+    ``tables`` are the names of the tables that are wanted (default: all, of a workbook those for people), ``machine``
+    is the only machine whose rows are written.
+    """
 
     folder: Path
-    format: Literal["csv", "parquet"] = "csv"
+    format: Literal["csv", "parquet", "xlsx"] = "csv"
+    tables: tuple[str, ...] | None = None
+    machine: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.tables is not None and not all(name.strip() for name in self.tables):
+            raise InputError("--tables: write names with commas between them, such as parameters,runs")
 
 
 @dataclass(frozen=True)
@@ -126,5 +189,15 @@ class ExportAnswer:
 
 
 def export(db: Database, request: ExportRequest) -> ExportAnswer:
-    """Write all tables as files. Raises InputError for a folder that is not empty, StoreError."""
-    return ExportAnswer(export_tables(db, request.folder, request.format))
+    """Write tables as files or a workbook. Raises InputError for what exists already, NotFoundError, StoreError."""
+    with db.reading():
+        if request.format == "xlsx":
+            file = (
+                request.folder
+                if request.folder.suffix.lower() == ".xlsx"
+                else request.folder / "monitor.xlsx"
+            )
+            return ExportAnswer((export_workbook(db, file, request.tables, request.machine),))
+        return ExportAnswer(
+            export_tables(db, request.folder, request.format, tables=request.tables, machine=request.machine)
+        )

@@ -6,7 +6,7 @@ A model is the complete set of base effects of the method (free in every run) an
 
 from __future__ import annotations
 
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError, NotFoundError, did_you_mean
 from monitor.methods import methods
 from monitor.methods.model import Model
 from monitor.records import Campaign, CurveCampaign
@@ -27,7 +27,10 @@ def resolve(db: Database, name: str | None, method: str = "") -> StoredModel:
         if list_models(db).empty:
             if model in methods():
                 raise NotFoundError(f"model '{model}' has no version {version}; it has 1") from error
-            raise NotFoundError(f"there is no model '{model}'; there are {', '.join(methods())}") from error
+            hint = did_you_mean(model, methods())
+            raise NotFoundError(
+                f"there is no model '{model}'; {hint}there are {', '.join(methods())}"
+            ) from error
         raise
 
 

@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
+
 import numpy as np
 from scipy import signal, stats
 
@@ -14,6 +17,7 @@ from monitor.statistics import (
     brown_forsythe,
     correlated_reference,
     cusum_chart,
+    dependence,
     ewma_chart,
     find_changes,
     individuals_chart,
@@ -23,7 +27,7 @@ from monitor.statistics import (
     t_squared_chart,
     welch_anova,
 )
-from monitor.statistics.before_after import before_after
+from monitor.statistics.before_after import OtherDays, before_after
 from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
 
 SEED = 20261122
@@ -47,8 +51,10 @@ def first_order(rng: np.random.Generator, count: int, n: int, r: float) -> np.nd
     return np.asarray(signal.lfilter([1.0], [1.0, -r], steps, axis=1))
 
 
-def slope_rate(values: np.ndarray, t: np.ndarray, cycle: float | None = YEAR) -> float:
-    """Share of series (c, n) of day means whose slope is called at 5 %."""
+def slope_rate(
+    values: np.ndarray, t: np.ndarray, cycle: float | None = YEAR, beside: np.ndarray | None = None
+) -> float:
+    """Share of series (c, n) of day means whose slope is called at 5 %; ``beside`` (c, n) is fitted beside it."""
     place = np.unique(block_of(t, int(block_count(len(t))), t[0], t[-1]), return_inverse=True)[1]
     counts = np.bincount(place).astype(float)
     sums = np.zeros((len(values), len(counts)))
@@ -56,8 +62,13 @@ def slope_rate(values: np.ndarray, t: np.ndarray, cycle: float | None = YEAR) ->
     shape = (len(values), 1)
     times = np.bincount(place, t) / counts
     days = np.full(len(values), float(len(t)))
+    column = None
+    if beside is not None:
+        column = np.zeros((len(values), len(counts)))
+        np.add.at(column.T, place, beside.T)
+        column = (column / counts)[:, :, np.newaxis]
     lines = block_lines(
-        Blocks(np.tile(counts, shape), np.tile(times, shape), sums / counts, days), cycle=cycle
+        Blocks(np.tile(counts, shape), np.tile(times, shape), sums / counts, days, column), cycle=cycle
     )
     return float((2.0 * stats.t.sf(np.abs(lines.slope / lines.u_slope), lines.dof) < 0.05).mean())
 
@@ -119,9 +130,12 @@ def slopes(rng: np.random.Generator) -> None:
             warmth = wave + 0.5 * first_order(rng, 2000, n, 0.7)
             tails = rng.standard_t(3, (2000, n)) / np.sqrt(3.0)
             cases = (noise + 0.5 * wave, noise + wave, noise + 2.0 * wave, noise + warmth, noise + tails)
-            rows.append(
-                [n, gap, r, *(slope_rate(case, t) for case in cases), slope_rate(noise + wave, t, None)]
-            )
+            u = np.sqrt(1.25 / ((t - t.mean()) ** 2).sum())
+            rows.append([
+                n, gap, r, *(slope_rate(case, t) for case in cases), slope_rate(noise + wave, t, None),
+                slope_rate(noise + 2.0 * warmth, t, beside=warmth),
+                slope_rate(noise + 2.0 * warmth + 8.0 * u * t, t, beside=warmth),
+            ])  # fmt: skip
     table(
         "Slopes called at 5 % with a yearly cycle, in scatters of a run",
         [
@@ -134,6 +148,8 @@ def slopes(rng: np.random.Generator) -> None:
             "temperature",
             "Student, 3",
             "1, no cycle in the null",
+            "2, temperature recorded",
+            "the same, drift of 8 u",
         ],
         rows,
     )
@@ -197,19 +213,30 @@ def charts(rng: np.random.Generator) -> None:
         rows,
     )
     rows = []
-    for r in (0.0, 0.5, 0.8):
-        hits = np.zeros(4)
-        for _ in range(100):
-            series = first_order(rng, 5, 130, r).T
-            before, after = series[:30], series[30:]
-            for place, correlated in ((0, True), (2, False)):
-                single = t_squared_chart(after, before, arl=370.0, correlated=correlated)
-                path = mewma_chart(after, before, rng=rng, arl=200.0, correlated=correlated)
-                hits[place : place + 2] += [len(single.alarms) > 0, len(path.alarms) > 0]
-        rows.append([r, *(hits / 100.0).tolist()])
+    for p in (2, 5, 10):
+        for r in (0.0, 0.3, 0.5, 0.8):
+            hits = np.zeros(5)
+            for _ in range(200):
+                series = first_order(rng, p, 130, r).T
+                before, after = series[:30], series[30:]
+                for place, correlated in ((0, True), (2, False)):
+                    single = t_squared_chart(after, before, arl=370.0, correlated=correlated)
+                    path = mewma_chart(after, before, rng=rng, arl=200.0, correlated=correlated)
+                    hits[place : place + 2] += [len(single.alarms) > 0, len(path.alarms) > 0]
+                shifted = after[:30] + 3.0 * np.eye(p)[0]
+                hits[4] += len(t_squared_chart(shifted, before, arl=370.0, correlated=True).alarms) > 0
+            rows.append([p, r, *(hits / 200.0).tolist()])
     table(
-        "Charts of five parameters with an alarm within 100 points, nominal 0.24 and 0.39",
-        ["r", "T²", "MEWMA", "T², independent", "MEWMA, independent"],
+        "Charts of several parameters with an alarm within 100 points, nominal 0.24 and 0.39",
+        [
+            "parameters",
+            "r",
+            "T²",
+            "MEWMA",
+            "T², independent",
+            "MEWMA, independent",
+            "T²: 3 sd of one in 30 points",
+        ],
         rows,
     )
 
@@ -256,37 +283,134 @@ def _called(
     return float(np.mean([bool(found.changes or found.trends) for found in together]))
 
 
+#: Machines of a cell of that table.
+MACHINES = 2000
+#: Days of runs before and after, and those of the machine's other campaigns.
+EVENTS = (
+    ((4,), (4,), ()),
+    ((10,), (10,), ()),
+    ((4,), (4,), ((4,) * 3,)),
+    ((4,), (4,), ((4,) * 5,) * 2),
+    ((4,), (4,), ((4,),) * 6),
+    ((10,), (2,), ((4,) * 8,)),
+    ((4,) * 2, (4,), ()),
+    ((4,) * 2, (4,), ((4,) * 6,)),
+    ((4,) * 5, (4,) * 5, ()),
+    ((4,) * 5, (4,) * 5, ((4,) * 5,) * 4),
+    ((4,) * 5, (4,) * 5, ((4,) * 5,) * 10),
+    ((4,) * 5, (4,) * 2, ()),
+    ((1,) * 3, (1,) * 3, ()),
+    ((2, 6, 4), (8, 3), ()),
+)
+
+
+def _campaign(
+    rng: np.random.Generator, runs: tuple[int, ...], days: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    index = np.repeat(np.arange(len(runs)), runs)
+    return days[index] + rng.normal(size=len(index)), index
+
+
+def _differences(
+    days_of: Callable[[int], np.ndarray], case: tuple, rng: np.random.Generator, shift: float
+) -> str:  # type: ignore[type-arg]
+    """Shares of machines whose difference is called and not decided."""
+    before, after, rest = case
+    called = undecided = 0
+    for _ in range(MACHINES):
+        (x, of_x), (y, of_y) = (_campaign(rng, runs, days_of(len(runs))) for runs in (before, after))
+        columns = [_campaign(rng, runs, days_of(len(runs))) for runs in rest]
+        others = None
+        if rest:
+            others = OtherDays(
+                np.concatenate([values for values, _ in columns]),
+                np.concatenate([100 * i + of_day for i, (_, of_day) in enumerate(columns)]),
+                np.zeros(sum(len(values) for values, _ in columns)),
+                np.concatenate([np.full(len(values), i) for i, (values, _) in enumerate(columns)]),
+            )
+        agree = before_after(x, y + shift, of_x, of_y, others).agree
+        called, undecided = called + (agree is False), undecided + (agree is None)
+    return "not decided" if undecided == MACHINES else f"{called / MACHINES:.3f}"
+
+
 def events(rng: np.random.Generator) -> None:
     """Changes called between two campaigns."""
     rows: list[list[object]] = []
-    for before, after in (
-        ((1, 4), (1, 4)),
-        ((1, 10), (1, 10)),
-        ((5, 4), (5, 4)),
-        ((5, 4), (2, 4)),
-        ((3, 1), (3, 1)),
-    ):
-        for component in (0.0, 1.0, 2.0):
-            u = np.sqrt(sum((component**2 + 1.0 / runs) / days for days, runs in (before, after)))
-            calls = np.zeros(2)
-            for _ in range(300):
-                sides = []
-                for days, runs in (before, after):
-                    values = component * rng.normal(size=(days, 1)) + rng.normal(size=(days, runs))
-                    sides.append((values.ravel(), np.repeat(np.arange(days), runs)))
-                (x, of_x), (y, of_y) = sides
-                calls += [not before_after(x, y + shift * u, of_x, of_y).agree for shift in (0.0, 3.5)]
-            rows.append(
-                [
-                    f"{before[0]} of {before[1]}",
-                    f"{after[0]} of {after[1]}",
-                    component,
-                    *(calls / 300.0).tolist(),
-                ]
-            )
+
+    def text(runs: tuple[int, ...]) -> str:
+        same = len(set(runs)) == 1
+        return f"{len(runs)} of {runs[0]}" if same else f"{len(runs)} of {', '.join(map(str, runs))}"
+
+    for case in EVENTS:
+        before, after, rest = case
+        row: list[object] = [
+            text(before),
+            text(after),
+            f"{len(rest)} campaigns: {text(rest[0])}" if rest else "none",
+        ]
+        for component in (0.0, 0.5, 1.0, 2.0, 3.0):
+            row.append(_differences(lambda n, c=component: c * rng.normal(size=n), case, rng, 0.0))  # type: ignore[misc]
+        u = np.sqrt(sum((1.0 + np.mean(1.0 / np.array(runs))) / len(runs) for runs in (before, after)))
+        row += [_differences(lambda n: rng.normal(size=n), case, rng, factor * u) for factor in (3.5, 7.0)]
+        row.append(_differences(lambda n: first_order(rng, 1, n, 0.6)[0], case, rng, 0.0))
+        row.append(_differences(lambda n: rng.standard_t(3, n) / np.sqrt(3.0), case, rng, 0.0))
+        row.append(_differences(lambda n: 0.7 * rng.normal(size=n) + 0.7 * rng.normal(), case, rng, 0.0))
+        rows.append(row)
     table(
-        "Before and after an event: called where nothing changed, and where it did by 3.5 standard deviations",
-        ["days of runs before", "after", "day component", "no change", "3.5 u"],
+        "Before and after an event: called where nothing changed, and where it did, in its standard deviations",
+        [
+            "days of runs before",
+            "after",
+            "the machine's other days",
+            *(f"days differ by {c:g}" for c in (0.0, 0.5, 1.0, 2.0, 3.0)),
+            "days 1, changed by 3.5",
+            "changed by 7",
+            "days AR 0.6",
+            "days Student, 3",
+            "campaigns differ by 0.7 too",
+        ],
+        rows,
+    )
+
+
+#: Histories of a cell.
+DEPENDENCES = 150
+
+
+def conditions(rng: np.random.Generator) -> None:
+    """Dependences called on a temperature that has nothing to do with the values, and on one that has."""
+    rows: list[list[object]] = []
+    for n, gap in ((6, 1.0), (10, 7.0), (20, 7.0), (52, 7.0), (104, 7.0)):
+        day = np.repeat(np.arange(n), 3)
+        t = gap * day + np.tile([0.0, 0.1, 0.2], n)
+        for r in (0.0, 0.6, 0.8):
+            called = np.zeros(4)
+            for _ in range(DEPENDENCES):
+                season = np.cos(2.0 * np.pi * (gap * np.arange(n) + rng.uniform(0.0, YEAR)) / YEAR)
+                degrees = (2.0 * season + first_order(rng, 1, n, 0.7)[0])[day] + np.tile([-0.3, 0.0, 0.3], n)
+                y = first_order(rng, 1, n, r)[0][day] + rng.normal(size=3 * n)
+                within = rng.normal(size=3 * n)
+                for place, (values, channel) in enumerate(
+                    ((y, degrees), (y, within), (y + 0.6 * degrees, degrees))
+                ):
+                    fit = dependence(values, t, {"degC": channel}, days=day)
+                    called[place] += fit.coefficients[0].p_value < 0.05
+                if n * gap >= 300.0:
+                    wave = dependence(y, t, {}, cycles={"year": YEAR}, days=day).cycles[0]
+                    called[3] += wave.p_value < 0.05
+            rates = (called / DEPENDENCES).tolist()
+            rows.append([n, gap, r, *rates[:3], rates[3] if n * gap >= 300.0 else ""])
+    table(
+        "Dependences and yearly cycles called at 5 % where there are none, day component 1",
+        [
+            "days",
+            "every (days)",
+            "r",
+            "on weather",
+            "on what varies within days",
+            "0.6 a kelvin",
+            "yearly cycle",
+        ],
         rows,
     )
 
@@ -325,5 +449,7 @@ def means(rng: np.random.Generator) -> None:
 
 
 if __name__ == "__main__":
-    for trial in (slopes, means, events, charts, forecasts, changes):
+    every = (slopes, means, events, conditions, charts, forecasts, changes)
+    # Names choose some of them: ``trial_dependence.py slopes events``.
+    for trial in [trial for trial in every if trial.__name__ in sys.argv[1:]] or every:
         trial(np.random.default_rng(SEED))

@@ -188,7 +188,9 @@ def shapes(seeds: range, peaks: tuple[float, ...], runs: int, only: str) -> Iter
 
 
 def empties(seeds: range, runs: list[int], only: str) -> Iterator[str]:
-    """The rows of the table of empty campaigns."""
+    """The rows of the table of empty campaigns; none without seeds."""
+    if not seeds:
+        return
     yield "| noise | runs | false effects | seconds | named |"
     yield "| --- | --- | --- | --- | --- |"
     for count in runs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 from typing import Any
@@ -97,8 +98,8 @@ WRONG = [
     (["event", "NOPE"], "there is no machine 'NOPE'; there are HU40-T"),
     (["event", "NOPE", "hi", "--at", AT], "there is no machine 'NOPE'; there are HU40-T"),
     (["event", "HU40-T", "hi"], "say when it happened: --at"),
-    (["event", "HU40-T", "hi", "--at", "soon"], "--at soon: write a time as 2026-03-05T07:00:00-05:00"),
-    (["event", "HU40-T", "hi", "--at", "2026-03-05T07:00:00"], "lacks its offset from UTC"),
+    (["event", "HU40-T", "hi", "--at", "soon"], "--at soon: write a day or a time as 2026-03-05, 2026-03-05 07:00 or"),
+    (["event", "HU40-T", "hi", "--at", "20260305"], "--at 20260305: write a day or a time as"),
     (["event", "HU40-T", " ", "--at", AT], "say in words what happened"),
     (["event", "HU40-T", "hi", "--at", AT, "--kind", ""], "an event needs a kind"),
     (["audit", "--last", "0"], "--last 0: how many entries"),
@@ -115,7 +116,7 @@ WRONG = [
     ([*ISSUE, "folder"], "folder cannot be read: Is a directory"),
     ([*ISSUE, "text"], "text is not TOML"),
     (["trend", "NOPE"], "there is no machine 'NOPE'; there are HU40-T"),
-    (["trend", "HU40-T", "--since", "nope"], "--since nope: write a date as 2026-03-05"),
+    (["trend", "HU40-T", "--since", "nope"], "--since nope: write a day or a time as 2026-03-05"),
     (["trend", "HU40-T", "--reliability", "nan"], "--reliability nan: a probability lies between 0 and 1"),
     (["trend", "HU40-T", "--reference", "x"], "--reference x: write two dates as 2026-01-01..2026-03-01"),
     (["plan", "nope"], "there is no campaign 'nope'"),
@@ -172,17 +173,22 @@ def test_wrong_input(typed: Any, untouched: Path, arguments: list[str], words: s
     assert {path.name for path in Path().iterdir()} == here
 
 
-def test_import_stops_at_the_first_refusal_and_says_what_came_before(
+def test_import_goes_on_after_a_refusal_and_ends_with_a_list(
     typed: Any, examples: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "new.duckdb"
-    answer = typed("import", examples / "cold-cold", "nope", examples / "five-days", db=path)
-    assert (answer.status, answer.out) == (2, "")
-    assert "nope was refused, nothing of it was kept" in answer.err
-    assert answer.err.endswith("In the database before it was met: cold-cold\n")
-    assert [one["campaign"] for one in typed("campaigns", "--json", db=path).document["campaigns"]] == [
-        "cold-cold"
-    ]
+    answer = typed("import", examples / "load-cell", "nope", examples / "cold-cold", "neither", db=path)
+    assert answer.status == 2
+    assert answer.out.startswith("load-cell: imported, 44 rows\n")
+    assert "\ncold-cold: imported" in answer.out
+    assert "monitor: nope was refused, nothing of it was kept" in answer.err
+    assert answer.err.endswith("monitor: 2 of 4 folders refused: nope, neither\n")
+    names = [campaign["campaign"] for campaign in typed("campaigns", "--json", db=path).document["campaigns"]]
+    assert names == ["load-cell", "cold-cold"]
+    again = typed("import", "--json", examples / "load-cell", "nope", db=path)
+    document = json.loads(again.out)
+    assert (again.status, [folder["state"] for folder in document["imported"]]) == (2, ["unchanged"])
+    assert [refused["folder"] for refused in document["refused"]] == ["nope"]
 
 
 def test_every_fault_of_a_folder_is_told_at_once(

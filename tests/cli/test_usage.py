@@ -75,7 +75,7 @@ def test_version(typed: Any) -> None:
         (["model", "add", "EXX:reversal"], "required: --to"),
         (["uncertainty", "five-days", "--seed", "1.5"], "invalid int value: '1.5'"),
         (["simulate", "x", "--peak", "much"], "invalid float value: 'much'"),
-        (["export", "x", "--format", "xlsx"], "choose from"),
+        (["export", "x", "--format", "ods"], "choose from"),
         (["audit", "--last", "x"], "invalid int value"),
     ],
     ids=" ".join,

@@ -125,3 +125,14 @@ def test_explain_names_what_could_not_be_fitted_and_blames_no_file(virtual_campa
     answer = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1))
     assert "EXX:reversal" in answer.unfitted
     assert all(found.effect != "EXX:reversal" for found in answer.missing)
+
+
+def test_a_warm_up_of_two_time_constants_is_told_although_few_runs_show_it(
+    virtual_campaigns, trial, explained
+):
+    """The first run of each day shows it: random signs of whole runs cannot tell it from noise, those of blocks can."""
+    right, effect, curve = trial.FAMILIES["two time constants"]
+    hidden = simulator().Effect(effect, peak_um=8.0, curve=curve)
+    campaign, _ = virtual_campaigns.virtual(0, [hidden], days=2, runs_per_day=4)
+    (found,) = explained(campaign).missing
+    assert found.effect.partition(":")[0] in right

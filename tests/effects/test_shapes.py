@@ -166,7 +166,7 @@ def test_names_of_the_coefficients(make: Callable[..., Context], text: str, name
     ("text", "words"),
     [
         ("EXX", "'EXX' is an error motion and needs a shape: write for example EXX:poly1 or EXX:const"),
-        ("EXX:poly0", "there is no shape 'poly0'; there are const, poly1 to poly9"),
+        ("EXX:poly0", "there is no shape 'poly0'; did you mean 'poly3'? there are const, poly1 to poly9"),
         ("EXX:poly10", "there is no shape 'poly10'"),
         ("EXX:wave", "there is no shape 'wave'"),
         ("EXX:table100", "there is no shape 'table100'"),

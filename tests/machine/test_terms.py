@@ -46,8 +46,9 @@ def test_numbered_axes_are_told_apart_whatever_their_digits() -> None:
 )
 def test_what_is_no_term_is_refused_with_the_axes_there_are(symbol: str) -> None:
     words = (
-        f"'{symbol}' is no geometric error of 'w C B X b Z Y (C1) t': write E, a direction X Y Z A B C, "
+        re.escape(f"'{symbol}' is no geometric error of 'w C B X b Z Y (C1) t': ")
+        + r"(did you mean 'E[XYZABC]0?[XBCZY1]+'\? )?write E, a direction X Y Z A B C, "
         "0 for a location error, and one of its axes X, B, C, Z, Y, C1, for example EX0C1 or EYX"
     )
-    with pytest.raises(EffectError, match=re.escape(words)):
+    with pytest.raises(EffectError, match=words):
         parse_term(symbol, CHAIN)

@@ -133,3 +133,26 @@ def test_every_order_of_five_axes_is_read_and_written_back(order: list[str], bed
     assert [joint.name for joint in chain.work] == order[:bed][::-1]
     assert parse_topology(chain.topology) == chain
     assert [chain.index(joint.name) for joint in chain.joints] == list(range(5 + spindle))
+
+
+@pytest.mark.parametrize(
+    ("code", "letters", "gravity"),
+    [
+        ("V [w C A Y X b Z S t]", "w C A Y X b Z (C1) t", (0.0, 0.0, -1.0)),
+        ("V[w C' A' Y' X' b Z (C1) t]", "w C A Y X b Z (C1) t", (0.0, 0.0, -1.0)),
+        ("H [w C2′ B′ X′ b Z Y (S) t]", "w C2 B X b Z Y (C1) t", (0.0, -1.0, 0.0)),
+        ("[w X b Y Z C B S1 t]", "w X b Y Z C B (C1) t", None),
+        ("w C1 X b Y Z S t", "w C1 X b Y Z (C2) t", None),
+    ],
+)
+def test_iso_10791_6_structural_code_is_the_same_machine(
+    code: str, letters: str, gravity: tuple[float, float, float] | None
+) -> None:
+    chain, plain = parse_topology(code), parse_topology(letters)
+    assert chain.topology == plain.topology == letters
+    assert chain.joints == plain.joints
+    assert chain.gravity == (plain.gravity if gravity is None else gravity)
+
+
+def test_a_machine_file_says_more_of_gravity_than_the_letter_does() -> None:
+    assert parse_topology("V [w X b Y Z S t]", gravity=(0.0, -1.0, 0.0)).gravity == (0.0, -1.0, 0.0)

@@ -80,14 +80,24 @@ def test_format_1_all_faults_are_listed_together_by_file_and_line(small, spoil, 
 def test_format_1_first_twenty_in_full(small):
     path = small / "probings.csv"
     header, *rows = path.read_text().splitlines()
-    spoilt = [
-        ",".join([*row.split(",")[:4], f"x{k}", f"y{k}", f"z{k}", *row.split(",")[7:]])
-        for k, row in enumerate(rows)
-    ]
-    path.write_text("\n".join([header, *spoilt]) + "\n")
+    header += "".join(f",furlong{k}" for k in range(30))
+    path.write_text("\n".join([header, *(row + 30 * ",1" for row in rows)]) + "\n")
     with pytest.raises(
         CampaignError, match=r"30 faults\.\n(  probings\.csv, line .*\n){20}  \.\.\. and 10 more\.$"
     ):
+        read_campaign(small)
+
+
+def test_faults_that_differ_in_their_cells_alone_are_told_once(small):
+    path = small / "probings.csv"
+    header, *rows = path.read_text().splitlines()
+    spoilt = [",".join([*row.split(",")[:4], f'"{k},5"', *row.split(",")[5:]]) for k, row in enumerate(rows)]
+    path.write_text("\n".join([header, *spoilt]) + "\n")
+    told = (
+        r"10 faults\.\n  probings\.csv, line 2, column x_mm: '0,5' is not a number: it has a decimal comma; "
+        r"write a decimal point, 0\.5, and no thousands separators \(and 9 more like it, to line 11\)$"
+    )
+    with pytest.raises(CampaignError, match=told):
         read_campaign(small)
 
 

@@ -127,7 +127,7 @@ def test_format_1_misspelt_column_is_hinted(spoil, faults_of):
         (b"", "the file is empty"),
         (b"\n\n", "the file is empty"),
         (b"\xef\xbb\xbf", "the file is empty"),
-        (b"run;sequence;time_s\n1;2;3\n", "the header has one cell; separate the cells by commas"),
+        (b"run|sequence|time_s\n1|2|3\n", "the header has one cell; separate the cells by commas"),
         (b"run,sequence\n1,\xff\n", "byte 0xff is not UTF-8; save the file as UTF-8 text"),
         (b"run,sequence\n1,\xed\xa0\x80\n", "byte 0xed is not UTF-8"),
         (b"run\x00,sequence\n", "a NUL character: this is not a text file"),

@@ -45,6 +45,9 @@ def test_17025_every_letter_of_both_clauses_has_a_field() -> None:
     assert set(ITEMS) == {place.name for place in dataclasses.fields(CertificateRecord)} - {
         "accepted",
         "accreditation",
+        "accredited",
+        "mark",
+        "standards",
         "country",
         "replaces",
         "volumetric",
@@ -61,7 +64,8 @@ def test_17025_item_that_is_missing_is_named_with_its_clause(name: str, make_rec
     clause, item = ITEMS[name]
     missing = missing_items(dataclasses.replace(make_record(), **{name: None}))
     assert [(one.clause, one.item, one.part) for one in missing] == [(clause, item, "")]
-    assert str(missing[0]) == f"{item} (ISO/IEC 17025:2017, {clause})"
+    key = f": write {missing[0].key}" if missing[0].key else ""
+    assert str(missing[0]) == f"{item}{key} (ISO/IEC 17025:2017, {clause})"
 
 
 @pytest.mark.parametrize("name", sorted(ITEMS))
@@ -123,7 +127,9 @@ def test_incomplete_certificate_is_refused_with_the_whole_list(make_record: Make
     expected = (
         r"the certificate is refused: 2 items are missing\n"
         r"  unique number of the certificate \(ISO/IEC 17025:2017, 7\.8\.2\.1 d\)\n"
-        r"  opinions and interpretations or that it does not apply \(ISO/IEC 17025:2017, 7\.8\.4\.1 f\)"
+        r"  opinions and interpretations or that it does not apply: write \[statements\] opinions "
+        r"\(ISO/IEC 17025:2017, 7\.8\.4\.1 f\)\n"
+        r"these keys are in the laboratory's file"
     )
     with pytest.raises(IncompleteCertificateError, match=expected):
         check_complete(record)

@@ -133,6 +133,6 @@ def test_a_standard_that_is_out_of_date_refuses_the_certificate(complete: Certif
 def test_what_is_stated_is_stated_whole(complete: CertificateRecord) -> None:
     missing = missing_items(replace(complete, accredited=Accreditation("a body", "tbd")))
     assert [str(item) for item in missing] == [
-        "accreditation, number: 'tbd' says nothing (ISO/IEC 17025:2017, 8.1 and ILAC P8)"
+        "accreditation, number: 'tbd' says nothing: write [accreditation] number (ISO/IEC 17025:2017, 8.1 and ILAC P8)"
     ]
     assert not missing_items(complete)

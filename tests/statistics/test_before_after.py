@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import DataError
-from monitor.statistics.before_after import before_after
+from monitor.statistics.before_after import OtherDays, before_after
 
 
 def sides(rng, days, runs, component):
@@ -15,14 +15,38 @@ def sides(rng, days, runs, component):
     return values.ravel(), np.repeat(np.arange(days), runs)
 
 
-def test_of_one_day_a_side_it_is_students_test():
+def test_one_day_a_side_decides_nothing_however_many_runs_and_u_is_students_of_the_runs():
     rng = np.random.default_rng(1)
-    x, y = rng.normal(size=6), rng.normal(size=4) + 1.0
+    x, y = rng.normal(size=6), rng.normal(size=4) + 9.0
     result = before_after(x, y, np.zeros(6), np.zeros(4))
     right = stats.ttest_ind(y, x).confidence_interval(0.95)
     assert result.difference - result.expanded == pytest.approx(right.low, rel=1e-10)
     assert result.difference + result.expanded == pytest.approx(right.high, rel=1e-10)
-    assert result.between is None
+    assert result.between is result.agree is result.e_n is None
+
+
+def test_with_other_days_of_the_machine_it_is_students_test_of_all_means_about_their_own_stretches():
+    rng = np.random.default_rng(4)
+    rest = rng.normal(size=(7, 4)) + rng.normal(size=(7, 1)) + np.repeat([0.0, 50.0], [3, 4])[:, np.newaxis]
+    x, y = rng.normal(size=4), rng.normal(size=4) + 3.0
+    stretches = np.repeat([0, 1], [12, 16])
+    others = OtherDays(rest.ravel(), np.repeat(np.arange(7), 4), stretches, stretches)
+    result = before_after(x, y, np.zeros(4), np.zeros(4), others)
+    means = rest.mean(axis=1)
+    squares = means[:3].var(ddof=1) * 2 + means[3:].var(ddof=1) * 3
+    u = np.sqrt(2.0 * squares / 5)
+    assert (result.u, result.dof, result.other_days) == (pytest.approx(u), 5.0, 7)
+    assert result.expanded == pytest.approx(stats.t.ppf(0.975, 5) * u)
+
+
+def test_campaigns_that_differ_by_more_than_their_days_say_what_a_change_has_to_exceed():
+    rng = np.random.default_rng(5)
+    level = 5.0 * rng.normal(size=6)
+    rest = level[:, np.newaxis] + rng.normal(size=(6, 4))
+    others = OtherDays(rest.ravel(), np.arange(24), np.zeros(24), np.repeat(np.arange(6), 4))
+    result = before_after(rng.normal(size=4), rng.normal(size=4) + 4.0, np.arange(4), np.arange(4), others)
+    assert result.u == pytest.approx(np.sqrt(2.0) * rest.mean(axis=1).std(ddof=1))
+    assert (result.dof, result.other_campaigns, result.agree) == (5.0, 6, True)
 
 
 def test_of_days_of_as_many_runs_it_is_students_test_of_their_means():
@@ -37,7 +61,7 @@ def test_of_days_of_as_many_runs_it_is_students_test_of_their_means():
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "component"), [((1, 4), (1, 4), 0.0), ((5, 4), (5, 4), 1.0), ((4, 3), (2, 3), 2.0)]
+    ("before", "after", "component"), [((3, 4), (2, 4), 0.0), ((5, 4), (5, 4), 1.0), ((4, 3), (2, 3), 2.0)]
 )
 def test_false_alarms_and_a_change_of_three_and_a_half_standard_deviations(
     before, after, component, rate_at_most
@@ -58,3 +82,17 @@ def test_refusals_say_what_is_needed():
         before_after([1.0], [2.0], [0], [0])
     with pytest.raises(DataError, match="no run differs from the others of its side"):
         before_after([1.0, 1.0], [2.0, 2.0], [0, 0], [0, 0])
+
+
+@pytest.mark.parametrize("component", [0.0, 1.0, 3.0])
+def test_of_one_day_a_side_and_five_other_days_one_in_twenty_is_called_whatever_the_days_do(
+    component, rate_at_most
+):
+    rng = np.random.default_rng(int(9 + component))
+    called = 0
+    for _ in range(400):
+        parts = [sides(rng, days, 4, component) for days in (1, 1, 5)]
+        others = OtherDays(*parts[2], np.zeros(20), np.zeros(20))
+        (x, of_x), (y, of_y), _rest = parts
+        called += before_after(x, y, of_x, of_y, others).agree is False
+    assert rate_at_most(called, 400, 0.05)

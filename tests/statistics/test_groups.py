@@ -28,6 +28,7 @@ COLUMNS = {
         ("operator == 'An and Bo'", [3, 5]),
         ("operator == 'An and Bo' and day != 2", [5]),
         ("started_at > 2026-03-03 and started_at <= 2026-03-05", [4, 5]),
+        ("started_at > 2026-03-03T02:00+02:00 and started_at <= '2026-03-04 19:00-05:00'", [4, 5]),
         ("operator == Jo", [1, 2, 4, 6]),
     ],
 )
@@ -48,7 +49,6 @@ def test_a_selection_keeps_its_name_and_condition():
         ("hours > warm", "hours is compared with 'warm'; it holds numbers"),
         ("warm_up == 1", "it is true or false"),
         ("started_at > monday", "it holds ISO 8601 times"),
-        ("started_at > 2026-03-01T00:00:00+01:00", "without an offset"),
         ("hours > 99", "no run meets 'hours > 99'"),
     ],
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from datetime import datetime, timedelta, timezone
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,17 @@ from monitor.records import (
     ScaleBar,
     SourceFile,
 )
-from monitor.store import Database, StoredIdentification, StoredRun
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    StoredRun,
+    import_campaign,
+    record_event,
+    save_analysis,
+    save_certificate,
+    save_identification,
+    save_model,
+)
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 
 #: As a controller prints them, among them degrees whose radians do not divide back to the same double.
@@ -135,3 +145,31 @@ def db(path: Path) -> Iterator[Database]:
     """An open, empty database."""
     with Database(path, actor="the test") as database:
         yield database
+
+
+@pytest.fixture
+def filled(
+    db: Database, campaign: Campaign, make_identification: Callable[..., StoredIdentification]
+) -> Database:
+    """A database with a campaign and its identification."""
+    import_campaign(db, campaign)
+    save_identification(db, make_identification(campaign))
+    return db
+
+
+@pytest.fixture
+def something_of_everything(
+    db: Database,
+    make_campaign: Callable[..., Campaign],
+    make_identification: Callable[..., StoredIdentification],
+) -> Database:
+    """A database with something of everything."""
+    one = make_campaign("one")
+    import_campaign(db, one)
+    import_campaign(db, make_campaign("two"))
+    save_model(db, "samba", ["EA0B"])
+    save_identification(db, make_identification(one))
+    save_analysis(db, "uncertainty", {"a": 1}, method="guf", campaign="one")
+    save_certificate(db, "C-1", "issued", "one", [1], {"a": 1}, b"pdf")
+    record_event(db, one.machine.id, datetime(2026, 1, 1, tzinfo=UTC), "crash", "x")
+    return db

@@ -12,27 +12,15 @@ from monitor.exceptions import InputError, StoreError
 from monitor.records import Campaign
 from monitor.store import (
     Database,
-    StoredIdentification,
     export_tables,
     import_campaign,
     list_backups,
     load_campaign,
     restore,
-    save_identification,
     snapshot,
     take_backup,
     verify_audit,
 )
-
-
-@pytest.fixture
-def filled(
-    db: Database, campaign: Campaign, make_identification: Callable[..., StoredIdentification]
-) -> Database:
-    """A database with a campaign and its identification."""
-    import_campaign(db, campaign)
-    save_identification(db, make_identification(campaign))
-    return db
 
 
 def test_restored_backup_is_the_database(filled: Database, campaign: Campaign, tmp_path: Path) -> None:

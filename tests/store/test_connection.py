@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,7 +14,7 @@ import pytest
 
 from monitor.exceptions import StoreError
 from monitor.records import Campaign
-from monitor.store import Database, import_campaign, list_campaigns, verify_audit
+from monitor.store import Database, SharedDatabase, import_campaign, list_campaigns, verify_audit
 
 _HOLD = """
 import sys, duckdb
@@ -175,29 +177,55 @@ with Database(sys.argv[1]) as db:
         assert db.rows("SELECT count(*) FROM information_schema.tables WHERE table_name = 'large'") == [(0,)]
 
 
-def test_a_file_that_another_process_is_making_is_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Two first imports at once: the second may see the file before its headers are written."""
-    ready, path = tmp_path / "ready.duckdb", tmp_path / "made.duckdb"
-    Database(ready).close()
-    path.write_bytes(ready.read_bytes()[:100].ljust(200, b"\0")[::-1])
+def test_a_file_gets_its_name_when_it_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever is stopped, or finds the disk full, while a database is made leaves no half of one."""
+    path = tmp_path / "new.duckdb"
 
-    looks = []
-
-    def meanwhile(seconds: float) -> None:
-        """The other process is ready before the third look, however busy the machine is."""
-        looks.append(seconds)
-        if len(looks) == 2:
-            part = tmp_path / "part"
-            part.write_bytes(ready.read_bytes())
-            part.replace(path)
+    def no_room(*_: object) -> None:
+        raise StoreError(f"{path}.new: no space left")
 
     with monkeypatch.context() as patch:
-        patch.setattr("monitor.store.connection.time.sleep", meanwhile)
-        with Database(path) as db:
-            assert db.rows("SELECT count(*) FROM v_campaigns") == [(0,)]
-    assert len(looks) == 2
-    path.write_text("this never was a database")
+        patch.setattr("monitor.store.opening.migrations.migrate", no_room)
+        with pytest.raises(StoreError, match=r"new\.duckdb: no space left"):
+            Database(path)
+    assert {entry.name for entry in tmp_path.iterdir()} <= {"new.duckdb.lock"}
+    # What a killed process left is no hindrance.
+    (tmp_path / "new.duckdb.new").write_bytes(b"half of one")
+    with Database(path) as db:
+        assert db.rows("SELECT count(*) FROM v_campaigns") == [(0,)]
+    assert not (tmp_path / "new.duckdb.new").exists()
+
+
+def test_an_empty_file_becomes_a_database_and_another_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "empty.duckdb").touch()
+    Database(tmp_path / "empty.duckdb").close()
+    assert (tmp_path / "empty.duckdb").stat().st_size > 4096
+    (tmp_path / "letter.duckdb").write_text("this never was a database")
     with pytest.raises(StoreError, match="is not a database of this software"):
-        Database(path)
+        Database(tmp_path / "letter.duckdb")
+
+
+def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.duckdb")
+    for kind in (Database, SharedDatabase):
+        with pytest.raises(StoreError, match="is a pipe or device, not a file"):
+            kind(tmp_path / "pipe.duckdb")
+
+
+def test_a_new_database_is_its_owners_alone_and_log_and_lock_follow_its_mode(tmp_path: Path) -> None:
+    path = tmp_path / "mine.duckdb"
+    code = (
+        "import os, sys; from monitor.store import SharedDatabase\n"
+        "db = SharedDatabase(sys.argv[1])\n"
+        "with db.transaction():\n"
+        "    db.execute(\"INSERT INTO registered_machine VALUES (1, 'M', 'w X t', TIMESTAMP '2026-01-01')\")\n"
+        "os._exit(9)"
+    )
+    for mode in (0o600, 0o660):
+        if path.exists():
+            path.chmod(mode)
+            with SharedDatabase(path) as db, db.transaction():
+                db.execute("DELETE FROM registered_machine")
+        assert subprocess.run([sys.executable, "-c", code, str(path)], check=False).returncode == 9
+        for ending in ("", ".wal", ".lock"):
+            assert stat.S_IMODE(Path(str(path) + ending).stat().st_mode) == mode, ending

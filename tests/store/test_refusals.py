@@ -71,9 +71,10 @@ def test_folders_that_tell_no_names_are_recorded_by_their_path(db: Database, tmp
     assert {(one.campaign, one.machine) for one in found} == {(None, None)}
 
 
-def test_what_is_imported_before_the_refused_folder_stays(db: Database, spoilt: Path) -> None:
-    with pytest.raises(InputError, match="In the database before it was met: five-days"):
-        import_folders(db, ImportRequest([EXAMPLES / "five-days", spoilt]))
+def test_a_refused_folder_does_not_hinder_the_others(db: Database, spoilt: Path) -> None:
+    answer = import_folders(db, ImportRequest([spoilt, EXAMPLES / "five-days"]))
+    assert [refused.folder for refused in answer.refused] == [str(spoilt)]
+    assert "was refused, nothing of it was kept" in answer.refused[0].why
     assert db.rows("SELECT campaign FROM campaign") == [("five-days",)]
     assert len(refusals(db)) == 1
 

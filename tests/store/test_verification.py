@@ -2,41 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from datetime import UTC, datetime
-
 import pytest
 
-from monitor.records import Campaign
 from monitor.store import (
     Database,
-    StoredIdentification,
-    import_campaign,
-    record_event,
-    save_analysis,
-    save_certificate,
-    save_identification,
-    save_model,
     verify_audit,
 )
 
 
 @pytest.fixture
-def filled(
-    db: Database,
-    make_campaign: Callable[..., Campaign],
-    make_identification: Callable[..., StoredIdentification],
-) -> Database:
+def filled(something_of_everything: Database) -> Database:
     """A database with something of everything."""
-    one = make_campaign("one")
-    import_campaign(db, one)
-    import_campaign(db, make_campaign("two"))
-    save_model(db, "samba", ["EA0B"])
-    save_identification(db, make_identification(one))
-    save_analysis(db, "uncertainty", {"a": 1}, method="guf", campaign="one")
-    save_certificate(db, "C-1", "issued", "one", [1], {"a": 1}, b"pdf")
-    record_event(db, one.machine.id, datetime(2026, 1, 1, tzinfo=UTC), "crash", "x")
-    return db
+    return something_of_everything
 
 
 def test_untouched_database_is_in_order(filled: Database) -> None:

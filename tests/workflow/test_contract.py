@@ -30,6 +30,7 @@ BESIDES_QUESTIONS = {
     "demo:fresh_database",
     "explain.curve_sentences:correlation",  # a sentence that two verbs print
     "history.agreement:sentence",
+    "history.weekly_looks:sentence",
     "health.mail:mail_report",  # sends what was written; nothing is asked
     "health.mail:read_mail_settings",
 }
@@ -110,5 +111,13 @@ def test_the_faces_ask_nothing_but_the_questions_of_the_contract() -> None:
     command_line, python = _asked_by("cli"), _asked_by("api")
     assert command_line - questions == BESIDES_QUESTIONS
     assert python <= questions
-    # What only people in Python ask: the kinematic model alone, machines and readings as tables.
-    assert questions - command_line == {"kinematics:poses", "query:machines", "query:readings"}
+    # The pages ask every question by its name.
+    assert _asked_by("web") == set()
+    # What people in Python and the pages ask: the kinematic model alone, and what the command line has in other words.
+    assert questions - command_line == {
+        "explain.residual_vectors:residual_vectors",
+        "history.values:values_of_machine",
+        "kinematics:poses",
+        "query:machines",
+        "query:readings",
+    }

@@ -57,12 +57,42 @@ def test_a_note_and_an_event_without_runs_on_both_sides_state_nothing():
     assert event_steps(past, [MachineEvent(REPAIR.at, "note", "looked at"), early]) == ()
 
 
-def test_one_day_before_and_one_after_are_compared_by_their_runs_and_said_to_be():
+def test_one_day_before_and_one_after_decide_nothing_and_are_said_to():
     late = MachineEvent(START + timedelta(days=0.5), "crash", "tool broken")
     values = _runs(np.random.default_rng(3), 1, 1, 15.0, 0.0)
     (step,) = event_steps({"EB0C": _past("EB0C", values)}, [late])
     assert not step.by_days
     assert step.p_value == pytest.approx(stats.ttest_ind(values[1], values[0]).pvalue)
+
+
+def test_the_days_of_other_pieces_say_what_a_step_between_two_days_has_to_exceed():
+    rng = np.random.default_rng(6)
+    values = _runs(rng, 5, 1, 0.0, 1.0)
+    values[4:] += 40.0
+    values[5] += 30.0
+    events = [MachineEvent(START + timedelta(days=day + 0.5), "repair", "spindle") for day in (3, 4)]
+    first, second = event_steps({"EB0C": _past("EB0C", values)}, events)
+    means = values.mean(axis=1)
+    # One day between the events and one after: only the four days before them scatter about a mean.
+    u = means[:4].std(ddof=1) * np.sqrt(2.0)
+    assert second.by_days
+    assert second.u == pytest.approx(u)
+    assert second.p_value == pytest.approx(2.0 * stats.t.sf((means[5] - means[4]) / u, 3))
+    assert first.by_days
+
+
+def test_days_that_differ_by_five_are_no_step_of_two_days():
+    rng = np.random.default_rng(8)
+    stated = [
+        step.by_days
+        for _ in range(100)
+        for step in event_steps(
+            {"EB0C": _past("EB0C", _runs(rng, 1, 1, 0.0, 5.0))},
+            [MachineEvent(START + timedelta(days=0.5), "crash", "")],
+        )
+    ]
+    assert len(stated) > 50
+    assert not any(stated)
 
 
 @pytest.mark.parametrize("day_sd", [0.0, 1.0, 2.0])

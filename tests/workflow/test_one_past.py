@@ -15,8 +15,10 @@ from monitor.store import Database, import_campaign, machine_history
 from monitor.workflow.fleet import FleetRequest, fleet
 from monitor.workflow.health.report import report, stored_health
 from monitor.workflow.health.request import ReportRequest
+from monitor.workflow.health.weeks import week_named
 from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.past import machine_past
+from monitor.workflow.history.weekly_looks import weekly_notices
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.trend.request import TrendRequest
@@ -42,7 +44,13 @@ def stepped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
 
 def reported(db: Database, week: str, out: Path, pdf_unread):
     with pdf_unread():
-        report(db, ReportRequest(week, out=out, made_at=MADE))
+        answer = report(db, ReportRequest(week, out=out, made_at=MADE))
+    # Of weekly looks it says what page and fleet table say of that week.
+    page = trend(db, TrendRequest("HU40-T", weekly_looks=True)).weekly_looks
+    table = fleet(db, FleetRequest(top=1, weekly_looks=True)).weekly_looks
+    assert page == table
+    assert answer.weekly_looks == weekly_notices(db, week_named(week)).of_machines({"HU40-T"}, week)
+    assert answer.weekly_looks.notices == page.of_machines({"HU40-T"}, week).notices
     ((number,),) = db.rows("SELECT max(analysis_id) FROM v_analyses WHERE kind = 'health'")
     return stored_health(db, number)
 

@@ -88,10 +88,10 @@ def test_coordinates_only_where_all_runs_follow_one_plan(db: Database) -> None:
     assert values.shape == (3, len(names)) == (3, 186)
 
 
-def test_import_of_several_folders_names_what_came_before_a_refusal(tmp_path: Path) -> None:
+def test_import_of_several_folders_lists_those_that_were_refused(tmp_path: Path) -> None:
     with Database(tmp_path / "x.duckdb") as own:
-        with pytest.raises(InputError, match="In the database before it was met: cold-cold"):
-            import_folders(own, ImportRequest([EXAMPLES / "cold-cold", tmp_path / "nope"]))
+        answer = import_folders(own, ImportRequest([tmp_path / "nope", EXAMPLES / "cold-cold"]))
+        assert [refused.folder for refused in answer.refused] == [str(tmp_path / "nope")]
         assert [row.campaign for row in campaigns.campaigns(own).campaigns] == ["cold-cold"]
 
 

@@ -15,13 +15,20 @@ EXAMPLE = "monitor audit --last 20"
 def options(parser: ArgumentParser) -> None:
     common(parser)
     parser.add_argument("--last", type=int, default=20, metavar="N", help="how many entries (default 20)")
+    parser.add_argument(
+        "--check", action="store_true", help="name entries that were edited, removed or put elsewhere"
+    )
 
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        answer = keeping.audit(db, keeping.AuditRequest(options.last))
+        answer = keeping.audit(db, keeping.AuditRequest(options.last, options.check))
     if options.json:
         output.document(answer)
     else:
         output.listing(answer.entries, "nothing was written yet")
-    return 0
+        for fault in answer.faults or ():
+            output.say(fault)
+        if answer.faults == ():
+            output.say("every entry of the audit is in its place and as it was written")
+    return 1 if answer.faults else 0

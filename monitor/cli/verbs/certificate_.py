@@ -1,4 +1,4 @@
-"""Calibration certificates: issue one for a run, show, verify a file, amend, withdraw."""
+"""Calibration certificates: issue one for a run, show, verify a file, amend, withdraw, the laboratory's template."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
+from monitor.cli.configuration import configuration
 from monitor.cli.database import opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
@@ -34,13 +35,16 @@ from monitor.workflow.certificate.states import (
     write_digital,
     write_issued,
 )
+from monitor.workflow.certificate.template import TemplateRequest, write_template
 from monitor.workflow.certificate.verification import verify_file
 
 EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/laboratory.toml"
 
 
 def options(parser: ArgumentParser) -> None:
-    verbs = parser.add_subparsers(dest="what", metavar="issue|show|verify|amend|withdraw", required=True)
+    verbs = parser.add_subparsers(
+        dest="what", metavar="issue|show|verify|amend|withdraw|template", required=True
+    )
     issued = verbs.add_parser("issue", **described("a certificate for one run", EXAMPLE))
     issued.add_argument("campaign", metavar="CAMPAIGN")
     issued.add_argument(
@@ -84,6 +88,9 @@ def options(parser: ArgumentParser) -> None:
     verified.add_argument(
         "--trust", type=Path, metavar="PEM", help="certificates that the signer's has to lead to"
     )
+    verified.add_argument(
+        "--expect", metavar="SHA256", help="the hash of the file as it was noted elsewhere when it was issued"
+    )
     verified.set_defaults(run=_verify)
     amended = verbs.add_parser(
         "amend",
@@ -109,6 +116,21 @@ def options(parser: ArgumentParser) -> None:
     withdrawn.add_argument("number", metavar="NUMBER")
     withdrawn.add_argument("--reason", required=True, help="why it is withdrawn")
     withdrawn.set_defaults(run=_withdraw)
+    templated = verbs.add_parser(
+        "template",
+        **described(
+            "the file that a laboratory fills in, with every key and no answer yet",
+            "monitor certificate template --language de --out laboratory.toml",
+        ),
+    )
+    templated.add_argument(
+        "--language", metavar="de|en", help="of the file (default: that of the configuration, else en)"
+    )
+    templated.add_argument(
+        "--out", type=Path, default=Path("laboratory.toml"), metavar="FILE", help="default: laboratory.toml"
+    )
+    templated.set_defaults(run=_template)
+    common(templated, database=False)
     for verb in (issued, shown, verified, amended, withdrawn):
         common(verb)
 
@@ -185,19 +207,36 @@ def _remake(options: Namespace) -> int:
 
 def _verify(options: Namespace) -> int:
     with opened(options) as db, output.working("verifying"):
-        answer = verify_file(db, VerificationRequest(options.file, options.trust))
+        answer = verify_file(db, VerificationRequest(options.file, options.trust, options.expect))
     if options.json:
         output.document(answer)
         return 0 if answer.ok else 1
     for name, passed in dataclasses.asdict(answer.checks).items():
+        if name == "expected" and passed is None:
+            continue
         output.say(f"{name:<10} {'not signed' if passed is None else 'good' if passed else 'FAILED'}")
     if answer.signer is not None:
         output.say(f"signed by {answer.signer}{'' if options.trust else ' (not checked against --trust)'}")
     for fault in answer.faults:
         output.say(f"  {fault}")
     name = options.file if answer.number is None else f"certificate {answer.number}"
-    output.say(f"{name} is {'genuine and valid' if answer.ok else 'NOT confirmed'}")
+    # Only a signer who was checked says who it is from; the database alone may have been rewritten as a whole.
+    verdict = (
+        "genuine and valid" if answer.signer is None or options.trust else "valid, its signer was not checked"
+    )
+    output.say(f"{name} is {verdict if answer.ok else 'NOT confirmed'}")
     return 0 if answer.ok else 1
+
+
+def _template(options: Namespace) -> int:
+    answer = write_template(
+        TemplateRequest(options.out, options.language or configuration().language or "en")
+    )
+    if options.json:
+        output.document(answer)
+    else:
+        output.say(f"{answer.file}: write your answers between the quotes")
+    return 0
 
 
 def _withdraw(options: Namespace) -> int:

@@ -36,7 +36,7 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     request = CompareRequest(options.campaign, options.model, options.figures)
     # One transaction: figures that cannot be drawn leave no result behind.
-    with opened(options) as db, output.working("comparing"), db.transaction():
+    with opened(options) as db, output.working("comparing"):
         answer = compare(db, request)
     if options.json:
         output.document(answer)

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 from monitor.cli import output
+from monitor.cli.database import PATIENCE_S
 from monitor.cli.parser import Parser, common
 from monitor.cli.verbs import (
     certificate_,
@@ -110,7 +111,7 @@ def _call(verb: ModuleType, name: str, database: str, arguments: list[str], sile
     """Run a verb as a user would type it."""
     parser = Parser(prog=f"monitor {name}")
     verb.options(parser)
-    options = parser.parse_args(arguments, Namespace(db=database))
+    options = parser.parse_args(arguments, Namespace(db=database, wait=PATIENCE_S))
     function = getattr(options, "run", None) or verb.run
     with contextlib.redirect_stdout(io.StringIO()) if silent else contextlib.nullcontext():
         return int(function(options))

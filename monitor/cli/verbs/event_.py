@@ -7,12 +7,11 @@ last event on. A note is only shown with the history. Neither can be undone.
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from datetime import datetime
 
 from monitor.cli import output
 from monitor.cli.database import opened
+from monitor.cli.moments import moment
 from monitor.cli.parser import common
-from monitor.exceptions import InputError
 from monitor.workflow.events import EventRequest, event
 
 EXAMPLE = 'monitor event HU40-T --at 2026-03-05T07:00:00-05:00 --kind repair "B axis encoder changed"'
@@ -25,7 +24,9 @@ def options(parser: ArgumentParser) -> None:
         "text", nargs="?", metavar="TEXT", help="what happened; without it the events are listed"
     )
     parser.add_argument(
-        "--at", metavar="TIME", help="when it happened, ISO 8601 with an offset; needed with TEXT"
+        "--at",
+        metavar="TIME",
+        help="when it happened: 2026-03-05, 2026-03-05 07:00, or with an offset from UTC; needed with TEXT",
     )
     parser.add_argument(
         "--kind",
@@ -36,7 +37,10 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     request = EventRequest(
-        options.machine, options.text, None if options.at is None else _moment(options.at), options.kind
+        options.machine,
+        options.text,
+        None if options.at is None else moment(options.at, "--at"),
+        options.kind,
     )
     with opened(options) as db:
         answer = event(db, request)
@@ -45,10 +49,3 @@ def run(options: Namespace) -> int:
     else:
         output.listing(answer.events, "nothing was recorded yet")
     return 0
-
-
-def _moment(text: str) -> datetime:
-    try:
-        return datetime.fromisoformat(text)
-    except ValueError:
-        raise InputError(f"--at {text}: write a time as 2026-03-05T07:00:00-05:00") from None

@@ -32,7 +32,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     # One transaction: figures that cannot be drawn leave no result behind.
-    with opened(options) as db, output.working("searching"), db.transaction():
+    with opened(options) as db, output.working("searching"):
         answer = explain(db, ExplainRequest(options.campaign, options.model, options.rate, options.figures))
     if options.json:
         output.document(answer)

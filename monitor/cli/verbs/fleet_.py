@@ -11,6 +11,7 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.trend_output import weekly_lines
 from monitor.workflow.fleet import FleetRequest, FleetTableRow, fleet
 
 EXAMPLE = "monitor fleet --top 50"
@@ -29,10 +30,15 @@ def options(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
     )
+    parser.add_argument(
+        "--weekly-looks",
+        action="store_true",
+        help="also what looks at all machines every week noticed (reads the history of every machine)",
+    )
 
 
 def run(options: Namespace) -> int:
-    request = FleetRequest(options.model, options.top)
+    request = FleetRequest(options.model, options.top, options.weekly_looks)
     with opened(options) as db, output.working("summing"):
         answer = fleet(db, request)
     if options.json:
@@ -48,6 +54,15 @@ def run(options: Namespace) -> int:
     for attention, count in answer.attention.items():
         if count:
             output.say(f"{count} of {answer.rows}: {attention}")
+    widest = max((row.slope_widening for row in answer.table if row.slope_widening), default=1.0)
+    if widest > 1.0:
+        output.say(
+            "slopes allow for days that resemble each other: their intervals are up to "
+            f"{widest:.2g} times as wide as with independent days"
+        )
+    if answer.weekly_looks is not None:
+        for line in weekly_lines(answer.weekly_looks, machines=True):
+            output.say(line)
     if answer.not_identified:
         names = ", ".join(answer.not_identified[:MOST_NAMED]) + ", ..." * (
             len(answer.not_identified) > MOST_NAMED

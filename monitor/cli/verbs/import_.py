@@ -1,7 +1,11 @@
-"""Import campaign folders, all or nothing each. A folder that was imported before changes nothing."""
+"""Import campaign folders, all or nothing each. A folder that was imported before changes nothing.
+
+Where several are named, one that is refused does not hinder the others: exit status 2 says that there was one.
+"""
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
@@ -29,4 +33,10 @@ def run(options: Namespace) -> int:
             output.say(folder.message)
             for note in folder.notes:
                 output.say(f"note: {note}")
-    return 0
+    for refused in answer.refused:
+        print(f"monitor: {refused.why}", file=sys.stderr)
+    if answer.refused:
+        names = ", ".join(refused.folder for refused in answer.refused)
+        count = len(answer.refused)
+        print(f"monitor: {count} of {len(request.folders)} folders refused: {names}", file=sys.stderr)
+    return 2 if answer.refused else 0

@@ -58,7 +58,7 @@ def run(options: Namespace) -> int:
         out=options.out,
     )
     # One transaction: files that cannot be written leave no result behind.
-    with opened(options) as db, output.working("mapping"), db.transaction():
+    with opened(options) as db, output.working("mapping"):
         answer = volumetric_map(db, request)
     if options.json:
         output.document(answer)

@@ -126,8 +126,7 @@ def _add(options: Namespace) -> int:
             if options.json:
                 output.document(changed)
             return 0
-        # One transaction: a campaign that is not there leaves no model behind.
-        with output.working("fitting"), db.transaction():
+        with output.working("fitting"):
             answer = add_effect(db, request)
     return _changed(answer, options.json)
 

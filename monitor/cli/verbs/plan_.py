@@ -78,7 +78,7 @@ def run(options: Namespace) -> int:
         _separate(options.separate), figures=options.figures,
     )  # fmt: skip
     # One transaction: files that cannot be written leave no result behind.
-    with opened(options) as db, output.working("planning"), db.transaction():
+    with opened(options) as db, output.working("planning"):
         answer = plan(db, request)
     if options.json:
         output.document(answer)

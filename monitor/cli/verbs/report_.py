@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from monitor.cli import output
+from monitor.cli.configuration import configuration
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
@@ -17,6 +18,8 @@ from monitor.workflow.health.mail import mail_report, read_mail_settings
 from monitor.workflow.health.report import report
 from monitor.workflow.health.request import ReportAnswer, ReportOptions, ReportRequest
 
+#: What stands for --mail without a file.
+_CONFIGURED = Path()
 EXAMPLE = "monitor report --week 2026-W10 --out reports-out --fail-on-alarm"
 
 
@@ -48,12 +51,20 @@ def options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--mail",
         type=Path,
+        nargs="?",
+        const=_CONFIGURED,
         metavar="FILE",
-        help="send it as this configuration says (see examples/mail.toml)",
+        help="send it as this file says (see examples/mail.toml); without FILE as that of the configuration",
     )
 
 
 def run(options: Namespace) -> int:
+    if options.mail is _CONFIGURED:
+        options.mail = configuration().mail
+        if options.mail is None:
+            raise InputError(
+                "--mail FILE: name a file, or write one as mail into the configuration (monitor.toml)"
+            )
     if options.mail is not None:
         read_mail_settings(options.mail)  # what is wrong with it is said before the work, not after
     request = ReportRequest(

@@ -50,7 +50,7 @@ def run(options: Namespace) -> int:
         )
     if making and options.compare is not None:
         raise InputError("make the selection first, then --compare it")
-    with opened(options, threads=1) as db, output.working("selecting"), db.transaction():
+    with opened(options, threads=1) as db, output.working("selecting"):
         answer = _answer(db, options)
     if options.json:
         output.document(answer)

@@ -43,7 +43,7 @@ def run(options: Namespace) -> int:
     elif options.csv:
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow(answer.columns)
-        writer.writerows(answer.rows)
+        writer.writerows([output.csv_cell(cell) for cell in row] for row in answer.rows)
     else:
         _table(answer)
     return 0

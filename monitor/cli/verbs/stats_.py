@@ -50,7 +50,7 @@ def run(options: Namespace) -> int:
         figures=options.figures,
     )
     # One transaction: figures that cannot be drawn leave no result behind.
-    with opened(options, threads=1) as db, output.working("computing"), db.transaction():
+    with opened(options, threads=1) as db, output.working("computing"):
         answer = stats(db, request)
     if options.json:
         output.document(answer)

@@ -8,11 +8,12 @@ reference period (--reference), by default the first third of the history.
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 from monitor.cli import output, trend_output
 from monitor.cli.database import opened
+from monitor.cli.moments import moment
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
 from monitor.workflow.trend.request import TrendRequest
@@ -46,40 +47,36 @@ def options(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
     )
+    parser.add_argument(
+        "--weekly-looks",
+        action="store_true",
+        help="also what looks at the whole fleet every week noticed (reads the history of every machine)",
+    )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw every parameter over the dates")
-
-
-def _date(text: str, option: str) -> datetime:
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        raise InputError(
-            f"{option} {text}: write a date as 2026-03-05 or 2026-03-05T07:00:00-05:00"
-        ) from None
-    return moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
 
 
 def _period(text: str) -> tuple[datetime, datetime]:
     start, dots, end = text.partition("..")
     if not dots:
         raise InputError(f"--reference {text}: write two dates as 2026-01-01..2026-03-01")
-    return _date(start, "--reference"), _date(end, "--reference")
+    return moment(start, "--reference"), moment(end, "--reference")
 
 
 def run(options: Namespace) -> int:
     request = TrendRequest(
         machine=options.machine,
         parameter=options.parameter,
-        since=None if options.since is None else _date(options.since, "--since"),
-        next_check=None if options.next_check is None else _date(options.next_check, "--next-check"),
+        since=None if options.since is None else moment(options.since, "--since"),
+        next_check=None if options.next_check is None else moment(options.next_check, "--next-check"),
         reference=None if options.reference is None else _period(options.reference),
         reliability=options.reliability,
         campaigns=tuple(options.campaign),
         model=options.model,
         volumetric_limit_um=options.volumetric_limit,
         figures=options.figures,
+        weekly_looks=options.weekly_looks,
     )
-    with opened(options) as db, output.working("following"), db.transaction():
+    with opened(options) as db, output.working("following"):
         answer = trend(db, request)
     if options.json:
         output.document(answer)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
 from monitor.discovery.search.held_out import folds_of, held_out_rms
 from monitor.discovery.search.projection import orthonormal_to_full_precision, without
+from monitor.discovery.search.remainder import Remainders
 from monitor.effects.curve import CurveEffect, curve_columns
 from monitor.methods.curve.fit import CurveFit
 from monitor.methods.curve.problem import CurveProblem
@@ -102,6 +104,11 @@ class CurveScene:
         """The columns (m, c) of candidates; those of the model are taken out of everything."""
         none = np.empty((len(self.residual), 0))
         return np.concatenate([none, *(candidate.columns for candidate in candidates)], axis=1)
+
+    @cached_property
+    def remainders(self) -> Remainders:
+        """What selected effects leave of the residual."""
+        return Remainders(self.residual, self.degrees_of_freedom, self.columns)
 
     def held_out_error(self, columns: Array) -> float | None:
         """Root mean square error on folds of rows left out in turn."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from monitor.discovery.machine.flexible import FlexibleErrors, error_of
@@ -15,33 +16,73 @@ from monitor.discovery.machine.refine import refine
 from monitor.discovery.machine.run_evidence import p_value_against_runs
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.variants import with_drivers
-from monitor.discovery.search.acceptance import Acceptance, lowers_held_out_error
+from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.amplitudes import amplitudes
-from monitor.discovery.search.evidence import BEYOND, STANDS_OUT, Evidence, Pool
+from monitor.discovery.search.evidence import (
+    BEYOND,
+    STANDS_OUT,
+    Evidence,
+    Pool,
+    best_of_families,
+    weigh_beside,
+)
+from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
 from monitor.discovery.search.sign_flips import p_value_by_flips
 from monitor.records import Array
 
+# Readings of one block of a run: some minutes, beyond what neighbours share once their correlation is taken out.
+BLOCK = 15
+# So many effects within the shape of another are named at most.
+MOST_NAMED = 5
+
+
+def blocks_of_runs(scene: ChainScene) -> npt.NDArray[np.int64]:
+    """The block (M,) of every whitened number: some neighbouring readings of one run."""
+    problem = scene.fit.problem
+    runs, rows = scene.fit.solution.last.residual.shape
+    numbers = problem.sigma.shape[1]
+    count = max(rows // (BLOCK * numbers), 1)
+    return np.asarray(scene.run * count + np.tile(np.arange(rows) * count // rows, runs))
+
 
 class ChainAcceptance(Acceptance[ChainCandidate]):
-    """The rules of a search on a chain; ``drivers`` are those that the recorded columns allow."""
+    """The rules of a search on a chain; ``drivers`` are those that the recorded columns allow, ``shared`` effects that
+    the scene takes for granted."""
 
-    def __init__(self, scene: ChainScene, drivers: Sequence[str], rate: float) -> None:
+    def __init__(
+        self, scene: ChainScene, drivers: Sequence[str], rate: float, shared: Sequence[ChainCandidate] = ()
+    ) -> None:
         self.scene = scene
+        self.shared = shared
         self.drivers = drivers
         self.rate = rate
         self._families = family_count(scene)
         self._poses = poses_of_rows(scene.fit)
+        self._units = (scene.run, blocks_of_runs(scene))
         self._flexible = FlexibleErrors(scene, drivers)
-        self._latest: tuple[object, Array, Array, tuple[ChainCandidate, ...]] | None = None
+        self._weighed: Memory[float] = Memory()
+        self._accepted: Memory[bool] = Memory()
+        self._refined: Memory[ChainCandidate] = Memory()
+        self._pool: Pool[ChainCandidate] | None = None
+        self._flipped: Memory[float | None] = Memory()
+        self._errors: Memory[tuple[float | None, float | None]] = Memory()
 
     def accepts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect stands out with every pose as one observation and from how its size scatters from run to
         run, is of a plausible size, and lowers the error on runs left out (blocks of poses where there is one run; true
         where it has few) and that at poses left out of every run."""
+        return self._accepted.answer(others, candidate, lambda: self._is_accepted(others, candidate))
+
+    def _is_accepted(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         limit = self.rate
-        if not self._survives(others, candidate) or not self._is_plausible(others, candidate):
+        named = [
+            *self._larger_errors(others, candidate),
+            *(shared for shared in self.shared if error_of(shared) != error_of(candidate)),
+        ]
+        if not self._survives(others, candidate, named) or not self._is_plausible(others, candidate):
             return False
         if self._poses is not None:
             by_poses = p_value_by_poses(candidate, self.scene, others, self._poses)
@@ -49,38 +90,64 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
                 return False
         if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
             return False
-        return lowers_held_out_error(self.scene, others, candidate) and self._predicts_poses(
-            others, candidate
-        )
+        return self._predicts(others, candidate)
 
-    def _survives(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
-        """Whether an effect stands out beside the errors of others in whatever shape they have."""
-        named = [other for other in others if error_of(other) != error_of(candidate)]
+    def within_shapes(self, selected: Sequence[ChainCandidate]) -> list[tuple[str, ...]]:
+        """For each selected effect the families that stand out beside all selected ones, but not beside its error in
+        any shape."""
+        pool = Pool(tuple(candidate for candidate in self.scene.candidates if candidate.visible))
+        families = {candidate.family for candidate in selected}
+        within: list[list[str]] = [[] for _ in selected]
+        for evidence in best_of_families(weigh_beside(self.scene, pool, selected)):
+            candidate = evidence.candidate
+            if evidence.p_value * self._families > self.rate or candidate.family in families:
+                continue
+            for index, named in enumerate(selected):
+                other_error = error_of(named) != error_of(candidate)
+                if other_error and not self._survives(selected, candidate, [named]):
+                    within[index].append(candidate.family)
+                    break
+        return [tuple(names[:MOST_NAMED]) for names in within]
+
+    def _survives(
+        self,
+        others: Sequence[ChainCandidate],
+        candidate: ChainCandidate,
+        named: Sequence[ChainCandidate],
+    ) -> bool:
+        """Whether an effect stands out beside others, the ``named`` ones in whatever shape they have."""
         if not named:
             return True
-        basis, residual = self._beside(others, named)
-        columns = orthonormal(without(basis, candidate.columns))
+        beside = self.scene.remainders.beside([*others, *self._flexible.competitors(named)])
+        residual = beside.residual
+        columns = orthonormal(without(beside.basis, candidate.columns))
         explained = float(np.sum((columns.T @ residual) ** 2))
         size = columns.shape[1]
-        dof = self.scene.degrees_of_freedom - basis.shape[1] - size
+        dof = beside.degrees_of_freedom - size
         rest = float(residual @ residual) - explained
         if size == 0 or dof < 1 or rest <= 0.0:
             return False
         p_value = float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof)))
         return p_value * candidate.variant.tries * candidate.variant.odds * self._families <= self.rate
 
-    def _beside(
-        self, others: Sequence[ChainCandidate], named: Sequence[ChainCandidate]
-    ) -> tuple[Array, Array]:
-        """The span (M, r) of others, ``named`` ones in any shape, and the residual (M,) without it."""
-        key = (tuple(id(other) for other in others), tuple(id(other) for other in named))
-        if self._latest is None or self._latest[0] != key:
-            columns = np.concatenate([self.scene.columns(others), self._flexible.columns(named)], axis=1)
-            basis = orthonormal(columns)
-            residual = without(basis, self.scene.residual[:, None])[:, 0]
-            # The others are kept too: an identity is only that of an object that exists.
-            self._latest = (key, basis, residual, (*others, *named))
-        return self._latest[1], self._latest[2]
+    def _larger_errors(
+        self, others: Sequence[ChainCandidate], candidate: ChainCandidate
+    ) -> list[ChainCandidate]:
+        """The effects of other errors that explain more beside all than a candidate does: of two effects the larger one
+        is named first, and its shape may be the cause of the other, not the other way round."""
+        own = self._explained(others, candidate)
+        return [
+            other
+            for index, other in enumerate(others)
+            if error_of(other) != error_of(candidate)
+            and self._explained([*except_for(others, index), candidate], other) >= own
+        ]
+
+    def _explained(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> float:
+        """The sum of squares that a candidate explains beside others."""
+        return self._weighed.answer(
+            others, candidate, lambda: weigh_beside(self.scene, [candidate], others)[0].explained
+        )
 
     def _is_plausible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect beside others is no larger than a machine could have."""
@@ -90,19 +157,34 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         sure = np.maximum(np.abs(sizes) - STANDS_OUT * spread, 0.0)
         return float(np.linalg.norm(sure)) <= BEYOND * candidate.largest
 
-    def _predicts_poses(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
-        """Whether an effect beside others lowers the error at poses left out of every run; true where there are too
-        few poses."""
+    def _predicts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        """Whether an effect beside others lowers the error on runs left out (blocks of poses where there is one run)
+        and that at poses left out of every run; true where there are too few."""
         columns = self.scene.columns(others)
-        before = self.scene.held_out_error_by_poses(columns)
-        after = self.scene.held_out_error_by_poses(np.concatenate([columns, candidate.columns], axis=1))
-        return before is None or after is None or after < before
+        before = self._errors.answer(others, None, lambda: self._held_out(columns))
+        more = np.concatenate([columns, candidate.columns], axis=1)
+        return all(
+            without is None or (error := held_out(more)) is None or error < without
+            for without, held_out in zip(
+                before, (self.scene.held_out_error, self.scene.held_out_error_by_poses), strict=True
+            )
+        )
+
+    def _held_out(self, columns: Array) -> tuple[float | None, float | None]:
+        """The errors by runs and by poses with ``columns`` (M, c)."""
+        return self.scene.held_out_error(columns), self.scene.held_out_error_by_poses(columns)
 
     def stands_among(
         self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
     ) -> bool:
         """Whether an effect stands out under sign flips of whole runs, where there are enough of them."""
-        p_value = p_value_by_flips(self.scene, pool, others, evidence, self.scene.run)
+        if pool is not self._pool:
+            self._pool, self._flipped = pool, Memory()
+        p_value = self._flipped.answer(
+            others,
+            evidence.candidate,
+            lambda: p_value_by_flips(self.scene, pool, others, evidence, self._units),
+        )
         return p_value is None or p_value <= self.rate
 
     def alternatives(self, candidate: ChainCandidate) -> Sequence[ChainCandidate]:
@@ -111,4 +193,8 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
 
     def at_best_value(self, selected: Sequence[ChainCandidate], index: int) -> ChainCandidate:
         """The selected candidate at an index with its time constant, pitch or order at the best value."""
-        return refine(self.scene, selected, index).candidate
+        return self._refined.answer(
+            except_for(selected, index),
+            selected[index],
+            lambda: refine(self.scene, selected, index).candidate,
+        )

@@ -27,7 +27,8 @@ CHECKED = 1e-6
 
 @dataclass(frozen=True)
 class BadPoint:
-    """A probing that contradicts the same one of the other runs; ``size`` mm along the machine's ``axis``."""
+    """A probing that contradicts the same one of the other runs; ``size`` mm along the machine's ``axis``. ``rows`` are
+    those of a pose that is bad as a whole."""
 
     row: int
     run: int
@@ -37,6 +38,12 @@ class BadPoint:
     size: float
     p_value: float
     chi_square: float = 0.0
+    rows: tuple[int, ...] = ()
+
+    @property
+    def all_rows(self) -> tuple[int, ...]:
+        """The rows that are left out with it."""
+        return self.rows or (self.row,)
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,11 @@ class Correlation:
     share: float
 
 
+def caution(correlation: Correlation | None) -> tuple[float, float]:
+    """What orders correlations by how much slow change they put down to noise."""
+    return (0.0, 0.0) if correlation is None else (correlation.rho * correlation.share, correlation.rho)
+
+
 @dataclass(frozen=True)
 class Rows:
     """The layout of whitened numbers (R, N): ``weighted`` (R, T) touches of d numbers each, ``turned`` (R, T, d, d)

@@ -9,22 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
+from monitor.discovery.machine.acceptance import ChainAcceptance
 from monitor.discovery.machine.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.compare import ChainComparison, compare
-from monitor.discovery.machine.correlation import Correlation
+from monitor.discovery.machine.correlation import Correlation, caution
 from monitor.discovery.machine.cures import Mistake
+from monitor.discovery.machine.curve_findings import with_curves
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
+from monitor.discovery.machine.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.poses import poses_of_rows
 from monitor.discovery.machine.refine import Refined, refine_all
+from monitor.discovery.machine.robot_search import search_beside_curves
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
 from monitor.discovery.machine.steps import Step, find_steps
-from monitor.discovery.machine.surroundings import surroundings_of
-from monitor.discovery.machine.suspects import Suspects, find_suspects, with_effects
+from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
+from monitor.discovery.machine.suspects import MOST_BAD_POINTS, Suspects, find_suspects, with_effects
 from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.machine.variants import (
     cycles_of_unknown_pitch,
@@ -34,12 +39,23 @@ from monitor.discovery.machine.variants import (
 )
 from monitor.discovery.machine.varying import varying_effects
 from monitor.discovery.search.comparison import Verdict
+from monitor.discovery.search.scan import MOST_EFFECTS
 from monitor.effects.catalogue import catalogue
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
-MOST_ROUNDS = 6
+MOST_ROUNDS = 4
+# Lines of joint curves that bad poses hid show once these are out; what they show again hides no more.
+MOST_CURVES = 4
+
+
+class Limit(StrEnum):
+    """What a search has an end of, whatever the data."""
+
+    EFFECTS = "effects"
+    BAD_POINTS = "bad_points"
+    ROUNDS = "rounds"
 
 
 @dataclass(frozen=True)
@@ -50,6 +66,7 @@ class Explanation:
     nothing that this plan can see. Of ``missing`` those marked ``varies`` have another size in every run, and no
     recorded column follows it. ``unfitted`` stood out but could not be fitted, and were skipped. Where the file itself
     looks wrong, ``mistakes`` says how, and nothing else is reported.
+    ``limits`` says at which ends of the search more may be there.
     """
 
     comparison: ChainComparison
@@ -62,6 +79,7 @@ class Explanation:
     final: Fit
     mistakes: tuple[Mistake, ...] = ()
     unfitted: tuple[str, ...] = ()
+    limits: tuple[Limit, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -74,6 +92,17 @@ class _Search:
     suspects: Suspects
     under: Fit
     unfitted: tuple[str, ...] = ()
+    settled: bool = True
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """The ends that the search came to."""
+        reached = {
+            Limit.EFFECTS: len(self.refined) >= MOST_EFFECTS,
+            Limit.BAD_POINTS: len(self.suspects.bad) >= MOST_BAD_POINTS,
+            Limit.ROUNDS: not self.settled,
+        }
+        return tuple(limit for limit, is_reached in reached.items() if is_reached)
 
     @property
     def effects(self) -> list[MachineEffect]:
@@ -81,7 +110,9 @@ class _Search:
         return [finding.candidate.effect for finding in self.refined]
 
 
-def _variants(campaign: Campaign, problem: ChainProblem, drivers: Sequence[str]) -> list[ChainVariant]:
+def variants_of_campaign(
+    campaign: Campaign, problem: ChainProblem, drivers: Sequence[str]
+) -> list[ChainVariant]:
     """Every effect of the catalogue that the model lacks, with what is searched of it."""
     axes = campaign.machine.axes.items()
     pitches = {name: axis.scale_pitch for name, axis in axes if axis.scale_pitch is not None}
@@ -116,10 +147,10 @@ def explain(
     if first is None or foreseen is not problem:
         first = fit(foreseen, certain.left_out(foreseen) if gross else None)
     surroundings = surroundings_of(campaign, foreseen)
-    variants = _variants(campaign, foreseen, surroundings.drivers)
-    search = _search(first, foreseen, variants, surroundings.drivers, rate, certain)
+    variants = variants_of_campaign(campaign, foreseen, surroundings.drivers)
+    curves, search = _search_with_curves(first, foreseen, variants, surroundings.drivers, rate, certain)
     suspects = search.suspects
-    missing = missing_effects(search.scene, search.result, search.refined, surroundings)
+    missing = _missing(first, foreseen, curves, search, surroundings, certain, rate)
     if suspects.varying:
         effects = [*suspects.move_effects(foreseen), *search.effects]
         steady, _ = fit_those_possible(foreseen, effects, search.under.left_out, first)
@@ -140,7 +171,60 @@ def explain(
         refused=search.scene.refused,
         final=search.under,
         unfitted=search.unfitted,
+        limits=search.limits,
     )
+
+
+def _missing(
+    first: Fit,
+    problem: ChainProblem,
+    curves: Sequence[ChainVariant],
+    search: _Search,
+    surroundings: Surroundings,
+    certain: Suspects,
+    rate: float,
+) -> tuple[ChainMissing, ...]:
+    """What is reported as missing: the effects of a search, the curves of joints before them."""
+    if curves:
+        suspects = search.suspects
+        base = first if suspects.same_as(certain) else fit(problem, suspects.left_out(problem), first)
+        return missing_effects(
+            *with_curves(base, curves, search.scene, search.result, search.refined), surroundings
+        )
+    missing = missing_effects(search.scene, search.result, search.refined, surroundings)
+    if missing:
+        rules = ChainAcceptance(search.scene, surroundings.drivers, rate)
+        within = rules.within_shapes([finding.candidate for finding in search.refined])
+        missing = tuple(
+            replace(effect, within_its_shape=names) for effect, names in zip(missing, within, strict=True)
+        )
+    return missing
+
+
+def _search_with_curves(
+    first: Fit,
+    problem: ChainProblem,
+    variants: Sequence[ChainVariant],
+    drivers: Sequence[str],
+    rate: float,
+    gross: Suspects,
+) -> tuple[tuple[ChainVariant, ...], _Search]:
+    """The curves of joints with several lines, and the search under them; once more without the bad poses that it
+    named, as long as these hide lines."""
+    curves = joint_curves(first, variants, rate)
+    if not curves:
+        return (), _search(first, problem, variants, drivers, rate, gross)
+    suspects = gross
+    for _ in range(MOST_CURVES):
+        under_curves = with_effects(problem, [curve.effect for curve in curves])
+        begin = fit(under_curves, suspects.left_out(problem), first)
+        search = _search(begin, under_curves, variants, drivers, rate, gross, suspects)
+        if search.suspects.same_as(suspects):
+            break
+        suspects = search.suspects
+        clean = fit(problem, suspects.left_out(problem), first)
+        curves = joint_curves(clean, variants, rate) or curves
+    return curves, search
 
 
 def _search(
@@ -149,19 +233,24 @@ def _search(
     variants: Sequence[ChainVariant],
     drivers: Sequence[str],
     rate: float,
-    suspects: Suspects,
+    gross: Suspects,
+    beside_curves: Suspects | None = None,
 ) -> _Search:
-    """Search effects and suspects in turn, each under the others and the ``suspects`` that ``first`` leaves out, until
-    nothing changes."""
-    gross = suspects
-    correlation: Correlation | None = None
+    """Search effects and suspects in turn, each under the others and the ``gross`` readings that ``first`` leaves out,
+    until nothing changes; beside the curves of joints it leaves out the suspects so far."""
+    initial = suspects = gross if beside_curves is None else beside_curves
+    noise = _Noise()
+    earlier: list[Suspects] = []
     unfitted: list[str] = []
     for _ in range(MOST_ROUNDS):
         out, single = suspects.left_out(problem), suspects.effects(problem)
-        current = first if suspects.same_as(gross) else fit(with_effects(problem, single), out, first)
-        current = current.with_correlation(correlation)
+        current = first if suspects.same_as(initial) else fit(with_effects(problem, single), out, first)
+        current = current.with_correlation(noise.correlation)
         able = [variant for variant in variants if variant.family not in unfitted]
-        scene, result = search_chain(scene_of(current, able), drivers, rate)
+        if beside_curves is not None:
+            scene, result = search_beside_curves(current, able, rate)
+        else:
+            scene, result = search_chain(scene_of(current, able), drivers, rate)
         refined = refine_all(scene, result.candidates)
         under, unable = fit_those_possible(
             current.problem, [finding.candidate.effect for finding in refined], out, current
@@ -171,20 +260,52 @@ def _search(
                 finding.candidate.family for finding in refined if finding.candidate.effect in unable
             ]
             continue
-        effects = [finding.candidate.effect for finding in refined]
         # What all runs share and what the effects explain is no noise of neighbours.
-        before, correlation = correlation, _correlation(under)
-        if correlation != before:
+        search = noise.settled(
+            _correlation(under),
+            _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted))),
+        )
+        if search is None:
             continue
         # Readings are judged under the present effects, again from the start: what looked bad without them may be good.
-        begin = under
-        if not suspects.same_as(gross):
-            begin = fit(with_effects(problem, effects), gross.left_out(problem), current)
-        more = find_suspects(begin, problem, effects, gross, able, scene if begin is current else None)
-        if more.same_as(suspects):
-            break
+        begin = search.under
+        if beside_curves is None and not suspects.same_as(gross):
+            begin, _ = fit_those_possible(problem, search.effects, gross.left_out(problem), current)
+        same_scene = search.scene if begin is search.scene.fit else None
+        more = find_suspects(begin, problem, search.effects, gross, able, same_scene)
+        if beside_curves is not None:
+            # The curves are pursued anew first: bad poses hide lines.
+            return replace(search, suspects=more)
+        earlier.append(suspects)
+        # Suspects that had their turn come again in a circle: what was found under the last ones stands.
+        if any(more.same_as(before) for before in earlier):
+            return search
         suspects = more
-    return _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted)))
+        noise = _Noise(noise.correlation)
+    return _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted)), settled=False)
+
+
+class _Noise:
+    """The correlation of neighbours under which effects are searched, from round to round.
+
+    Effects that are found under one correlation may leave another, and so on in a circle: then the most cautious of
+    them counts.
+    """
+
+    def __init__(self, correlation: Correlation | None = None) -> None:
+        self.correlation = correlation
+        self._searches: dict[Correlation | None, _Search] = {}
+
+    def settled(self, following: Correlation | None, search: _Search) -> _Search | None:
+        """The search that counts, where the one under the present correlation leaves this or one that had its turn;
+        None where the ``following`` correlation has its turn."""
+        self._searches[self.correlation] = search
+        if following != self.correlation and following not in self._searches:
+            self.correlation = following
+            return None
+        turns = list(self._searches)
+        self.correlation = max(turns[turns.index(following) :], key=caution)
+        return self._searches[self.correlation]
 
 
 def _correlation(under: Fit) -> Correlation | None:

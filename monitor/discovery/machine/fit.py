@@ -38,7 +38,8 @@ class Nuisance:
     shared_rank: int
 
 
-@dataclass(frozen=True)
+# By identity: what depends on a fit alone is computed once for it.
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A problem and its least-squares point; ``left_out`` (n,) marks probings without weight.
 

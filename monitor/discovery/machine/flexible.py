@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.variants import TIME_CONSTANTS_S
 from monitor.discovery.search.candidate import Variant
@@ -18,7 +16,6 @@ from monitor.effects import ChainEffect, with_time_constant
 from monitor.effects.drivers import Always, parse_driver
 from monitor.effects.shapes.free import Free
 from monitor.machine import MOTION
-from monitor.records import Array
 
 
 def error_of(candidate: ChainCandidate) -> str:
@@ -33,19 +30,15 @@ class FlexibleErrors:
     def __init__(self, scene: ChainScene, drivers: Sequence[str]) -> None:
         self.scene = scene
         self.drivers = drivers
-        self._columns: dict[str, Array] = {}
+        self._competitors: dict[str, tuple[ChainCandidate, ...]] = {}
 
-    def columns(self, candidates: Sequence[ChainCandidate]) -> Array:
-        """The columns (M, k) of the flexible competitors of candidates."""
-        none = np.zeros((len(self.scene.residual), 0))
+    def competitors(self, candidates: Sequence[ChainCandidate]) -> list[ChainCandidate]:
+        """The flexible competitors of candidates."""
         parts = {self._key(candidate): candidate for candidate in candidates}
         for key, candidate in parts.items():
-            if key not in self._columns:
-                competitors = scene_of(self.scene.fit, self._variants(candidate)).candidates
-                self._columns[key] = np.concatenate(
-                    [none, *(competitor.columns for competitor in competitors)], axis=1
-                )
-        return np.concatenate([none, *(self._columns[key] for key in parts)], axis=1)
+            if key not in self._competitors:
+                self._competitors[key] = scene_of(self.scene.fit, self._variants(candidate)).candidates
+        return [competitor for key in parts for competitor in self._competitors[key]]
 
     def _key(self, candidate: ChainCandidate) -> str:
         """What candidates with the same competitor have in common."""

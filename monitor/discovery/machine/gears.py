@@ -15,7 +15,6 @@ import numpy as np
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant
 from monitor.discovery.search.candidate import Variant
-from monitor.discovery.search.projection import orthonormal, without
 from monitor.effects import parse_effect
 from monitor.machine import COMPONENTS, MOTION
 from monitor.records import Array
@@ -29,7 +28,7 @@ FEWEST_POSITIONS = 100
 MOST_PEAKS = 3
 
 
-def _rows(fit: Fit, padded: Array) -> Array:
+def in_rows(fit: Fit, padded: Array) -> Array:
     """Rows (n, d) of numbers that stand run by run (M,)."""
     problem = fit.problem
     count, numbers = problem.sigma.shape
@@ -52,10 +51,10 @@ def gear_variants(scene: ChainScene, selected: Sequence[ChainCandidate], rate: f
     ]
     if not joints:
         return []
-    basis = orthonormal(scene.columns(selected))
-    residual = without(basis, scene.residual[:, None])[:, 0]
-    variance = float(residual @ residual) / max(scene.degrees_of_freedom - basis.shape[1], 1)
-    rows = _rows(fit, residual)
+    beside = scene.remainders.beside(selected)
+    residual = beside.residual
+    variance = float(residual @ residual) / max(beside.degrees_of_freedom, 1)
+    rows = in_rows(fit, residual)
     orders = np.arange(LOWEST, HIGHEST + STEP / 2.0, STEP)
     limit = -2.0 * np.log(rate / (len(orders) * len(joints)))
     variants = []

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -41,17 +42,73 @@ def pose_parts(fit: Fit) -> npt.NDArray[np.int64] | None:
     unknowns = int(fit.solution.rank.sum()) + len(fit.problem.added_names)
     if len(problem.runs) != 1 or fit.readings < READINGS_AN_UNKNOWN * unknowns:
         return None
-    positions = problem.context.positions
-    pose = np.concatenate([[0], np.cumsum(np.any(np.diff(positions, axis=0) != 0.0, axis=1))])
+    parts = pose_blocks(fit)
+    return None if parts.max() < 0 else parts
+
+
+def pose_blocks(fit: Fit) -> npt.NDArray[np.int64]:
+    """The part (M,) of every whitened number, where blocks of neighbouring poses are dealt out to ten parts: -1 for
+    calibrated quantities and padding, and for all numbers where there are too few poses."""
+    pose = poses_of(fit)
     poses = int(pose[-1]) + 1
     blocks = min(BLOCKS, poses)
     if blocks < 2 * PARTS:
-        return None
+        return np.full(fit.solution.last.residual.size, -1, dtype=np.int64)
     part = np.random.default_rng(SEED).permutation(np.arange(blocks) % PARTS)
-    numbers = np.repeat(part[pose * blocks // poses], problem.sigma.shape[1])
-    parts = np.full(fit.solution.last.residual.size, -1, dtype=np.int64)
-    parts[: len(numbers)] = numbers
-    return parts
+    return of_numbers(fit, part[pose * blocks // poses])
+
+
+class LeftOutBlocks:
+    """Blocks of poses of a single run left out in turn, its own unknowns determined without them each time.
+
+    ``basis`` (M, p) is the orthonormal span of the run's own unknowns, ``parts`` (M,) the part of every number, -1 for
+    those never left out. What the own unknowns take of each part is worked out once (by bordering the normal equations:
+    Cook and Weisberg, Residuals and influence in regression, 1982, section 2.2).
+    """
+
+    def __init__(self, basis: Array, parts: npt.NDArray[np.int64]) -> None:
+        self._rows = [np.flatnonzero(parts == part) for part in range(int(parts.max()) + 1)]
+        self._own = [basis[rows] for rows in self._rows]
+        self._inverse = [
+            np.linalg.pinv(np.eye(basis.shape[1]) - own.T @ own, rcond=1e-10, hermitian=True)
+            for own in self._own
+        ]
+
+    def sum_of_squares(self, residual: Array, columns: Array) -> float:
+        """Sum of squares of the parts, each predicted from the others with ``columns`` (M, c) of effects beside the own
+        unknowns; residual (M,) and columns are free of these."""
+        scale = np.linalg.norm(columns, axis=0)
+        columns = columns / np.where(scale == 0, 1.0, scale)
+        gram, onto = columns.T @ columns, columns.T @ residual
+        total = 0.0
+        for rows, own, inverse in zip(self._rows, self._own, self._inverse, strict=True):
+            part, left_out = columns[rows], residual[rows]
+            mixed, alone = -own.T @ part, -own.T @ left_out
+            reaction = inverse @ mixed
+            normal = gram - part.T @ part - mixed.T @ reaction
+            sizes = np.linalg.pinv(normal, rcond=1e-10, hermitian=True) @ (
+                onto - part.T @ left_out - reaction.T @ alone
+            )
+            error = left_out - part @ sizes - own @ (inverse @ alone - reaction @ sizes)
+            total += float(error @ error)
+        return total
+
+
+def poses_of(fit: Fit) -> npt.NDArray[np.int64]:
+    """The pose (n,) of every row: rows of one run after another at which no axis moved."""
+    context = fit.problem.context
+    moved = np.any(np.diff(context.positions, axis=0) != 0.0, axis=1) | (np.diff(context.run) != 0)
+    return np.concatenate([[0], np.cumsum(moved)])
+
+
+def of_numbers(fit: Fit, rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Labels (n,) of rows as those (M,) of their whitened numbers, -1 for calibrated quantities and padding."""
+    problem = fit.problem
+    numbers = np.repeat(rows + 1.0, problem.sigma.shape[1]).reshape(problem.sigma.shape)
+    padded = problem.padded(numbers).astype(np.int64) - 1
+    labels = np.full(fit.solution.last.residual.shape, -1, dtype=np.int64)
+    labels[:, : padded.shape[1]] = padded
+    return labels.reshape(-1)
 
 
 @dataclass(frozen=True)
@@ -62,7 +119,13 @@ class PoseFold:
     rows: npt.NDArray[np.int64]
     predicted: Array
 
+    @cached_property
+    def count(self) -> int:
+        """The count of numbers that are predicted."""
+        return int(np.sum(np.any(self.predicted != 0.0, axis=2)))
 
+
+@lru_cache(maxsize=2)
 def pose_folds(fit: Fit) -> tuple[PoseFold, ...]:
     """The poses of a plan dealt out to ten folds; empty where there are too few poses."""
     problem = fit.problem
@@ -106,15 +169,18 @@ def held_out_by_poses(residual: Array, columns: Array, folds: Sequence[PoseFold]
     basis = orthonormal(columns)
     remainder = without(basis, residual.reshape(-1, 1)).reshape(residual.shape)
     shared = basis.reshape(*residual.shape, -1)
-    squares, number = 0.0, 0.0
+    number = sum(fold.count for fold in folds)
+    if not number:
+        return None
+    grams, ontos, parts = [], [], []
+    runs = np.arange(len(residual))[:, None]
     for fold in folds:
-        left_out = np.take_along_axis(remainder, fold.rows, axis=1)
-        own = np.take_along_axis(shared, fold.rows[..., None], axis=1)
-        alone = (fold.predicted @ left_out[..., None])[..., 0]
-        reaction = fold.predicted @ own
-        gram = np.eye(own.shape[2]) - np.einsum("rmc,rmd->cd", own, reaction)
-        onto = np.einsum("rmc,rm->c", reaction, left_out)
-        error = alone + reaction @ (np.linalg.pinv(gram, rcond=PREDICTED, hermitian=True) @ onto)
-        squares += float(np.sum(error**2))
-        number += float(np.sum(np.any(fold.predicted != 0.0, axis=2)))
-    return float(np.sqrt(squares / number)) if number else None
+        left_out, own = remainder[runs, fold.rows], shared[runs, fold.rows]
+        reaction = (fold.predicted @ own).reshape(left_out.size, -1)
+        grams.append(np.eye(own.shape[2]) - own.reshape(left_out.size, -1).T @ reaction)
+        ontos.append(reaction.T @ left_out.reshape(-1))
+        parts.append(((fold.predicted @ left_out[..., None]).reshape(-1), reaction))
+    inverses = np.linalg.pinv(np.array(grams), rcond=PREDICTED, hermitian=True)
+    shares = (inverses @ np.array(ontos)[..., None])[..., 0]
+    errors = [alone + reaction @ share for (alone, reaction), share in zip(parts, shares, strict=True)]
+    return float(np.sqrt(sum(float(error @ error) for error in errors) / number))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
+from monitor.discovery.machine.curve_findings import is_curve
 from monitor.discovery.machine.curves import Curve, curve_of
 from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows, widening
 from monitor.discovery.machine.refine import Refined
@@ -16,10 +17,10 @@ from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineE
 from monitor.discovery.machine.separate import Separation, separating_poses
 from monitor.discovery.machine.surroundings import Surroundings
 from monitor.discovery.machine.tables import ChainScan
+from monitor.discovery.machine.variants import part_of_period
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.missing import Missing, Rival
-from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
 from monitor.effects.drivers import EachRun
@@ -41,6 +42,8 @@ class ChainMissing(Missing):
     of days None with fewer than three days, those of poses are of poses left out of every run. ``separation`` holds the
     poses that would separate the rivals; ``varies`` says that the effect has another size in every run. Where the
     catalogue does not have its shape, ``nearest`` is the entry that comes closest, and ``curve`` the shape.
+    ``travelled_periods`` of a harmonic are less than one where the axis did not turn through its period (else None);
+    ``within_its_shape`` are effects that stand out beside it, but not beside its error in any shape.
     """
 
     held_out_days_before: float | None
@@ -51,6 +54,8 @@ class ChainMissing(Missing):
     varies: bool
     nearest: str | None = None
     curve: Curve | None = None
+    travelled_periods: float | None = None
+    within_its_shape: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,34 @@ class _Selection:
     shown: ChainScene
     poses: npt.NDArray[np.int64] | None
     surroundings: Surroundings
+    computed: dict[int, _Errors] = field(default_factory=dict)
+
+    def errors(self, first: Sequence[ChainCandidate]) -> _Errors:
+        """The errors with the first so many candidates in the model."""
+        if len(first) not in self.computed:
+            self.computed[len(first)] = _errors(self.shown, first, self.surroundings)
+        return self.computed[len(first)]
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """Root mean square in mm: of the fit, and of runs, days and poses left out, None where there are too few."""
+
+    rms: float
+    runs: float | None
+    days: float | None
+    poses: float | None
+
+
+def _errors(shown: ChainScene, first: Sequence[ChainCandidate], surroundings: Surroundings) -> _Errors:
+    runs = _held_out(shown, first, surroundings.runs)
+    single = len(surroundings.runs) == 1
+    return _Errors(
+        rms=_rms(shown, first),
+        runs=runs,
+        days=runs if single else _held_out(shown, first, surroundings.days),
+        poses=runs if single and runs is not None else _held_out_poses(shown, first),
+    )
 
 
 def missing_effects(
@@ -143,7 +176,7 @@ def _amplitude(effect: MachineEffect, coefficients: Array, covariance: Array) ->
 
 def _name(candidate: ChainCandidate) -> str:
     """The effect as written; searched pitches, orders and nodes are part of it, a searched time constant is not."""
-    searched = candidate.family.endswith((":cyclic", ":harmonic", ":table", ":free"))
+    searched = candidate.family.endswith((":cyclic", ":harmonic", ":table", ":free", ":curve"))
     return candidate.effect.text if searched else candidate.family
 
 
@@ -162,9 +195,11 @@ def _missing(
     p_value, q_value = _p_and_q(selection, finding, candidate)
     shown = selection.shown
     visible = selection.candidates if shown is scene else shown.candidates
-    before, after = visible[:index], visible[: index + 1]
-    search = RivalSearch(scene, selection.candidates, surroundings.drivers)
-    rivals = search.rivals(index, least_likelihood(finding.evidence), coefficients)
+    before, after = selection.errors(visible[:index]), selection.errors(visible[: index + 1])
+    rivals: list[tuple[ChainCandidate, bool]] = []
+    if not is_curve(candidate):
+        search = RivalSearch(scene, selection.candidates, surroundings.drivers)
+        rivals = search.rivals(index, least_likelihood(finding.evidence), coefficients)
     return ChainMissing(
         rank=index + 1,
         effect=_name(candidate),
@@ -179,22 +214,23 @@ def _missing(
         searched=refined.searched,
         p_value=p_value,
         q_value=q_value,
-        rms_before=_rms(shown, before),
-        rms_after=_rms(shown, after),
-        held_out_before=_held_out(shown, before, surroundings.runs),
-        held_out_after=_held_out(shown, after, surroundings.runs),
-        held_out_days_before=_held_out(shown, before, surroundings.days),
-        held_out_days_after=_held_out(shown, after, surroundings.days),
+        rms_before=before.rms,
+        rms_after=after.rms,
+        held_out_before=before.runs,
+        held_out_after=after.runs,
+        held_out_days_before=before.days,
+        held_out_days_after=after.days,
         rivals=tuple(Rival(_name(rival), same) for rival, same in rivals),
-        held_out_poses_before=_held_out_poses(shown, before),
-        held_out_poses_after=_held_out_poses(shown, after),
+        held_out_poses_before=before.poses,
+        held_out_poses_after=after.poses,
         separation=separating_poses(
             scene.fit, effect, coefficients, [rival.effect for rival, _ in rivals], surroundings.strokes
         ),
         varies=isinstance(effect.driver, EachRun),
+        travelled_periods=part_of_period(effect, scene.fit.problem.context),
         nearest=candidate.variant.nearest,
         curve=None
-        if candidate.variant.nearest is None
+        if candidate.variant.nearest is None and not is_curve(candidate)
         else curve_of(scene.fit.problem.context, effect, coefficients, covariance),
     )
 
@@ -214,7 +250,7 @@ def _p_and_q(
 
 def _rms(scene: ChainScene, candidates: Sequence[ChainCandidate]) -> float:
     """Root mean square in mm of all coordinates with candidates in the model."""
-    residual = without(orthonormal(scene.columns(candidates)), scene.residual[:, None])
+    residual = scene.remainders.beside(candidates).residual
     return scene.fit.sigma * float(np.sqrt(np.sum(residual**2) / scene.fit.readings))
 
 

@@ -43,13 +43,13 @@ def p_value_by_poses(
     pose: npt.NDArray[np.int64],
 ) -> float:
     """Return p-value of an effect beside others with every pose as one observation, what was searched paid for."""
-    basis = orthonormal(scene.columns(others))
-    residual = without(basis, scene.residual[:, None])[:, 0]
-    columns = orthonormal(without(basis, candidate.columns))
+    beside = scene.remainders.beside(others)
+    residual = beside.residual
+    columns = orthonormal(without(beside.basis, candidate.columns))
     size = columns.shape[1]
     inside = pose >= 0
     poses = len(np.unique(pose[inside]))
-    dof = scene.degrees_of_freedom - basis.shape[1] - size
+    dof = beside.degrees_of_freedom - size
     if size == 0 or dof < 1 or poses <= size:
         return 1.0
     onto = columns.T @ residual

@@ -27,6 +27,12 @@ from monitor.records import Array
 GRID_FACTOR = TIME_CONSTANTS_S[1] / TIME_CONSTANTS_S[0]
 # Relative step of the numerical derivative by the searched value.
 STEP = 1e-3
+# A time constant whose uncertainty exceeds half of it, as neighbours on its grid differ, is not determined.
+LARGEST_RELATIVE_U = 0.5
+# Twice the logarithm of the likelihood ratio that a value exceeds in 5 % (chi-square with one degree of freedom).
+LIMIT = 3.84
+# Values that are tried for a limit differ by this factor.
+LIMIT_FACTOR = 2.0**0.25
 # A warm-up has settled after so few readings that no data show how.
 SETTLED_READINGS = 1.0
 
@@ -109,7 +115,7 @@ def refine_all(scene: ChainScene, candidates: Sequence[ChainCandidate]) -> list[
     selected = list(candidates)
     refined: list[Refined] = []
     for index in range(len(selected)):
-        refined.append(refine(scene, selected, index))
+        refined.append(_with_limit(scene, selected, index, refine(scene, selected, index)))
         selected[index] = refined[-1].candidate
     return refined
 
@@ -150,8 +156,48 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     if searched.unit == "min" and 60.0 * value < SETTLED_READINGS * _between_readings(scene):
         # It has settled before the second reading: the plain effect.
         return Refined(at_rest(scene, candidate), None, np.zeros((len(scene.residual), 0)))
-    result = Searched(searched.name, value, u if np.isfinite(u) else None, searched.unit)
-    return Refined(refined, result if u < value else None, slope)
+    if searched.unit == "min" and _counts_readings(scene):
+        return Refined(refined, None, slope)
+    return Refined(refined, Searched(searched.name, value, u if u < value else None, searched.unit), slope)
+
+
+def _with_limit(
+    scene: ChainScene, selected: Sequence[ChainCandidate], index: int, refined: Refined
+) -> Refined:
+    """A refined candidate with the limit of a time constant that the data do not determine; without a searched value of
+    another kind that they do not determine."""
+    searched = refined.searched
+    if searched is None:
+        return refined
+    if searched.unit != "min":
+        return replace(refined, searched=searched if searched.u is not None else None)
+    if searched.u is not None and searched.u < LARGEST_RELATIVE_U * searched.value:
+        return refined
+    at_least = _at_least(scene, selected, index, searched.value)
+    return replace(refined, searched=replace(searched, u=None, at_least=at_least))
+
+
+def _at_least(
+    scene: ChainScene, selected: Sequence[ChainCandidate], index: int, value: float
+) -> float | None:
+    """The value in min that a time constant exceeds, the other selected effects fitted along; None where the shortest
+    would do."""
+    searched = _range_of(selected[index])
+    assert searched is not None
+    lowest = TIME_CONSTANTS_S[0] / 60.0 / GRID_FACTOR
+    steps = int(np.ceil(np.log(max(value / lowest, 1.0)) / np.log(LIMIT_FACTOR)))
+    values = [value / LIMIT_FACTOR**step for step in range(steps + 1)]
+    variants = [searched.variant(trial) for trial in values]
+    beside = scene.remainders.beside(except_for(selected, index))
+    total = float(beside.residual @ beside.residual)
+    best = 0.0
+    for place, candidate in enumerate(scene_of(scene.fit, variants).candidates):
+        columns = orthonormal(without(beside.basis, candidate.columns))
+        rest = max(total - float(np.sum((columns.T @ beside.residual) ** 2)), 1e-300)
+        best = rest if place == 0 else min(best, rest)
+        if beside.degrees_of_freedom * np.log(rest / best) > LIMIT:
+            return values[place]
+    return None
 
 
 def at_rest(scene: ChainScene, candidate: ChainCandidate) -> ChainCandidate:
@@ -165,6 +211,13 @@ def _between_readings(scene: ChainScene) -> float:
     context = scene.fit.problem.context
     steps = np.diff(context.time)[np.diff(context.run) == 0]
     return float(np.median(steps)) if len(steps) else 0.0
+
+
+def _counts_readings(scene: ChainScene) -> bool:
+    """Whether the column of times is no time but the number of the row: no constant in minutes comes from it."""
+    context = scene.fit.problem.context
+    steps = np.diff(context.time)[np.diff(context.run) == 0]
+    return bool(len(steps) and np.all(steps == 1.0))
 
 
 def _uncertainty(scene: ChainScene, candidate: ChainCandidate, slope: Array, others: Array) -> float:

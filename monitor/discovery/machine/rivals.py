@@ -11,7 +11,7 @@ from monitor.discovery.machine.refine import refine
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.variants import with_drivers
 from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import coincides
 from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect
@@ -37,7 +37,7 @@ class RivalSearch:
         """Effects as likely as ``least`` instead of that at an index, and whether they coincide with it; these
         first."""
         others = except_for(self.selected, index)
-        basis = orthonormal(self.scene.columns(others))
+        basis = self.scene.remainders.beside(others).basis
         remainder = without(basis, self.selected[index].columns) @ coefficients
         rivals = []
         for evidence in best_of_families(weigh_beside(self.scene, self._pool(index), others)):

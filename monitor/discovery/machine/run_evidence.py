@@ -10,7 +10,7 @@ import scipy
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.search.evidence import SMALLEST_REMAINDER, Evidence, Pool, evidence_of, explained_by
-from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.projection import without
 from monitor.records import Array
 
 # Sizes of an effect scatter from run to run where noise alone would do so once in a thousand times.
@@ -74,9 +74,9 @@ def p_value_against_runs(
     runs = len(np.unique(scene.run))
     if runs < 2:
         return 0.0
-    basis = orthonormal(scene.columns(others))
-    residual = without(basis, scene.residual[:, None])[:, 0]
-    columns = without(basis, candidate.columns).T
+    beside = scene.remainders.beside(others)
+    residual = beside.residual
+    columns = without(beside.basis, candidate.columns).T
     lengths = np.sqrt(np.einsum("km,km->k", columns, columns))
     lengths = np.where(lengths == 0, 1.0, lengths)
     scaled = columns / lengths[:, None]
@@ -87,7 +87,7 @@ def p_value_against_runs(
     )
     between, more = float(each[0] - common), int(ranks[0]) - int(rank)
     stays = float(residual @ residual - each[0])
-    dof = scene.degrees_of_freedom - basis.shape[1] - int(ranks[0])
+    dof = beside.degrees_of_freedom - int(ranks[0])
     if more < 1 or dof < 1 or between <= 0 or stays <= 0:
         return 0.0
     if scipy.special.fdtrc(more, dof, (between / more) / (stays / dof)) > SCATTERS:

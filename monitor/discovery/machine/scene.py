@@ -15,9 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.held_out import PoseFold, held_out_by_poses, pose_folds, pose_parts
+from monitor.discovery.machine.held_out import (
+    LeftOutBlocks,
+    PoseFold,
+    held_out_by_poses,
+    pose_folds,
+    pose_parts,
+)
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
-from monitor.discovery.search.held_out import held_out_rms, held_out_sum
+from monitor.discovery.search.held_out import held_out_rms
+from monitor.discovery.search.remainder import Remainders
 from monitor.effects import ParsedEffect
 from monitor.exceptions import EffectError
 from monitor.methods.chain.shared_effects import largest_coefficient
@@ -80,6 +87,11 @@ class ChainScene:
         """The shared columns, then those of the candidates."""
         return np.concatenate([self.shared, *(candidate.columns for candidate in candidates)], axis=1)
 
+    @cached_property
+    def remainders(self) -> Remainders:
+        """What selected effects, beside ``shared``, leave of the residual."""
+        return Remainders(self.residual, self.degrees_of_freedom, self.columns)
+
     def held_out_error(self, columns: Array) -> float | None:
         """Root mean square error in mm of runs left out in turn, of blocks of poses where there is one run."""
         return self.held_out_error_of(columns, np.arange(len(self.fit.problem.runs)))
@@ -91,6 +103,9 @@ class ChainScene:
     def held_out_error_by_poses(self, columns: Array) -> float | None:
         """Root mean square error in mm of poses left out of every run with ``columns`` (M, c) of shared effects; None
         where the plan has too few."""
+        if len(self.fit.problem.runs) == 1 and self._left_out_blocks is not None:
+            # Blocks of poses are what is left out of a single run anyway.
+            return self.held_out_error(columns)
         error = held_out_by_poses(self.fit.white, columns, self._pose_folds)
         return None if error is None else self.fit.sigma * error
 
@@ -102,12 +117,17 @@ class ChainScene:
         fit = self.fit
         if len(fold) > 1:
             return held_out_rms(self.residual, columns, fold[self.run], self.degrees_of_freedom, fit.sigma)
-        parts = pose_parts(fit)
+        if self._left_out_blocks is None:
+            return None
+        squares = self._left_out_blocks.sum_of_squares(self.residual, columns)
+        return fit.sigma * float(np.sqrt(squares / fit.readings))
+
+    @cached_property
+    def _left_out_blocks(self) -> LeftOutBlocks | None:
+        parts = pose_parts(self.fit)
         if parts is None:
             return None
-        # The run's own unknowns are no longer free where it was left out: they are columns like the others.
-        whole = np.concatenate([fit.nuisance.basis.reshape(len(self.residual), -1), columns], axis=1)
-        return fit.sigma * float(np.sqrt(held_out_sum(self.residual, whole, parts) / fit.readings))
+        return LeftOutBlocks(self.fit.nuisance.basis.reshape(len(self.residual), -1), parts)
 
 
 def scene_of(fit: Fit, variants: Sequence[ChainVariant]) -> ChainScene:

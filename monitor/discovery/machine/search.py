@@ -7,8 +7,9 @@ from dataclasses import replace
 
 from monitor.discovery.machine.acceptance import ChainAcceptance
 from monitor.discovery.machine.gears import gear_variants
+from monitor.discovery.machine.joint_curves import all_curves_were_searched
 from monitor.discovery.machine.missing import standing_out
-from monitor.discovery.machine.scene import ChainScene, scene_of
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.tables import ChainScan, with_tables
 from monitor.discovery.machine.unknown_shapes import with_unknown_shapes
 from monitor.discovery.search.scan import by_error_taken_away, scan
@@ -21,16 +22,21 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
     """Scan a scene; where gears stand out of what it leaves, once more with them; at last with tables instead of
     several shapes. Return the scene with the candidates that were added."""
 
-    def scanned(scene: ChainScene) -> ChainScan:
-        return scan(scene, ChainAcceptance(scene, drivers, rate), rate=rate)
+    def scanned(
+        scene: ChainScene, begin: Sequence[ChainCandidate], shared: Sequence[ChainCandidate] = ()
+    ) -> ChainScan:
+        return scan(scene, ChainAcceptance(scene, drivers, rate, shared), rate=rate, begin=begin)
 
     gears: set[str] = set()
+    selected: Sequence[ChainCandidate] = ()
     while True:
-        result = standing_out(scene, scanned(scene))
+        result = standing_out(scene, scanned(scene, selected))
+        selected = result.candidates
         variants = gear_variants(scene, result.candidates, rate)
         new = [variant for variant in variants if variant.effect.text not in gears]
         if not new or len(gears) > MOST_GEARS:
-            scene, result = with_tables(scene, result, scanned)
+            if not all_curves_were_searched(scene.fit):
+                scene, result = with_tables(scene, result, scanned)
             scene, result = with_unknown_shapes(scene, standing_out(scene, result))
             return scene, by_error_taken_away(scene, standing_out(scene, result))
         gears |= {variant.effect.text for variant in new}

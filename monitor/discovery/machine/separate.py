@@ -19,6 +19,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import MachineEffect
 from monitor.effects import ChainEffect, Context
 from monitor.effects.drivers import Always
+from monitor.effects.drivers.gravity import Gravity
 from monitor.exceptions import DataError
 from monitor.machine import Chain, Joint, evaluate, touching_positions
 from monitor.methods.chain.touch import TouchProblem
@@ -145,8 +146,8 @@ def separating_poses(
 
 
 def _is_plain(effect: MachineEffect) -> bool:
-    """Whether an effect is one of the chain without a driver."""
-    return isinstance(effect, ChainEffect) and isinstance(effect.driver, Always)
+    """Whether an effect is one of the chain that depends on where the axes stand alone, and on no other driver."""
+    return isinstance(effect, ChainEffect) and isinstance(effect.driver, (Always, Gravity))
 
 
 def _reachable_touches(

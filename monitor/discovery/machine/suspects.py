@@ -13,7 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.anomalies import BadPoint, BallMove, bad_points, ball_moves
+from monitor.discovery.machine.bad_poses import bad_poses
 from monitor.discovery.machine.fit import Fit, fit
+from monitor.discovery.machine.poses import poses_of_rows
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect
 from monitor.discovery.machine.variants import each_run
 from monitor.discovery.machine.varying import most_varying
@@ -75,7 +77,7 @@ class Suspects:
     def left_out(self, problem: ChainProblem) -> npt.NDArray[np.bool_]:
         """Marks (n,) the bad points."""
         out = np.zeros(len(problem.context), dtype=bool)
-        out[list(self.bad)] = True
+        out[[row for point in self.bad.values() for row in point.all_rows]] = True
         return out
 
     def move_effects(self, problem: ChainProblem) -> list[MachineEffect]:
@@ -106,6 +108,8 @@ def find_suspects(
     ``under`` is the fit with the selected effects and the earlier suspects, ``variants`` the effects that may vary,
     ``scene`` that of ``under`` with all of them where it is known.
     """
+    if poses_of_rows(under) is not None and len(under.problem.runs) == 1:
+        return replace(earlier, bad={**earlier.bad, **{point.row: point for point in bad_poses(under)}})
     suspects = earlier
     current = under
     while len(suspects.bad) < MOST_BAD_POINTS:

@@ -33,8 +33,8 @@ SAME_POSITION = 0.5
 MOST_TABLES, MOST_TRIED = 2, 3
 
 ChainScan: TypeAlias = ScanResult[ChainCandidate]
-#: Scans a scene.
-Scan: TypeAlias = Callable[[ChainScene], ChainScan]
+#: Scans a scene, beginning with candidates, beside some that are taken for granted.
+Scan: TypeAlias = Callable[[ChainScene, Sequence[ChainCandidate], Sequence[ChainCandidate]], ChainScan]
 
 
 def _error(candidate: ChainCandidate) -> str | None:
@@ -98,7 +98,8 @@ def with_tables(scene: ChainScene, result: ChainScan, scan: Scan) -> tuple[Chain
         # What one error does looks like others' at the positions where they are alike: each is tried to its end.
         best, worth = None, _score(scene, selected) + WORTH_EXCHANGING
         for table in _promising(scene, tables, selected):
-            beside = scan(replace(scene, shared=scene.columns([table])))
+            others = [shape for shape in selected if _error(shape) != _error(table)]
+            beside = scan(replace(scene, shared=scene.columns([table])), others, [table])
             more = [table, *beside.candidates]
             if len(more) < len(selected) and _score(scene, more) > worth:
                 best, worth = (more, beside.remaining), _score(scene, more)

@@ -160,8 +160,8 @@ def _of_parts(
 
 def _says_more(scene: ChainScene, whole: ChainCandidate, selected: Sequence[ChainCandidate]) -> bool:
     """Whether an error in any shape explains more than chance of what the selected effects leave."""
-    basis = orthonormal(scene.columns(selected))
-    residual = without(basis, scene.residual[:, None])[:, 0]
+    beside = scene.remainders.beside(selected)
+    basis, residual = beside.basis, beside.residual
     columns = orthonormal(without(basis, whole.columns))
     explained, size = float(np.sum((columns.T @ residual) ** 2)), columns.shape[1]
     dof = scene.degrees_of_freedom - basis.shape[1] - size
@@ -173,8 +173,8 @@ def _says_more(scene: ChainScene, whole: ChainCandidate, selected: Sequence[Chai
 
 def _parts(scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]) -> list[int]:
     """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other."""
-    basis = orthonormal(scene.columns(others))
-    residual = without(basis, scene.residual[:, None])[:, 0]
+    beside = scene.remainders.beside(others)
+    basis, residual = beside.basis, beside.residual
     columns = without(basis, whole.columns)
     before: Array = np.linalg.norm(whole.columns, axis=0)
     dof = scene.degrees_of_freedom - basis.shape[1]

@@ -45,19 +45,24 @@ def without_part_periods(variants: Iterable[ChainVariant], context: Context) -> 
     Over a part of a period a cosine and a sine are a bend of any cause, and so are the components of gravity in the
     frame of an axis, each with a coefficient of its own.
     """
-    travel = np.ptp(context.positions, axis=0)
-    checked = []
-    for variant in variants:
-        effect, periods = variant.effect, 0.0
-        if isinstance(effect, ChainEffect):
-            if isinstance(effect.shape, Harmonic):
-                periods = effect.shape.order
-            elif isinstance(effect.driver, Gravity | LinkWeights):
-                periods = 1.0
-            part = 0.0 < periods * travel[effect.term.joint] < WHOLE_PERIOD * 2.0 * np.pi
-            variant = replace(variant, odds=NEVER_FOUND) if part else variant
-        checked.append(variant)
-    return checked
+    return [
+        variant if part_of_period(variant.effect, context) is None else replace(variant, odds=NEVER_FOUND)
+        for variant in variants
+    ]
+
+
+def part_of_period(effect: MachineEffect, context: Context) -> float | None:
+    """The part of its period that the axis of an effect turned; None for whole periods, and for what has none."""
+    if not isinstance(effect, ChainEffect) or not effect.joint.turns:
+        return None
+    if isinstance(effect.shape, Harmonic):
+        periods = float(effect.shape.order)
+    elif isinstance(effect.driver, Gravity | LinkWeights):
+        periods = 1.0
+    else:
+        return None
+    part = periods * float(np.ptp(context.positions[:, effect.term.joint])) / (2.0 * np.pi)
+    return part if 0.0 < part < WHOLE_PERIOD else None
 
 
 def variants_of(effect: MachineEffect) -> list[ChainVariant]:

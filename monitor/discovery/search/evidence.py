@@ -125,12 +125,20 @@ def weigh(
 
     ``degrees_of_freedom`` are those of ``residual`` (M,) before the selected columns are taken out.
     """
+    basis = orthonormal(selected)
+    remainder = without(basis, residual[:, None])[:, 0]
+    return _weighed(candidates, basis, remainder, degrees_of_freedom - basis.shape[1])
+
+
+def _weighed(
+    candidates: Sequence[CandidateT] | Pool[CandidateT], basis: Array, remainder: Array, dof: int
+) -> list[Evidence[CandidateT]]:
+    """Weigh every candidate beside what an orthonormal ``basis`` (M, r) leaves of a residual, ``remainder`` (M,) with
+    ``dof`` degrees of freedom."""
     pool = candidates if isinstance(candidates, Pool) else Pool(tuple(candidates))
     if not pool.candidates:
         return []
-    basis = orthonormal(selected)
-    remainder = without(basis, residual[:, None])[:, 0]
-    total, dof = float(remainder @ remainder), degrees_of_freedom - basis.shape[1]
+    total = float(remainder @ remainder)
     onto = (pool.rows @ remainder) / pool.lengths
     overlap = (pool.rows @ basis) / pool.lengths[:, None]
     explained = np.zeros(len(pool.candidates))
@@ -151,7 +159,8 @@ def weigh_beside(
     selected: Sequence[Candidate[object]],
 ) -> list[Evidence[CandidateT]]:
     """Weigh every candidate beside the selected ones, the most convincing first."""
-    return weigh(candidates, scene.residual, scene.columns(selected), scene.degrees_of_freedom)
+    beside = scene.remainders.beside(selected)
+    return _weighed(candidates, beside.basis, beside.residual, beside.degrees_of_freedom)
 
 
 def explained_by(

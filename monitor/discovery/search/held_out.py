@@ -29,20 +29,14 @@ def held_out_sum(residual: Array, columns: Array, row_fold: npt.NDArray[np.int64
         return float(residual @ residual)
     scale = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(scale == 0, 1.0, scale)
-    folds = np.unique(row_fold)
-    grams = np.array([scaled[row_fold == fold].T @ scaled[row_fold == fold] for fold in folds])
-    ontos = np.array([scaled[row_fold == fold].T @ residual[row_fold == fold] for fold in folds])
-    total = 0.0
-    for index, fold in enumerate(folds):
-        if fold < 0:
-            continue
-        gram = grams.sum(axis=0) - grams[index]
-        onto = ontos.sum(axis=0) - ontos[index]
-        coefficients = -np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ onto
-        rows = row_fold == fold
-        remainder = residual[rows] + scaled[rows] @ coefficients
-        total += float(remainder @ remainder)
-    return total
+    folds, index = np.unique(row_fold, return_inverse=True)
+    members = [np.flatnonzero(index == fold) for fold in range(len(folds))]
+    grams = np.array([scaled[rows].T @ scaled[rows] for rows in members])
+    ontos = np.array([scaled[rows].T @ residual[rows] for rows in members])
+    inverses = np.linalg.pinv(grams.sum(axis=0) - grams, rcond=1e-10, hermitian=True)
+    coefficients = -(inverses @ (ontos.sum(axis=0) - ontos)[..., None])[..., 0]
+    remainder = residual + np.einsum("mc,mc->m", scaled, coefficients[index])
+    return float(np.sum(remainder[row_fold >= 0] ** 2))
 
 
 def held_out_rms(

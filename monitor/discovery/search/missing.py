@@ -22,13 +22,15 @@ class Rival:
 @dataclass(frozen=True)
 class Searched:
     """A value that was searched: name, best value and standard uncertainty (None where there is none) in ``unit``;
-    ``frequency`` is the inverse of a searched period."""
+    ``frequency`` is the inverse of a searched period. Where the data do not determine it, ``u`` is None, and
+    ``at_least`` what it exceeds at 95 %, if anything."""
 
     name: str
     value: float
     u: float | None
     unit: str
     frequency: float | None = None
+    at_least: float | None = None
 
 
 @dataclass(frozen=True)

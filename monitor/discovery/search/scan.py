@@ -16,6 +16,7 @@ import numpy as np
 
 from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.evidence import Evidence, Pool, best_of_families, weigh_beside
+from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.scene import CandidateT, Scene, family_count
 from monitor.statistics import control_false_discoveries
 
@@ -64,15 +65,16 @@ def scan(
     *,
     rate: float = 0.01,
     most: int = MOST_EFFECTS,
+    begin: Sequence[CandidateT] = (),
 ) -> ScanResult[CandidateT]:
     """Search the missing effects among the candidates of which the data see anything.
 
     ``rate`` is the false discovery rate over each scan; ``most`` how many effects at most; ``acceptance`` the rules
-    of the search, none where it is None.
+    of the search, none where it is None; ``begin`` what an earlier scan of fewer candidates selected.
     """
     steps = _Steps(scene, Acceptance() if acceptance is None else acceptance)
     pool = _pool(scene)
-    selected: list[CandidateT] = []
+    selected = list(begin)
     fallen: set[str] = set()
     for _ in range(MOST_STEPS):
         weighed = best_of_families(steps.weighed(pool, selected))
@@ -115,16 +117,26 @@ def findings_of(
     return tuple(sorted(findings, key=lambda finding: -finding.evidence.score))
 
 
-@dataclass(frozen=True)
 class _Steps(Generic[CandidateT]):
-    """The steps of a scan of a scene under the rules of its search."""
+    """The steps of a scan of a scene under the rules of its search; what was weighed is not weighed again."""
 
-    scene: Scene[CandidateT]
-    rules: Acceptance[CandidateT]
+    def __init__(self, scene: Scene[CandidateT], rules: Acceptance[CandidateT]) -> None:
+        self.scene = scene
+        self.rules = rules
+        self._weighed: Memory[list[Evidence[CandidateT]]] = Memory()
+        self._alone: Memory[Evidence[CandidateT]] = Memory()
+        self._pool: Pool[CandidateT] | None = None
 
     def weighed(self, pool: Pool[CandidateT], selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
         """Evidence for the candidates of a pool that can be separated from the selected ones, given these."""
-        return self.rules.separable(selected, weigh_beside(self.scene, pool, selected))
+        if pool is not self._pool:
+            self._pool, self._weighed = pool, Memory()
+        weighed = self._weighed.answer(selected, None, lambda: weigh_beside(self.scene, pool, selected))
+        return self.rules.separable(selected, weighed)
+
+    def evidence(self, candidate: CandidateT, others: Sequence[CandidateT]) -> Evidence[CandidateT]:
+        """Evidence for one candidate beside others."""
+        return self._alone.answer(others, candidate, lambda: weigh_beside(self.scene, [candidate], others)[0])
 
     def best(
         self,
@@ -157,7 +169,7 @@ class _Steps(Generic[CandidateT]):
         families = family_count(self.scene)
         while selected:
             evidence = [
-                weigh_beside(self.scene, [candidate], except_for(selected, index))[0]
+                self.evidence(candidate, except_for(selected, index))
                 for index, candidate in enumerate(selected)
             ]
             doubtful = [
@@ -207,8 +219,8 @@ class _Steps(Generic[CandidateT]):
                 for evidence in self.weighed(pool, others)
                 if evidence.candidate.family not in families
             ]
-            pair = weigh_beside(self.scene, [selected[first]], others)[0].score
-            pair += weigh_beside(self.scene, [selected[second]], [*others, selected[first]])[0].score
+            pair = self.evidence(selected[first], others).score
+            pair += self.evidence(selected[second], [*others, selected[first]]).score
             if weighed and weighed[0].score > pair and self.rules.outdoes(selected, weighed[0].candidate):
                 return self.merged(pool, [*others, weighed[0].candidate])
         return selected
@@ -220,7 +232,7 @@ class _Steps(Generic[CandidateT]):
         others = except_for(selected, index)
         families = {candidate.family for candidate in selected}
         weighed = best_of_families(self.weighed(pool, others))
-        (evidence,) = weigh_beside(self.scene, [selected[index]], others)
+        evidence = self.evidence(selected[index], others)
         return evidence, [other for other in weighed if other.candidate.family not in families]
 
     def finding(

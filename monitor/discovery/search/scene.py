@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
 from monitor.discovery.search.candidate import Candidate
+from monitor.discovery.search.remainder import Remainders
 from monitor.records import Array
 
 CandidateT = TypeVar("CandidateT", bound=Candidate[object])
@@ -29,6 +30,10 @@ class Scene(Protocol[CandidateT_co]):
 
     def columns(self, candidates: Sequence[Candidate[object]]) -> Array:
         """The columns (M, c) of effects that the model shares between runs, then those of the candidates."""
+
+    @property
+    def remainders(self) -> Remainders:
+        """What selected effects, beside those that the model shares, leave of the residual."""
 
     def held_out_error(self, columns: Array) -> float | None:
         """Root mean square error on rows that took no part in the fit of ``columns`` (M, c); None where too few rows

@@ -1,7 +1,8 @@
 """Sign flips of whole runs: how often noise alone would bring forth a candidate as convincing as one that was found.
 
 Where nothing is missing the residual of a run is as likely as its negative, whatever the readings of one run share
-with each other. So the scores of the runs are given random signs, and the most convincing of all candidates under these
+with each other; of blocks of one run that holds as far as the correlation of neighbours was taken out. So the scores of
+the runs (or blocks) are given random signs, and the most convincing of all candidates under these
 signs is compared with the one that was found (Hemerik, Goeman and Finos, J. R. Stat. Soc. B 82 (2020) 841; the maximum
 over all candidates as in Westfall and Young, Resampling-based multiple testing, 1993). That pays for every candidate
 that was looked at, searched pitches and time constants too.
@@ -24,8 +25,9 @@ from monitor.records import Array
 
 # With 999 flips a p-value of 0.01 is known to 0.003.
 FLIPS = 999
-# Fewer runs have fewer than 128 different flips, which no effect can pass at 1 %.
-FEWEST_RUNS = 8
+# Fewer runs have fewer than 128 different flips, which no effect can pass at 1 %. An effect that mainly few of the runs
+# show (a warm-up in the first of each day) is as if there were only these.
+FEWEST = 7.0
 # Up to so many runs all flips are made.
 ALL_FLIPS_UP_TO = 10
 # Draws the flips, always the same.
@@ -42,21 +44,32 @@ def signs(runs: int) -> Array:
     return np.asarray(np.random.default_rng(SEED).choice([-1.0, 1.0], size=(runs, FLIPS)))
 
 
+def effective_number(columns: Array, unit: npt.NDArray[np.int64]) -> float:
+    """By how many units (M,) orthonormal columns (M, k) are shown: as many as there are where each shows the same."""
+    weights = np.bincount(unit, weights=np.sum(columns**2, axis=1))
+    return float(weights.sum() ** 2 / max(float(weights @ weights), 1e-300))
+
+
 def p_value_by_flips(
     scene: Scene[CandidateT],
     pool: Pool[CandidateT],
     others: Sequence[Candidate[object]],
     evidence: Evidence[CandidateT],
-    run: npt.NDArray[np.int64],
+    units: Sequence[npt.NDArray[np.int64]],
 ) -> float | None:
-    """Return the share of flips under which some candidate of a pool beside others is as convincing as ``evidence``;
-    ``run`` (M,) is that of every row. None with too few runs."""
-    runs = int(run[-1]) + 1
-    if runs < FEWEST_RUNS:
+    """Return the share of flips under which some candidate of a pool beside others is as convincing as ``evidence``.
+
+    ``units`` (M,) each are the indices, in order, of what every row is flipped with: runs, then blocks of them. The
+    first by which enough of the effect is shown independently is taken; None where there is none.
+    """
+    beside = scene.remainders.beside(others)
+    basis, residual, dof = beside.basis, beside.residual, beside.degrees_of_freedom
+    columns = orthonormal(without(basis, evidence.candidate.columns))
+    run = next((unit for unit in units if effective_number(columns, unit) > FEWEST), None)
+    if run is None:
         return None
-    basis = orthonormal(scene.columns(others))
-    residual = without(basis, scene.residual[:, None])[:, 0]
-    total, dof = float(residual @ residual), scene.degrees_of_freedom - basis.shape[1]
+    runs = int(run[-1]) + 1
+    total = float(residual @ residual)
     if dof < 1 or total <= 0.0:
         return 1.0
     ends = np.searchsorted(run, np.arange(runs + 1))

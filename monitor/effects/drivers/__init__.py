@@ -13,7 +13,7 @@ from monitor.effects.drivers.each_run import EachRun
 from monitor.effects.drivers.run_time import RunTime
 from monitor.effects.drivers.warmup import WarmUp
 from monitor.effects.registry import parse, plug_in_patterns, plug_ins
-from monitor.exceptions import EffectError
+from monitor.exceptions import EffectError, did_you_mean
 from monitor.units import COLUMN_UNITS, column_unit
 
 __all__ = ["Always", "Channel", "Driver", "EachRun", "RunTime", "WarmUp", "parse_driver"]
@@ -28,8 +28,9 @@ def parse_driver(text: str) -> Driver:
     if driver is not None:
         return driver
     if column_unit(text) is None:
+        hint = did_you_mean(text, ("warmup", "run_time", "sequence", "gravity", "each_run"))
         raise EffectError(
-            f"there is no driver '@{text}'; there are @warmup (or @warmup45min), @run_time, @sequence, @gravity, "
+            f"there is no driver '@{text}'; {hint}there are @warmup (or @warmup45min), @run_time, @sequence, @gravity, "
             "@each_run and every recorded channel, whose name ends in a unit "
             f"({', '.join('_' + suffix for suffix in COLUMN_UNITS)}){plug_in_patterns('monitor.drivers')}"
         )

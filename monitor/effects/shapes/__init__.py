@@ -9,11 +9,12 @@ from monitor.effects.shapes.const import Const
 from monitor.effects.shapes.cyclic import Cyclic
 from monitor.effects.shapes.formula import FormulaShape
 from monitor.effects.shapes.harmonic import Harmonic
+from monitor.effects.shapes.harmonics import Harmonics, harmonics_text
 from monitor.effects.shapes.nodes import Nodes, nodes_text
 from monitor.effects.shapes.poly import Poly
 from monitor.effects.shapes.reversal import REVERSAL_VALUE, Reversal, has_reversal_value
 from monitor.effects.shapes.table import TABLE_NODES, Table
-from monitor.exceptions import EffectError
+from monitor.exceptions import EffectError, did_you_mean
 
 __all__ = [
     "REVERSAL_VALUE",
@@ -23,23 +24,35 @@ __all__ = [
     "Cyclic",
     "FormulaShape",
     "Harmonic",
+    "Harmonics",
     "Nodes",
     "Poly",
     "Reversal",
     "Table",
+    "harmonics_text",
     "has_reversal_value",
     "nodes_text",
     "parse_shape",
 ]
 
 
+#: What a mistyped shape is compared with.
+_EXAMPLES = (
+    "const", "poly1", "poly2", "poly3", "harmonic1", "harmonic2", "cyclic20mm", "reversal", "lag", "compliance",
+    "table", "formula(...)",
+)  # fmt: skip
+
+
 def parse_shape(text: str) -> Shape:
     """Return the shape of a name. Raises EffectError, listing the shapes there are, for an unknown one."""
     shape: Shape | None = parse(text, __name__, plug_ins("monitor.shapes"))
     if shape is None:
+        hint = did_you_mean(text, _EXAMPLES)
         raise EffectError(
-            f"there is no shape '{text}'; there are const, poly1 to poly9, harmonic1 to harmonic9999, cyclic20mm (any "
-            "pitch), reversal, lag, compliance, table (or table9 for nine nodes, up to table99; table(-100,0,100) for "
+            f"there is no shape '{text}'; {hint}"
+            "there are const, poly1 to poly9, harmonic1 to harmonic9999, "
+            "harmonics(1,2,121) (several at once), cyclic20mm (any pitch), reversal, lag, compliance, table (or table9 "
+            "for nine nodes, up to table99; table(-100,0,100) for "
             f"your own nodes) and formula(...){plug_in_patterns('monitor.shapes')}"
         )
     return shape

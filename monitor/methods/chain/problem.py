@@ -143,6 +143,11 @@ class ChainProblem(ABC):
         return ()
 
     @property
+    def resting(self) -> tuple[str, ...]:
+        """The targets that no axis moves: what they do is the observer's."""
+        return ()
+
+    @property
     def moved_together(self) -> Array | None:
         """The moves (q, s) of the own unknowns that placing all targets anew allows; None where they have no places."""
         return None

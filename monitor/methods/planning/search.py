@@ -14,7 +14,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from monitor.exceptions import DataError, InputError
+from monitor.exceptions import DataError, InputError, did_you_mean
 from monitor.methods.planning.candidates import Candidates, Choice
 from monitor.methods.planning.expected import Sums, expected, information, sums_by_pose, sums_of
 from monitor.records import Array
@@ -181,7 +181,10 @@ def _check_wanted(candidates: Candidates, wanted: Mapping[str, float]) -> None:
     names = candidates.touches.names[: candidates.touches.reported]
     unknown = [name for name in wanted if name not in names]
     if unknown:
-        raise InputError(f"--wanted {unknown[0]}: there is no such parameter; there are {', '.join(names)}")
+        hint = did_you_mean(unknown[0], names)
+        raise InputError(
+            f"--wanted {unknown[0]}: there is no such parameter; {hint}there are {', '.join(names)}"
+        )
     bad = [name for name, u in wanted.items() if not (u > 0.0 and math.isfinite(u))]
     if bad:
         raise InputError(f"--wanted {bad[0]}: an uncertainty is a number above 0")

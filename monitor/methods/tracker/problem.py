@@ -71,6 +71,11 @@ class TrackingProblem(ChainProblem):
         return "reflector"
 
     @property
+    def resting(self) -> tuple[str, ...]:
+        """Reflectors beside the machine."""
+        return self.fixed
+
+    @property
     def largest_effect(self) -> tuple[float, float]:
         """Displacement in mm and angle in rad that a robot may hide."""
         return LARGEST_DISPLACEMENT, LARGEST_ANGLE

@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from monitor.exceptions import CampaignError
+from monitor.bounded import read_bounded
+from monitor.exceptions import CampaignError, did_you_mean
 from monitor.readers.csv_table import CsvTable, parse_csv
 from monitor.readers.curve_columns import DATA, NAME, CurveColumns, CurveSettings, read_columns
-from monitor.readers.faults import Faults, near, one_of, quoted
-from monitor.readers.files import LARGEST_CSV, LARGEST_TOML, decode, read_bytes
+from monitor.readers.faults import Faults, one_of, quoted
+from monitor.readers.files import LARGEST_TOML, decode, read_bytes
 from monitor.readers.registry import Reader
+from monitor.readers.spreadsheet import read_table, renamed
 from monitor.readers.toml_table import Table, parse_toml
 from monitor.records import CurveCampaign, Instrument, SourceFile
 
@@ -27,16 +29,15 @@ RESERVED = ("sequence", "formula", "pi")
 def recognises(folder: Path) -> bool:
     """Return whether a folder is a curve: its file says so, or it has data.csv and no probings."""
     try:
-        content = (folder / TOML).read_bytes()[:LARGEST_TOML]
+        content = read_bounded(folder / TOML, LARGEST_TOML)
         return tomllib.loads(content.decode("utf-8-sig")).get("method") == METHOD
     except (OSError, ValueError, RecursionError):
         # A damaged file: the name of the method in it, or the data beside it, say which reader should refuse it.
         if (folder / DATA).is_file() and not (folder / "probings.csv").exists():
             return True
         try:
-            return (
-                re.search(rb'(?m)^\s*method\s*=\s*["\']curve["\']', (folder / TOML).read_bytes()) is not None
-            )
+            head = read_bounded(folder / TOML, LARGEST_TOML)
+            return re.search(rb'(?m)^\s*method\s*=\s*["\']curve["\']', head) is not None
         except OSError:
             return False
 
@@ -53,13 +54,11 @@ class _Head:
 def read(folder: Path) -> CurveCampaign:
     """Read the curve of a folder. Raises CampaignError with all faults of the folder."""
     faults = Faults((TOML, DATA))
-    contents = {
-        name: read_bytes(folder, name, LARGEST_TOML if name == TOML else LARGEST_CSV, faults)
-        for name in (TOML, DATA)
-    }
-    files = tuple(SourceFile(name, content) for name, content in contents.items() if content is not None)
-    texts = {file.name: decode(file.name, file.content, faults) for file in files}
-    toml, data = texts.get(TOML), texts.get(DATA)
+    content = read_bytes(folder, TOML, LARGEST_TOML, faults)
+    toml = None if content is None else decode(TOML, content, faults)
+    source, data = read_table(folder, DATA, faults)
+    head_file = None if content is None else SourceFile(TOML, content)
+    files = tuple(file for file in (head_file, source) if file is not None)
     top = None if toml is None else parse_toml(TOML, toml, faults)
     table = None if data is None else parse_csv(DATA, data, faults)
     head = _Head() if top is None else _head(top)
@@ -69,7 +68,8 @@ def read(folder: Path) -> CurveCampaign:
         if len(table) and _check_settings(top, head.settings, table):
             columns = read_columns(table, head.settings, faults)
     if len(faults):
-        raise CampaignError(str(folder), faults.sorted())
+        read_from = {} if source is None else {DATA: source.name}
+        raise CampaignError(str(folder), renamed(faults.sorted(), read_from))
     return _campaign(head, table, columns, files)
 
 
@@ -167,7 +167,7 @@ def _check_settings(top: Table, settings: CurveSettings, table: CsvTable) -> boo
     sound = settings.response is not None
     for key, name in named:
         if name is not None and name not in table.columns:
-            hint = near(name, table.columns)
+            hint = did_you_mean(name, table.columns)
             section.fault(key, f"{DATA} has no column {quoted(name)}; {hint}it has {one_of(table.columns)}")
             sound = False
     both = set(settings.groups) & set(settings.inputs)

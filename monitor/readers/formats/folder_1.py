@@ -5,17 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from monitor.exceptions import CampaignError
+from monitor.exceptions import CampaignError, did_you_mean
 from monitor.readers import probings_file, runs_file
 from monitor.readers.artefact_file import read_artefact, read_probe
 from monitor.readers.csv_table import CsvTable, parse_csv
-from monitor.readers.faults import Faults, near, one_of, quoted
-from monitor.readers.files import LARGEST_CSV, LARGEST_TOML, decode, read_bytes
+from monitor.readers.faults import Faults, one_of, quoted
+from monitor.readers.files import LARGEST_TOML, decode, read_bytes
 from monitor.readers.machine_file import MachinePart, read_machine
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.registry import Reader, method_rules
 from monitor.readers.setups_file import probe_of, read_setups
 from monitor.readers.sources_file import read_sources
+from monitor.readers.spreadsheet import read_table, renamed
 from monitor.readers.toml_table import Table, parse_toml
 from monitor.records import Artefact, Campaign, Probe, SourceFile
 from monitor.sources import Source
@@ -50,12 +51,15 @@ _EMPTY = _Head(None, None, None, MachinePart(None, None, {}), None, None, None)
 def read(folder: Path) -> Campaign:
     """Read the campaign of a folder. Raises CampaignError with all faults of the folder."""
     faults = Faults(FILES)
-    contents = {
-        name: read_bytes(folder, name, LARGEST_TOML if name == TOML else LARGEST_CSV, faults)
-        for name in FILES
-    }
-    files = [SourceFile(name, content) for name, content in contents.items() if content is not None]
-    texts = {file.name: decode(file.name, file.content, faults) for file in files}
+    content = read_bytes(folder, TOML, LARGEST_TOML, faults)
+    texts = {TOML: None if content is None else decode(TOML, content, faults)}
+    sources = {} if content is None else {TOML: SourceFile(TOML, content)}
+    for name in FILES[1:]:
+        source, texts[name] = read_table(folder, name, faults)
+        if source is not None:
+            sources[name] = source
+    # One workbook may hold both tables.
+    files = tuple({source.name: source for source in sources.values()}.values())
     head = _head(texts.get(TOML), faults)
     runs_table = _table(runs_file.FILE, texts, faults)
     ambient = head.rules is None or not head.rules.needs_setups
@@ -71,8 +75,9 @@ def read(folder: Path) -> Campaign:
     if part is not None:
         _check_plan(head, part, faults)
     if len(faults):
-        raise CampaignError(str(folder), faults.sorted())
-    return _campaign(head, runs, part, tuple(files))
+        read_from = {name: source.name for name, source in sources.items()}
+        raise CampaignError(str(folder), renamed(faults.sorted(), read_from))
+    return _campaign(head, runs, part, files)
 
 
 def _campaign(
@@ -156,7 +161,7 @@ def _rules(top: Table, method: str | None) -> MethodRules | None:
         names = [*rules, CURVE]
         top.fault(
             "method",
-            f"method {quoted(method)} is not known; {near(method, names)}the methods are {one_of(names)}",
+            f"method {quoted(method)} is not known; {did_you_mean(method, names)}the methods are {one_of(names)}",
         )
     return rules.get(method)
 

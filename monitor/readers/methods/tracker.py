@@ -12,6 +12,7 @@ from monitor.readers.method_rules import CHANNELS_ONLY, MethodRules, Plan
 
 #: The frame has six unknowns and a reflector three; fewer poses than this cannot even give these.
 FEWEST_POSES = 4
+COLUMNS = ("tracker_x_mm", "tracker_y_mm", "tracker_z_mm")
 
 
 def check(plan: Plan) -> Iterable[Fault]:
@@ -35,9 +36,23 @@ def check(plan: Plan) -> Iterable[Fault]:
                 f"run {run}: {poses} pose{'s' * (poses != 1)} of the tool; frame and reflector alone take "
                 f"{FEWEST_POSES} or more, and the errors of a robot some tens",
             )
+    yield from _lost_beam(plan)
     for name in sorted(fixed - set(probings.target.tolist())):
         yield Fault(
             "campaign.toml", None, "artefact.reflectors", f"reflector {quoted(name)} was never measured"
+        )
+
+
+def _lost_beam(plan: Plan) -> Iterable[Fault]:
+    """A fault for every row 0, 0, 0: what trackers write whose beam was lost, never the place of a reflector."""
+    seen = np.column_stack([plan.probings.channels[name] for name in COLUMNS])
+    for row in np.flatnonzero(np.all(seen == 0.0, axis=1)):
+        target = quoted(str(plan.probings.target[row]))
+        yield Fault(
+            plan.file,
+            int(plan.lines[row]),
+            COLUMNS[0],
+            f"reflector {target} at 0, 0, 0: the tracker had lost the beam; leave the row out",
         )
 
 
@@ -45,6 +60,6 @@ RULES = MethodRules(
     "tracker",
     targets_are_reflectors=True,
     suffixes=CHANNELS_ONLY,
-    measured_columns=("tracker_x_mm", "tracker_y_mm", "tracker_z_mm"),
+    measured_columns=COLUMNS,
     check=check,
 )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from datetime import date
 
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.laboratory_keys import key_of
 from monitor.reporting.certificate.record import ITEMS, CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 
@@ -27,14 +28,20 @@ _PLACEHOLDERS = frozenset({"n/a", "n.a.", "n. a.", "k.a.", "k. a.", "tbd", "tba"
 
 @dataclass(frozen=True)
 class MissingItem:
-    """An item that the certificate lacks: the clause, what it is, and what of it is missing (may be empty)."""
+    """An item that the certificate lacks: the clause, what it is, and what of it is missing (may be empty).
+
+    ``key`` is where the laboratory's file answers it, empty where another source does.
+    """
 
     clause: str
     item: str
     part: str = ""
+    key: str = ""
 
     def __str__(self) -> str:
-        return f"{self.item}{f', {self.part}' if self.part else ''} (ISO/IEC 17025:2017, {self.clause})"
+        part = f", {self.part}" if self.part else ""
+        key = f": write {self.key}" if self.key else ""
+        return f"{self.item}{part}{key} (ISO/IEC 17025:2017, {self.clause})"
 
 
 class IncompleteCertificateError(InputError):
@@ -45,6 +52,10 @@ class IncompleteCertificateError(InputError):
         count = len(missing)
         lines = [f"the certificate is refused: {count} item{'s are' if count != 1 else ' is'} missing"]
         lines += [f"  {item}" for item in missing]
+        if any(item.key for item in missing):
+            lines.append(
+                "these keys are in the laboratory's file; `monitor certificate template` writes one with all of them"
+            )
         super().__init__("\n".join(lines))
 
 
@@ -52,10 +63,12 @@ def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
     """Every item that is None, empty or says nothing, and every such part of an item, in the order of the record."""
     missing: list[MissingItem] = []
     for name, (clause, item) in ITEMS.items():
-        missing += [MissingItem(clause, item, part) for part in _gaps(getattr(record, name))]
+        missing += [
+            MissingItem(clause, item, part, key_of(name, part)) for part in _gaps(getattr(record, name))
+        ]
     for field, words in _STATED.items():
         missing += [
-            MissingItem(*words, part)
+            MissingItem(*words, part, key_of(field, part))
             for part in _gaps(getattr(record, field))
             if getattr(record, field) is not None
         ]

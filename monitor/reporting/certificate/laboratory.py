@@ -13,35 +13,15 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
+from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.laboratory_keys import SECTIONS
 from monitor.reporting.certificate.mark import read_mark
 from monitor.reporting.certificate.record import Accreditation, NotApplicable, Party, Person, Standard
 from monitor.reporting.certificate.samples import sample_faults
+from monitor.reporting.resources import report_text
 from monitor.reporting.texts import languages
 
-#: Every section and its keys.
-SECTIONS: Mapping[str, tuple[str, ...]] = {
-    "laboratory": ("name", "address", "contact", "accreditation", "country", "language", "mark"),
-    "accreditation": ("body", "number"),
-    "customer": ("name", "address", "contact"),
-    "item": ("description", "identification", "condition", "place", "received_on"),
-    "method": ("document",),
-    "traceability": ("statement", "probe", "scale_bar"),
-    "standards": ("name", "identification", "certificate", "issuer", "issued_on", "valid_until"),
-    "temperature": ("machine_degC", "machine_U_degC", "standard_degC", "standard_U_degC", "reference"),
-    "statements": (
-        "title",
-        "sampling",
-        "relates_only",
-        "deviations",
-        "external_results",
-        "reproduction",
-        "adjustment",
-        "conformity",
-        "opinions",
-    ),
-    "authorised_by": ("name", "function"),
-}
 #: The keys that may be answered by ``{ not_applicable = "..." }``.
 MAY_NOT_APPLY = frozenset(
     {
@@ -104,7 +84,7 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
     """The answers in a TOML file. Raises InputError, with all faults, where it cannot be read as such."""
     file = Path(path)
     try:
-        text = file.read_bytes().decode("utf-8-sig")
+        text = read_bounded(file, LARGEST_SETTINGS).decode("utf-8-sig")
         tables = tomllib.loads(text)
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
@@ -150,6 +130,16 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         or None,
         **{key: answers.get(f"statements.{key}") for key in SECTIONS["statements"]},
     )
+
+
+def template(language: str) -> str:
+    """A laboratory's file with every key and no answer yet, its comments in a language that certificates have.
+
+    Raises InputError for another.
+    """
+    if language not in languages():
+        raise InputError(f"there is no template in {language!r}; there are {', '.join(languages())}")
+    return report_text(f"laboratory.{language}.toml")
 
 
 def _answers(tables: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:

@@ -28,6 +28,8 @@ _NAMED = 6
 _DRIFT_P = 0.05
 _QUIET = "No parameter is out of its tolerance, none changed, and the models explain the measurements."
 
+_NOTICED = "No parameter is out of its tolerance, but weekly looks noticed a change: see below the table."
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -43,12 +45,16 @@ def answers(fleet: Fleet) -> tuple[Answer, ...]:
     worst = next((health for health in fleet.attention if health.state in URGENT), None)
     return (
         Answer("worst", "Worst machine?", _worst(fleet)),
-        Answer("why", "Why?", _QUIET if worst is None else reason(worst)),
+        Answer("why", "Why?", _quiet(fleet) if worst is None else reason(worst)),
         Answer("since", "Since when?", "Nothing to date." if worst is None else _since(worst)),
         Answer("do", "What to do?", _keep_on(fleet) if worst is None else to_do(worst)),
         Answer("fine", "What is fine?", _fine(fleet.rows)),
         Answer("unjudged", "Not judged?", _unjudged(fleet)),
     )
+
+
+def _quiet(fleet: Fleet) -> str:
+    return _NOTICED if fleet.noticed else _QUIET
 
 
 def concern(health: MachineHealth) -> ParameterHealth | None:

@@ -144,6 +144,7 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
             for state, meaning in STATES.items()
             if state in {row.state for row in fleet.rows}
         ],
+        "noticed": [(machine, _anchor(machine), what) for machine, what in fleet.noticed],
         "answers": answers(fleet),
         "cards": [_card(health) for health in fleet.attention if health.state in URGENT],
         "imports": [printed_refusal(refusal) for refusal in fleet.refused_imports],
@@ -215,10 +216,14 @@ def _range(condition: ConditionRange) -> str:
     return f"{lowest} to {highest}, mean {mean} {condition.unit}".strip()
 
 
+def _anchor(machine: str) -> str:
+    return "machine-" + "".join(sign if sign.isalnum() else f"_{ord(sign):x}_" for sign in machine)
+
+
 def _line(row: FleetRow) -> FleetLine:
     return FleetLine(
         machine=row.machine,
-        anchor="machine-" + "".join(sign if sign.isalnum() else f"_{ord(sign):x}_" for sign in row.machine),
+        anchor=_anchor(row.machine),
         location=row.location,
         sign=SIGNS[row.state],
         state=row.state,

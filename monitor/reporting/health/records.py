@@ -223,7 +223,8 @@ class Fleet:
 
     ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known. ``ended``
     says whether the week had, by the shop's clock, when the report was made. ``attention`` are the records of the most
-    urgent machines, for the pictures and answers of the first page.
+    urgent machines, for the pictures and answers of the first page. ``noticed``: machine and sentence of what was
+    noticed in the week under weekly looks at the fleet.
     """
 
     week: str
@@ -235,6 +236,7 @@ class Fleet:
     rows: tuple[FleetRow, ...]
     refused_imports: tuple[RefusedImport, ...] = ()
     ended: bool = True
+    noticed: tuple[tuple[str, str], ...] = ()
     attention: tuple[MachineHealth, ...] = ()
 
 

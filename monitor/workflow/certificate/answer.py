@@ -63,18 +63,21 @@ class CertificateChecks:
     """What a file was checked for; ``signature`` is None where it has none.
 
     ``hash``: this database knows its content; ``chain``: the database is as written; ``database``: the certificate is
-    issued and its campaign counts.
+    issued and its campaign counts; ``expected``: the file has the hash that was noted elsewhere, None where none was.
     """
 
     hash: bool
     chain: bool
     signature: bool | None
     database: bool
+    expected: bool | None = field(default=None, metadata=OMITTED)
 
     @property
     def passed(self) -> bool:
         """Whether nothing failed."""
-        return all((self.hash, self.chain, self.signature is not False, self.database))
+        return all(
+            (self.hash, self.chain, self.signature is not False, self.database, self.expected is not False)
+        )
 
 
 @dataclass(frozen=True)

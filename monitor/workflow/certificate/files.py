@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import InputError
 from monitor.store import Database, find_certificate, load_certificate
 
@@ -53,7 +54,7 @@ def keep_issued(db: Database, path: Path) -> None:
     """
     if not path.is_file():
         return
-    content = path.read_bytes()
+    content = read_bounded(path, LARGEST_DOCUMENT)
     number = find_certificate(db, hashlib.sha256(content).hexdigest())
     if number is None and content:
         raise InputError(
@@ -81,7 +82,9 @@ def prepared(path: Path, content: bytes) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-        with part.open("wb") as file:
+        # A link that somebody planted under this name is removed, not followed; so is what a killed process left.
+        part.unlink(missing_ok=True)
+        with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
@@ -106,7 +109,12 @@ def publish(part: Path, path: Path, number: str) -> None:
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Write a file that is never seen half. Raises InputError where that fails."""
+    """Write a new file that is never seen half. Raises InputError where that fails, or another file is there."""
+    try:
+        if path.is_file() and read_bounded(path, LARGEST_DOCUMENT) not in (b"", content):
+            raise InputError(f"{path} is there already, with other content: name another file, or remove it")
+    except OSError as error:
+        raise InputError(f"{path} is there already and cannot be read: {error.strerror or error}") from error
     part = prepared(path, content)
     try:
         part.replace(path)

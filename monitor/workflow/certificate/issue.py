@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Sequence
 from datetime import date
 from typing import Literal
 
 from monitor.documents import to_document
+from monitor.exceptions import InputError, TakenNumberError
 from monitor.methods import method_named
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
@@ -65,21 +67,41 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     replaced = None
     if request.replaces is not None:
         replaced = replaced_by(db, request.replaces, request.reason, request.draft, campaign)
-    number = request.number or next_number(db, day.year)
-    path = path_of(request.out, number)
-    keep_issued(db, path)
+    keep_issued(db, path_of(request.out, request.number or next_number(db, day.year)))
     model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     stored = {run.run: stored_uncertainty(db, campaign, run.run, model, request.asked) for run in measured}
     accepted = accepted_grounds(grounds_against(campaign, model, stored), request.accept)
     runs = [certified_run(db, campaign, model, run, request.asked, stored[run.run]) for run in measured]
-    identity = CertificateIdentity(
-        number, day, label(runs[-1].evaluated.model),
-        method_name=_method_name(campaign.method, texts_of(stated.language or ENGLISH)),
-    )  # fmt: skip
-    record = dataclasses.replace(
-        _record(stated, runs, request, identity), replaces=replaced, accepted=accepted or None
-    )
     inputs = inputs_of(runs, request.asked, request.fonts)
+
+    def recorded(number: str) -> CertificateRecord:
+        identity = CertificateIdentity(
+            number, day, label(runs[-1].evaluated.model),
+            method_name=_method_name(campaign.method, texts_of(stated.language or ENGLISH)),
+        )  # fmt: skip
+        record = _record(stated, runs, request, identity)
+        return dataclasses.replace(record, replaces=replaced, accepted=accepted or None)
+
+    for _ in range(_NUMBERS):
+        # Nobody waits while a page is rendered; whoever was quicker has the number, and this one takes the next.
+        with contextlib.suppress(TakenNumberError):
+            return _issued(db, request, recorded(request.number or next_number(db, day.year)), inputs)
+    raise InputError(
+        f"{_NUMBERS} free numbers in turn were given to other certificates; type the command again"
+    )
+
+
+#: How often another certificate may take the number that was free when this one was rendered.
+_NUMBERS = 50
+
+
+def _issued(
+    db: Database, request: CertificateRequest, record: CertificateRecord, inputs: CertificateInputs
+) -> CertificateFileAnswer:
+    """Render a record, sign it, store it and give its file its name. Raises TakenNumberError, InputError."""
+    number = str(record.number)
+    path = path_of(request.out, number)
+    keep_issued(db, path)
     pdf = certificate_pdf(record, request.fonts, to_document(inputs))
     if request.key is not None:
         pdf = sign(pdf, request.key)
@@ -112,7 +134,16 @@ def _save(
     document = {**to_document(record), "inputs": to_document(inputs)}
     runs = [inputs.run.run] if inputs.as_left is None else [inputs.run.run, inputs.as_left.run]
     with db.transaction():
-        save_certificate(db, str(record.number), state, request.campaign, runs, document, pdf)
+        save_certificate(
+            db,
+            str(record.number),
+            state,
+            request.campaign,
+            runs,
+            document,
+            pdf,
+            unused=request.number is None,
+        )
         if request.replaces is not None:
             mark_certificate(db, request.replaces, "amended", request.reason, record.number)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from datetime import date
@@ -153,7 +154,15 @@ class RemakeRequest:
 @dataclass(frozen=True)
 class VerificationRequest:
     """A ``file`` that may be a certificate of this database; ``trusted`` names the certificates (PEM or DER) that the
-    signer's has to lead to."""
+    signer's has to lead to, ``expected`` the hash of the file as it was noted elsewhere when it was issued.
+
+    Raises InputError for what is no hash.
+    """
 
     file: Path
     trusted: Path | None = None
+    expected: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.expected is not None and not re.fullmatch(r"\s*[0-9a-fA-F]{64}\s*", self.expected):
+            raise InputError(f"--expect {self.expected}: the SHA-256 of a file has 64 hexadecimal digits")

@@ -8,6 +8,7 @@ from datetime import UTC
 
 import numpy as np
 
+from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.signature.signature import SignatureFinding, check_signature, is_signed
 from monitor.store import Database, StoredCertificate, find_certificate, load_certificate, verify_audit
@@ -27,10 +28,11 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
     """
     file = request.file
     try:
-        content = file.read_bytes()
+        content = read_bounded(file, LARGEST_DOCUMENT)
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
-    number = find_certificate(db, hashlib.sha256(content).hexdigest())
+    sha256 = hashlib.sha256(content).hexdigest()
+    number = find_certificate(db, sha256)
     chain = verify_audit(db)
     stored = None if number is None else load_certificate(db, number)
     # The chain of entries, not the signer, says when this very file was there.
@@ -43,6 +45,12 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         chain=chain.ok,
         signature=signature.good,
         database=stored is not None and stored.state == "issued" and stored.campaign_withdrawn is None,
+        expected=None if request.expected is None else request.expected.strip().lower() == sha256,
+    )
+    other = (
+        ()
+        if checks.expected is not False
+        else (f"the file has the hash {sha256}, not the one noted elsewhere",)
     )
     invalid = _unknown(db, file.name, content) if stored is None else _no_longer(stored)
     return VerificationAnswer(
@@ -51,7 +59,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         state=None if stored is None else stored.state,
         checks=checks,
         signer=signature.signer,
-        faults=(*([] if invalid is None else [invalid]), *signature.faults, *chain.faults),
+        faults=(*([] if invalid is None else [invalid]), *other, *signature.faults, *chain.faults),
     )
 
 

@@ -9,18 +9,23 @@ from monitor.documents import INLINED, OMITTED, named
 from monitor.effects.description import Description
 from monitor.reporting.health.comparison import ResidualAgainst, ResidualMap
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
+from monitor.workflow.explain.ties import Tie
 from monitor.workflow.identify.answer import CurveNoise, Estimate
 
 
 @dataclass(frozen=True)
 class SearchedValue:
-    """A value that was searched for in the data: a time constant, a pitch, a period; ``u`` is None where unknown."""
+    """A value that was searched for in the data: a time constant, a pitch, a period.
+
+    ``u`` is None where the data do not determine it; ``at_least`` is then what it exceeds at 95 %, if anything.
+    """
 
     what: str
     value: float
     u: float | None
     unit: str
     frequency: float | None = field(default=None, metadata=OMITTED)
+    at_least: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -48,10 +53,14 @@ class MachineMissing:
 
     ``heldout_..`` are None with one run of few poses, ``heldout_days_..`` with fewer than three days,
     ``heldout_poses_..`` (poses left out of every run) with fewer than eight poses. ``coinciding`` are rivals that no
-    data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart. Where the catalogue does
+    data of this plan could rule out; ``tell_apart_by`` are poses that tell the others apart; ``ties``
+    say for every rival what does. Where the catalogue does
     not have the shape of the effect, ``shape_unknown`` says so, ``nearest_shape`` is the entry that comes closest, and
     ``curve`` the shape in ``unit``, without the constant and the slope that every run has of its own.
     ``reversal_value`` of a play (ISO 230-2) is twice its amplitude: what a backlash compensation is set to.
+    ``travelled_periods`` of a harmonic is the part of its period that the axis turned, where that is no whole one: over
+    a part of a turn an offset, a tilt or flexure looks alike. ``within_its_shape`` are effects that stand out beside it
+    but not beside its error in any shape: they cannot be separated from it.
     """
 
     rank: int
@@ -82,6 +91,9 @@ class MachineMissing:
     curve: tuple[CurvePoint, ...]
     searched: SearchedValue | None = field(default=None, metadata=OMITTED)
     reversal_value: Estimate | None = field(default=None, metadata=OMITTED)
+    travelled_periods: float | None = field(default=None, metadata=OMITTED)
+    within_its_shape: tuple[str, ...] = ()
+    ties: tuple[Tie, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -196,8 +208,9 @@ class MachineExplanation:
     """The explanation of a machine; ``answer`` is the finding in a few sentences.
 
     ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why;
-    ``held_out`` are the parts left out in turn for the held-out errors. ``not_fitted`` are effects that stood out but
-    could not be fitted, and were skipped. The residual is pictured where something is missing.
+    ``held_out`` are the parts left out in turn for the held-out errors. ``limits_reached`` says where the search ended
+    at a limit and more may be there: ``effects``, ``bad_points``, ``rounds``. ``not_fitted`` are effects that stood out
+    but could not be fitted, and were skipped. The residual is pictured where something is missing.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -214,6 +227,7 @@ class MachineExplanation:
     residual_map: ResidualMap | None
     residual_against: ResidualAgainst | None
     not_fitted: tuple[str, ...] = ()
+    limits_reached: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,6 +30,7 @@ from monitor.workflow.explain.shared_answer import (
     rivals,
     searched_value,
 )
+from monitor.workflow.explain.ties import ties_of
 from monitor.workflow.identify.answer import Estimate, reversal_value
 
 
@@ -108,9 +109,12 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         nearest_shape=effect.nearest,
         curve=_curve(effect, unit),
         searched=searched_value(effect),
+        travelled_periods=effect.travelled_periods,
+        within_its_shape=effect.within_its_shape,
         reversal_value=reversal_value(
             effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
         ),
+        ties=ties_of(effect, rivals(effect)),
     )
 
 
@@ -171,4 +175,5 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         residual_map=residual_map,
         residual_against=residual_against,
         not_fitted=explanation.unfitted,
+        limits_reached=tuple(explanation.limits),
     )

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from monitor.discovery import Explanation, Mistake, Verdict
+from monitor.discovery.machine.explain import Limit
+from monitor.discovery.machine.suspects import MOST_BAD_POINTS
+from monitor.discovery.search.scan import MOST_EFFECTS
 from monitor.units import MICROMETRE
 from monitor.workflow.explain.explain_answer import (
     ChangedParameter,
@@ -22,6 +25,16 @@ GROSS = (
     "More is left than the effects of a machine leave: look first for exchanged columns or targets, a wrong sign or "
     "unit, or the geometry in campaign.toml; of the simple mistakes that were tried none alone explains it. "
 )
+# What is said where the search ended at a limit.
+LIMITS = {
+    Limit.EFFECTS: (
+        f"The search ended at {MOST_EFFECTS} effects: more may be missing; add these to the model and look again."
+    ),
+    Limit.BAD_POINTS: f"The search for bad points ended at {MOST_BAD_POINTS}: there may be more.",
+    Limit.ROUNDS: (
+        "Effects and bad points had not settled when the search ended: look again with these effects in the model."
+    ),
+}
 ONE_RUN = (
     "one run cannot show what varies from run to run, what stepped between runs, or how well a reading repeats; "
     "measure the same plan again"
@@ -57,6 +70,7 @@ def machine_sentences(
             else (f"{target_word} {change.target}", "moved")
         )
         sentences.append(f"{subject} {verb} by {change.size:.1f} {change.unit} at run {change.run}.")
+    sentences += [LIMITS[limit] for limit in explanation.limits]
     if explanation.unfitted:
         sentences.append(
             f"Could not be fitted and {'was' if len(explanation.unfitted) == 1 else 'were'} skipped: "

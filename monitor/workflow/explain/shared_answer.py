@@ -30,7 +30,9 @@ def searched_value(effect: Missing) -> SearchedValue | None:
     searched = effect.searched
     if searched is None:
         return None
-    return SearchedValue(searched.name, searched.value, searched.u, searched.unit, searched.frequency)
+    return SearchedValue(
+        searched.name, searched.value, searched.u, searched.unit, searched.frequency, searched.at_least
+    )
 
 
 def rivals(effect: Missing) -> tuple[str, ...]:

@@ -36,6 +36,16 @@ def history(db: Database, request: HistoryRequest) -> HistoryAnswer:
     return HistoryAnswer(steps, tuple(history_figures(steps, request.figures)))
 
 
+def fitted_version(
+    db: Database, version: StoredModel, campaign: str | None
+) -> tuple[MachineVersion | CurveVersion, ...]:
+    """Fit a version that need not be stored yet, and its ancestors, to a campaign. Raises NotFoundError, DataError."""
+    ancestors = () if version.parent is None else model_history(db, *version.parent)
+    if campaign is None:
+        campaign = latest_campaign(db, ancestors[-1] if ancestors else version)
+    return error_steps(load_measured(db, campaign), (*ancestors, version))
+
+
 def latest_campaign(db: Database, model: StoredModel) -> str:
     """The campaign on which a version or an ancestor of it was last used. Raises NotFoundError where none was."""
     campaign = last_used_campaign(db, model)

@@ -24,6 +24,7 @@ from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
 from monitor.workflow.health.forecast import DriftForecast, stated_drift
 from monitor.workflow.health.weeks import Week
+from monitor.workflow.history.agreement import NOT_DECIDED
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
 from monitor.workflow.history.past import ParameterPast
@@ -131,10 +132,12 @@ def event_noted(event: MachineEvent, week: Week) -> Change:
 def _step_in_words(step: EventStep) -> str:
     """What a parameter stepped by at an event, and that one knows since when."""
     size, u = in_words(step.size, step.u, sign=True)
-    days = "" if step.by_days else " by the runs; too few days to know how days differ"
+    event = f"the event '{step.event.description}'"
+    if step.by_days:
+        return f"{step.parameter} stepped by {size} {step.unit} at {event} (u = {u} {step.unit})"
     return (
-        f"{step.parameter} stepped by {size} {step.unit} at the event '{step.event.description}' "
-        f"(u = {u} {step.unit}{days})"
+        f"{step.parameter} differs by {size} {step.unit} before and after {event} (u = {u} {step.unit} by the runs "
+        f"alone): {NOT_DECIDED}"
     )
 
 

@@ -16,6 +16,7 @@ from email.utils import formatdate, make_msgid
 from pathlib import Path
 from typing import Any
 
+from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
 from monitor.workflow.health.request import ReportAnswer
 
@@ -58,7 +59,7 @@ class MailSettings:
 def read_mail_settings(path: Path) -> MailSettings:
     """The section ``[mail]`` of a TOML file. Raises InputError naming every key that is wrong or missing."""
     try:
-        tables = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        tables = tomllib.loads(read_bounded(path, LARGEST_SETTINGS).decode("utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -89,7 +90,7 @@ def _file_beside(path: Path, table: Table, key: str) -> Path | None:
         return None
     file = path.parent / str(table[key])
     try:
-        file.read_bytes()
+        read_bounded(file, LARGEST_SETTINGS)
     except OSError as error:
         raise InputError(f"{key} of {path}: {file} cannot be read: {error.strerror or error}") from error
     return file
@@ -107,7 +108,7 @@ def _faults(table: Table) -> list[str]:
 
 def _faults_of_connection(table: Table) -> list[str]:
     faults = []
-    if table.get("security", "starttls") not in PORTS:
+    if str(table.get("security", "starttls")) not in PORTS:
         faults.append(f"security is one of {', '.join(PORTS)}, not {table['security']!r}")
     if isinstance(table.get("port"), int) and not 1 <= table["port"] <= 65535:
         faults.append(f"port is a number from 1 to 65535, not {table['port']}")
@@ -190,7 +191,9 @@ def send(settings: MailSettings, message: EmailMessage) -> Sequence[str]:
             if settings.security == "starttls":
                 server.starttls(context=context)
             if settings.user is not None and settings.password_file is not None:
-                server.login(settings.user, settings.password_file.read_text(encoding="utf-8").strip())
+                server.login(
+                    settings.user, read_bounded(settings.password_file, LARGEST_SETTINGS).decode().strip()
+                )
             refused = server.send_message(message)
     except smtplib.SMTPResponseException as error:
         reply = (

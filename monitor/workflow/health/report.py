@@ -38,6 +38,7 @@ from monitor.workflow.health.refusals import refused_elsewhere
 from monitor.workflow.health.request import ReportAnswer, ReportRequest
 from monitor.workflow.health.task import Task, computed
 from monitor.workflow.health.weeks import Week, week_before, week_named
+from monitor.workflow.history.weekly_looks import WeeklyNotices, sentence, weekly_notices
 
 KIND = "health"
 #: Processes by default: at most so many (each needs up to 0.7 GB while it writes a part of the PDF), and one for so
@@ -74,15 +75,18 @@ def report(
     moment = (made_at or datetime.now(UTC)).replace(tzinfo=None, microsecond=0)
     with _engine(request.workers, len(machines)) as engine:
         rows = _reported(db, machines, week, request, engine, progress)
+        # Once all runs of the week are identified.
+        looks = weekly_notices(db, week).of_machines({row.machine for row, _ in rows}, week.name)
         fleet = Fleet(
             week.name, week.first, week.last, moment, f"machine-health-monitor {__version__}", options.risk,
             tuple(row for row, _ in rows),
             refused_elsewhere(db, {name.machine for name in every}, week),
             ended=today > week.last,
+            noticed=tuple((notice.machine, sentence(notice)) for notice in looks.notices),
             attention=tuple(stored_health(db, number) for _, number in rows[:ATTENTION]),
         )  # fmt: skip
         files = _write(db, fleet, [number for _, number in rows], request, engine)
-    return _answer(fleet, week, files)
+    return _answer(fleet, week, files, looks)
 
 
 def _machines(db: Database) -> list[MachineName]:
@@ -215,7 +219,7 @@ def _becoming(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
-def _answer(fleet: Fleet, week: Week, files: list[str]) -> ReportAnswer:
+def _answer(fleet: Fleet, week: Week, files: list[str], looks: WeeklyNotices) -> ReportAnswer:
     measured = sum(row.state != "not measured" for row in fleet.rows)
     return ReportAnswer(
         week=week.name,
@@ -230,4 +234,5 @@ def _answer(fleet: Fleet, week: Week, files: list[str]) -> ReportAnswer:
         if measured
         else f"No machine was measured in week {week.name} ({week.first} to {week.last}).",
         files=tuple(files),
+        weekly_looks=looks,
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 from monitor.documents import OMITTED, named
 from monitor.exceptions import InputError
 from monitor.reporting.health.records import FleetRow, RefusedImport
+from monitor.workflow.history.weekly_looks import WeeklyNotices
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,10 @@ class ReportRequest:
 
 @dataclass(frozen=True)
 class ReportAnswer:
-    """The machines by urgency, those that raise an alarm, and the files written."""
+    """The machines by urgency, those that raise an alarm, and the files written.
+
+    ``weekly_looks`` are the notices of the week, as if the fleet had been looked at every week.
+    """
 
     week: str
     from_: str = field(metadata=named("from"))
@@ -59,4 +63,5 @@ class ReportAnswer:
     refused_imports: tuple[RefusedImport, ...]
     message: str
     files: tuple[str, ...]
+    weekly_looks: WeeklyNotices
     mailed_to: tuple[str, ...] | None = field(default=None, metadata=OMITTED)

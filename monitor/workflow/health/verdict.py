@@ -39,11 +39,15 @@ def conformity_of(stated: UncertaintyAnswer | None, limits: Mapping[str, float])
     """The parameters of a run against the limits of their absolute values."""
     if stated is None or not any(name in limits for name in stated.parameters):
         return Conformity({}, None, every_has_one=False)
-    names, dof = stated.parameters, stated.guf.degrees_of_freedom
+    names = stated.parameters
+    # Each parameter rests on its own part of the budget; an evaluation of before knows one number for all.
+    every = stated.guf.degrees_of_freedom
+    freedoms = stated.guf.degrees_of_freedom_by_parameter or dict.fromkeys(names, every)
+    dof = [math.inf if (freedom := freedoms.get(name, every)) is None else freedom for name in names]
     limit = np.array([limits.get(name, np.inf) for name in names])
     result = conformity(
         [stated.guf.estimate[name] for name in names], stated.covariance, -limit, limit,
-        dof=np.inf if dof is None else dof,
+        dof=dof,
     )  # fmt: skip
     single = {name: float(1.0 - p) for name, p in zip(names, result.single, strict=True) if name in limits}
     return Conformity(single, float(1.0 - result.joint), all(name in limits for name in names))

@@ -16,10 +16,15 @@ import numpy.typing as npt
 
 from monitor.documents import OMITTED
 from monitor.exceptions import DataError
-from monitor.statistics.before_after import before_after
+from monitor.statistics.before_after import OtherDays, before_after
 from monitor.statistics.normalised_error import K, normalised_error, result_of_runs
 from monitor.store import Database, MachineEvent, MachineHistory, latest_documents
 from monitor.workflow.history.series import day_numbers
+
+#: Why nothing is said of a change where each side has one day and the machine no other that would say how days differ.
+NOT_DECIDED = (
+    "not decided: one day on each side cannot tell a change from days that differ; measure a second day"
+)
 
 
 class PairKind(Enum):
@@ -35,7 +40,10 @@ class ParameterAgreement:
     E_n.
 
     Before and after an event u is that of the means without what both share; ``between_days`` is the standard deviation
-    of the days that it holds, None where each side has one day (then it is that of runs alone).
+    of the days that it holds, estimated with ``other_days`` of the machine where the sides have few, or
+    the scatter of so many ``other_campaigns`` where that is larger. ``agree`` and
+    ``e_n`` are None where nothing is known of the days, and ``why_not_decided`` says what would decide it: ``expanded``
+    is then of runs alone.
     """
 
     unit: str
@@ -46,10 +54,13 @@ class ParameterAgreement:
     difference: float
     expanded: float
     k: float
-    e_n: float
-    agree: bool
+    e_n: float | None
+    agree: bool | None
     degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
     between_days: float | None = field(default=None, metadata=OMITTED)
+    other_days: int | None = field(default=None, metadata=OMITTED)
+    other_campaigns: int | None = field(default=None, metadata=OMITTED)
+    why_not_decided: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,11 +82,15 @@ class AgreementPair:
 
 @dataclass(frozen=True)
 class _Comparison:
-    """A pair without its numbers; ``before`` and ``after`` (n,) select the runs of its campaigns."""
+    """A pair without its numbers; ``before`` and ``after`` (n,) select the runs of its campaigns.
+
+    ``stretch`` (n,) numbers the runs of the method by the events before them, -1 for other methods.
+    """
 
     pair: AgreementPair
     before: npt.NDArray[np.bool_] | None = None
     after: npt.NDArray[np.bool_] | None = None
+    stretch: npt.NDArray[np.int64] | None = None
 
 
 def agreement(
@@ -87,7 +102,7 @@ def agreement(
     evaluated for its campaign (the latest `monitor uncertainty`), and the scatter of its runs. Before and after an
     event
     one method measured with the same artefact and probe: what they share drops out, and the scatter of runs and days is
-    left (``before_after``).
+    left (``before_after``), with the machine's other days where both sides have few.
     """
     comparisons = list(_comparisons(history, events))
     # Of years of campaigns few are compared: only their results are read.
@@ -109,6 +124,7 @@ def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Ite
             )
         )  # fmt: skip
     seconds = history.seconds
+    moments = np.sort([event.at.timestamp() for event in events])
     for event in events:
         for method in latest:
             of_method = history.method == method
@@ -121,7 +137,8 @@ def _comparisons(history: MachineHistory, events: Sequence[MachineEvent]) -> Ite
                     kind=PairKind.EVENT, event=event.kind, description=event.description, method=method,
                     campaigns=campaigns, parameters={}, disagree=(),
                 )  # fmt: skip
-                yield _Comparison(pair, before, after)
+                stretch = np.where(of_method, np.searchsorted(moments, seconds, side="right"), -1)
+                yield _Comparison(pair, before, after, stretch)
 
 
 def _stated_uncertainties(
@@ -158,14 +175,19 @@ def _across_event(
     days, (before, after) = day_numbers(history), _rows(history, comparison, column)
     if not before.any() or not after.any():
         return None
-    values = history.values[:, column]
+    values, stretch = history.values[:, column], comparison.stretch
+    others = None
+    if stretch is not None:
+        rest = np.isfinite(values) & (stretch >= 0) & ~np.isin(days, days[before | after])
+        others = OtherDays(values[rest], days[rest], stretch[rest], history.campaign[rest])
     try:
-        result = before_after(values[before], values[after], days[before], days[after])
+        result = before_after(values[before], values[after], days[before], days[after], others)
     except DataError:
         return None
     return ParameterAgreement(
         unit, result.before, result.u_before, result.after, result.u_after, result.difference, result.expanded,
-        result.k, result.e_n, result.agree, result.dof, result.between,
+        result.k, result.e_n, result.agree, result.dof, result.between, result.other_days, result.other_campaigns,
+        None if result.decided else NOT_DECIDED,
     )  # fmt: skip
 
 
@@ -192,28 +214,32 @@ def _compared(history: MachineHistory, comparison: _Comparison) -> AgreementPair
             unit, x1, u1, x2, u2, float(error.difference[0]), float(error.expanded[0]), K, float(error.e_n[0]),
             bool(error.agree[0]),
         )  # fmt: skip
-    disagree = tuple(name for name, result in parameters.items() if not result.agree)
+    disagree = tuple(name for name, result in parameters.items() if result.agree is False)
     return replace(comparison.pair, parameters=parameters, disagree=disagree)
 
 
 def sentence(pair: AgreementPair) -> str:
     """A pair as a line for people."""
     first, second = pair.campaigns
-    worst, result = max(pair.parameters.items(), key=lambda named: abs(named[1].e_n))
-    number = f"largest |E_n| {abs(result.e_n):.2g} ({worst})"
+    errors = {name: abs(result.e_n) for name, result in pair.parameters.items() if result.e_n is not None}
+    worst = max(errors, key=errors.__getitem__, default="")
+    number = f"; largest |E_n| {errors[worst]:.2g} ({worst})" if errors else ""
     if pair.methods is not None:
         subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
         if not pair.disagree:
-            return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}: {number}"
-        return f"{subject} disagree in {', '.join(pair.disagree)}: {number}"
+            return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}"
+        return f"{subject} disagree in {', '.join(pair.disagree)}{number}"
     moved = ", ".join(
         f"{name} {pair.parameters[name].first:.3g} -> {pair.parameters[name].second:.3g} {pair.parameters[name].unit}"
         for name in pair.disagree
     )
     subject = f"before and after the {pair.event} ({first}, {second}; {pair.method})"
-    days = (
-        "; each side is one day: days that differ are not told from a change"
-        if all(parameter.between_days is None for parameter in pair.parameters.values())
-        else ""
-    )
-    return f"{subject}: {moved or 'nothing moved beyond the scatter of runs and days'}; {number}{days}"
+    if not errors:
+        return f"{subject}: {NOT_DECIDED}"
+    days = max((result.other_days or 0 for result in pair.parameters.values()), default=0)
+    campaigns = max((result.other_campaigns or 0 for result in pair.parameters.values()), default=0)
+    lean = [f"{count} other {of}" for count, of in ((days, "days"), (campaigns, "campaigns")) if count]
+    judged = f"; judged with the scatter of {' and '.join(lean)} of the machine" if lean else ""
+    open_ones = [name for name, result in pair.parameters.items() if result.agree is None]
+    undecided = f"; {NOT_DECIDED} ({', '.join(open_ones)})" if open_ones else ""
+    return f"{subject}: {moved or 'nothing moved beyond the scatter of runs and days'}{number}{judged}{undecided}"

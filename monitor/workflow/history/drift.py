@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from monitor.exceptions import DataError
+from monitor.records import Array
 from monitor.statistics import Trend, trend
 from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
@@ -16,6 +17,10 @@ from monitor.workflow.history.series import Series
 #: fifty and more, is no statement about a year; and where days differ much among themselves the weighted slope
 #: rests on the hours within the days, which a machine that warms up every morning fills with something else.
 SHORTEST_DAYS = 30.0
+
+#: The temperature of the days is fitted beside the line from so many days on, where it runs over so many kelvin. Where
+#: it rises or falls with time, the interval of the slope grows: nothing tells the two apart.
+DAYS_FOR_TEMPERATURE, LEAST_TEMPERATURE_RANGE = 6, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +46,32 @@ class PieceDrift:
         if len(piece.t) and np.ptp(piece.values) == 0.0:
             return f"no drift of {piece.name}: it has the same value in every run"
         try:
-            return trend(piece.values, piece.t, u=piece.weights(), days=piece.days, cycle=DAYS_PER_YEAR)
+            return trend(
+                piece.values,
+                piece.t,
+                u=piece.weights(),
+                days=piece.days,
+                cycle=DAYS_PER_YEAR,
+                beside=self._beside,
+            )
         except DataError as error:
             return f"no drift: {error}"
+
+    @cached_property
+    def _beside(self) -> Array | None:
+        """The temperature of the runs (n, 1), fitted beside the line; None where too few days or kelvins show it."""
+        piece = self.piece
+        degrees = piece.temperature
+        if degrees is None or piece.day_count < DAYS_FOR_TEMPERATURE or not np.isfinite(degrees).all():
+            return None
+        index = np.unique(piece.days, return_inverse=True)[1]
+        means = np.bincount(index, degrees) / np.bincount(index)
+        return degrees[:, np.newaxis] if np.ptp(means) >= LEAST_TEMPERATURE_RANGE else None
+
+    @property
+    def thermometer(self) -> str | None:
+        """The recorded temperature that is fitted beside the line; None where none is."""
+        return None if self.line is None or self._beside is None else self.piece.thermometer
 
     @property
     def line(self) -> Trend | None:

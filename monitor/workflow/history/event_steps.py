@@ -29,7 +29,8 @@ class EventStep:
     """A parameter that stepped at an event: ``size`` with its standard uncertainty ``u``, in its display unit.
 
     ``at`` is the time of the event (days since 1970). ``by_days`` says whether ``u`` and ``p_value`` are by the
-    scatter of the means of days; otherwise by that of the runs, which knows nothing of how days differ.
+    scatter of the means of days; otherwise by that of the runs, which knows nothing of how days differ: then the step
+    is not decided, for one day a side may differ as much where nothing happened.
     """
 
     parameter: str
@@ -56,24 +57,24 @@ def event_steps(
     """The steps at events that may have changed the machine, of all parameters, in the order of time.
 
     By the scatter of the days: those whose p-value lies below ``false_alarm`` over the number of comparisons
-    (Bonferroni), so that ``false_alarm`` is the probability of any where there is none. Where a few days leave that
-    open, a step is stated by the scatter of the runs (``by_days`` is false), which knows nothing of how days differ.
-    Of events between the same two runs the last one stands for all.
+    (Bonferroni), so that ``false_alarm`` is the probability of any where there is none. Both sides of an event and all
+    other pieces of the history say how days differ. Where no piece has two days nothing says so: what is large by the
+    scatter of the runs is then named as not decided (``by_days`` is false). Of events between the same two runs the
+    last one stands for all.
     """
     moments = {days_since_1970(event.at): event for event in events if event.kind != NOTE}
     compared = [pair for parameter in past.values() for pair in _of_parameter(parameter, moments)]
     level = false_alarm / max(len(compared), 1)
-    steps = (_stated(pair, level, false_alarm) for pair in compared)
+    steps = (_stated(pair, level) for pair in compared)
     return tuple(sorted((step for step in steps if step is not None), key=lambda step: step.at))
 
 
-def _stated(pair: _Compared, level: float, alone: float) -> EventStep | None:
-    """The step as it may be stated, None where it may not: by days at ``level``; by runs where days are not against
-    it."""
+def _stated(pair: _Compared, level: float) -> EventStep | None:
+    """The step as it may be stated, None where it may not: by days at ``level``; by runs where no days can."""
     step = pair.step
-    if step.by_days and step.p_value < level:
-        return step
-    if pair.by_runs is None or (step.by_days and step.p_value >= alone) or pair.by_runs[1] >= level:
+    if step.by_days:
+        return step if step.p_value < level else None
+    if pair.by_runs is None or pair.by_runs[1] >= level:
         return None
     u, p_value = pair.by_runs
     return replace(step, u=u, p_value=p_value, by_days=False)
@@ -82,6 +83,8 @@ def _stated(pair: _Compared, level: float, alone: float) -> EventStep | None:
 def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) -> list[_Compared]:
     steady = past.series.steady
     ends = np.array([-np.inf, *sorted({*moments, *(change.at for change in past.search.changes)}), np.inf])
+    # Which days scatter about which mean: the pieces between all ends.
+    pieces = np.searchsorted(ends, steady.t, side="right")
     pairs: dict[int, _Compared] = {}
     for at, event in sorted(moments.items()):
         first = int(np.searchsorted(steady.t, at))
@@ -90,10 +93,13 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
         later = ends[np.searchsorted(steady.t, ends) > first].min(initial=np.inf)
         before = steady.part((steady.t >= earlier) & (steady.t < at))
         after = steady.part((steady.t >= at) & (steady.t < later))
-        days, runs = _student(_means(before), _means(after)), _student(before.values, after.values)
+        means = _means(before), _means(after)
+        others = (steady.t < earlier) | (steady.t >= later)
+        rest = [_means(steady.part(others & (pieces == piece))) for piece in np.unique(pieces[others])]
+        days, runs = _student(*means, rest), _student(before.values, after.values)
         if runs is None and days is None:
             continue
-        size = float(_means(after).mean() - _means(before).mean())
+        size = float(means[1].mean() - means[0].mean()) if min(map(len, means)) else 0.0
         u, p_value = days or runs or (np.nan, 1.0)
         pairs[first] = _Compared(
             EventStep(steady.name, steady.unit, event, at, size, u, p_value, days is not None), runs
@@ -101,12 +107,14 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
     return list(pairs.values())
 
 
-def _student(first: Array, second: Array) -> tuple[float, float] | None:
-    """Standard uncertainty of the difference of two means and its p-value, with a common scatter; None without one."""
-    freedom = len(first) + len(second) - 2
+def _student(first: Array, second: Array, rest: Sequence[Array] = ()) -> tuple[float, float] | None:
+    """Standard uncertainty of the difference of two means and its p-value, with the scatter common to them and to the
+    groups of the ``rest`` about their means; None without one."""
+    groups = [first, second, *rest]
+    freedom = sum(len(group) - 1 for group in groups)
     if min(len(first), len(second)) < 1 or freedom < 1:
         return None
-    squares = float(np.sum((first - first.mean()) ** 2) + np.sum((second - second.mean()) ** 2))
+    squares = sum(float(np.sum((group - group.mean()) ** 2)) for group in groups)
     u = float(np.sqrt(squares / freedom * (1.0 / len(first) + 1.0 / len(second))))
     if u <= 0.0:
         return None
@@ -114,5 +122,8 @@ def _student(first: Array, second: Array) -> tuple[float, float] | None:
 
 
 def _means(series: Series) -> Array:
+    """Means of the days of a part of the history; none of an empty one."""
+    if not len(series.days):
+        return np.empty(0)
     _, index = np.unique(series.days, return_inverse=True)
     return np.asarray(np.bincount(index, series.values) / np.bincount(index))

@@ -7,7 +7,7 @@ from datetime import datetime
 
 import numpy as np
 
-from monitor.exceptions import NotFoundError
+from monitor.exceptions import NotFoundError, did_you_mean
 from monitor.store import MachineHistory, RecordedRun
 
 
@@ -17,7 +17,8 @@ def selected_campaigns(history: MachineHistory, campaigns: tuple[str, ...]) -> M
     for name in campaigns:
         if present and name not in present:
             raise NotFoundError(
-                f"the history of machine {history.machine} holds no campaign {name!r}; it holds {', '.join(present)}"
+                f"the history of machine {history.machine} holds no campaign {name!r}; "
+                f"{did_you_mean(name, present)}it holds {', '.join(present)}"
             )
     return history.part(np.isin(history.campaign, campaigns)) if campaigns else history
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from monitor.records import Array
 from monitor.store import MachineHistory
+from monitor.units import DEGREE_CELSIUS, column_unit
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 
 #: So many runs have to remain for those of a warming machine to be left out: fewer are not searched for changes.
@@ -23,7 +24,8 @@ class Series:
 
     ``values`` and ``u`` (n,) in ``unit``, ``t`` (n,) in days since 1970 (UTC), ``days`` (n,) numbers of the machine's
     days, ``hour`` (n,) of the shop's clock, ``warm_up`` (n,) whether the machine was warming up; ``offset`` of the
-    shop's clock from UTC, that of the machine's last run.
+    shop's clock from UTC, that of the machine's last run. ``temperature`` (n,) is that of the machine or its shop in °C
+    as far as recorded (NaN: not), under the name ``thermometer``.
     """
 
     name: str
@@ -35,6 +37,8 @@ class Series:
     hour: Array
     warm_up: npt.NDArray[np.bool_]
     offset: timedelta
+    temperature: Array | None = None
+    thermometer: str | None = None
 
     def part(self, mask: npt.NDArray[np.bool_]) -> Series:
         """The runs of a mask (n,)."""
@@ -42,7 +46,8 @@ class Series:
             return self
         return Series(
             self.name, self.unit, self.values[mask], self.u[mask], self.t[mask], self.days[mask], self.hour[mask],
-            self.warm_up[mask], self.offset,
+            self.warm_up[mask], self.offset, None if self.temperature is None else self.temperature[mask],
+            self.thermometer,
         )  # fmt: skip
 
     @cached_property
@@ -80,18 +85,33 @@ def day_numbers(history: MachineHistory) -> npt.NDArray[np.int64]:
     return np.array([numbers.setdefault(pair, len(numbers)) for pair in pairs], dtype=np.int64)
 
 
+def _temperature(history: MachineHistory) -> tuple[str | None, Array | None]:
+    """The recorded temperature that most runs have, the first in the order of names; None without one."""
+    recorded = {
+        name: int(np.isfinite(values).sum())
+        for name, values in history.conditions.items()
+        if column_unit(name) == DEGREE_CELSIUS and np.isfinite(values).any()
+    }
+    if not recorded:
+        return None, None
+    name = min(recorded, key=lambda channel: (-recorded[channel], channel))
+    return name, history.conditions[name]
+
+
 def parameter_series(history: MachineHistory) -> dict[str, tuple[Series, npt.NDArray[np.bool_]]]:
     """Each parameter that a run has, with the mask (n,) of the runs that have it."""
     t = history.seconds / SECONDS_PER_DAY
     days = day_numbers(history)
     hour = np.array([at.hour + at.minute / 60.0 for at in history.started_at])
     offset = (history.started_at[-1].utcoffset() if history.started_at else None) or timedelta()
+    thermometer, temperature = _temperature(history)
     series = {}
     for j, (name, unit) in enumerate(zip(history.parameters, history.units, strict=True)):
         mask = np.isfinite(history.values[:, j])
         whole = Series(
-            name, unit, history.values[:, j], history.u[:, j], t, days, hour, history.warm_up, offset
-        )
+            name, unit, history.values[:, j], history.u[:, j], t, days, hour, history.warm_up, offset,
+            temperature, thermometer,
+        )  # fmt: skip
         if mask.any():
             series[name] = (whole.part(mask), mask)
     return series

@@ -10,6 +10,7 @@ from monitor.methods.chain.problem import Solver, solve_problem
 from monitor.methods.model import chain_of
 from monitor.records import Array, Campaign, Machine
 from monitor.refusal import Reason, ReasonKind, Refusal
+from monitor.reporting.frames import frame_words
 from monitor.reporting.refused import refusal_sentence, refused_parameters
 from monitor.store import StoredIdentification, StoredModel, StoredRun
 from monitor.units import MICROMETRE, Unit
@@ -111,6 +112,7 @@ def _stored(campaign: Campaign, identification: Identification, model: StoredMod
                 residuals=run.residuals,
             )
         )
+    frames = frames_of((*identification.parameters, *followed.names), chain_of(campaign.machine))
     return StoredIdentification(
         campaign=identification.campaign,
         model=model.name,
@@ -119,4 +121,5 @@ def _stored(campaign: Campaign, identification: Identification, model: StoredMod
         parameters=(*identification.parameters, *followed.names),
         units=(*identification.units, *followed.units),
         runs=tuple(runs),
+        refers_to={name: frame_words(frame) for name, frame in frames.items()},
     )

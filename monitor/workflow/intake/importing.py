@@ -49,31 +49,47 @@ class ImportedFolder:
 
 
 @dataclass(frozen=True)
+class RefusedFolder:
+    """A folder of which nothing was kept, and why: all its faults in one text."""
+
+    folder: str
+    why: str
+
+
+@dataclass(frozen=True)
 class ImportAnswer:
-    """The imported folders in their order."""
+    """The imported folders in their order, and those that were refused."""
 
     imported: tuple[ImportedFolder, ...]
+    refused: tuple[RefusedFolder, ...] = ()
 
 
 def import_folders(
     db: Database, request: ImportRequest, *, progress: Callable[[str], None] = lambda name: None
 ) -> ImportAnswer:
-    """Import every folder, all or nothing each; the first refusal stops, what was imported before stays.
+    """Import every folder, all or nothing each; one that is refused does not hinder the others.
 
-    Raises CampaignError with all faults of the folder that is refused; the refusal is recorded.
+    Every refusal is recorded. Raises CampaignError with all faults of a folder that was asked for alone, StoreError
+    where the database cannot be written.
     """
     answers: list[ImportedFolder] = []
+    refused: list[RefusedFolder] = []
     for folder in request.folders:
         progress(str(folder))
         try:
             imported = _import(db, Path(folder))
-        except InputError as error:
+        except StoreError as error:
             if not answers:
                 raise
             before = ", ".join(answer.campaign for answer in answers)
-            raise InputError(f"{error}\nIn the database before it was met: {before}") from error
-        answers.append(_answer(db, folder, imported))
-    return ImportAnswer(tuple(answers))
+            raise StoreError(f"{error}\nIn the database before it was met: {before}") from error
+        except InputError as error:
+            if len(request.folders) == 1:
+                raise
+            refused.append(RefusedFolder(str(folder), str(error)))
+        else:
+            answers.append(_answer(db, folder, imported))
+    return ImportAnswer(tuple(answers), tuple(refused))
 
 
 def _import(db: Database, folder: Path) -> Imported:

@@ -11,11 +11,11 @@ from monitor.store import (
     load_model,
     machine_models,
     machines_of_method,
+    next_version,
     save_model,
 )
-from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
-from monitor.workflow.explain.versions import history
+from monitor.workflow.explain.versions import fitted_version
 from monitor.workflow.model.answer import AffectedAnswer, ChangeModelAnswer
 from monitor.workflow.model.request import AddEffectRequest, RemoveEffectRequest
 from monitor.workflow.model.show import shown
@@ -29,13 +29,15 @@ def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
     The effect must exist on one of the machines of the database, or for a curve in its ``campaign``, else in one of
     the curves of the database. Raises EffectError, NotFoundError.
     """
-    model = version_with(db, request)
+    version = _planned(db, request)
     try:
-        steps = history(db, HistoryRequest(f"{model.name}@{model.version}", request.campaign)).steps
+        # Fitted before it is stored: a campaign that is not there leaves no model behind, and nobody waits for the fit.
+        steps = fitted_version(db, version, request.campaign)
     except NotFoundError:
         if request.campaign is not None:
             raise
         steps = ()
+    model = version_with(db, request)
     return _changed(db, model, request.new_name, steps)
 
 
@@ -76,6 +78,12 @@ def remove_effect(db: Database, request: RemoveEffectRequest) -> ChangeModelAnsw
 
 def version_with(db: Database, request: AddEffectRequest) -> StoredModel:
     """The stored version with one more effect; its parent is the one it was added to. Raises as ``add_effect``."""
+    version = _planned(db, request)
+    return save_model(db, version.name, version.effects, parent=version.parent, note=version.note)
+
+
+def _planned(db: Database, request: AddEffectRequest) -> StoredModel:
+    """The version with one more effect as it would be stored."""
     parent = resolve(db, request.to)
     text = subjects_of(db, parent).canonical(request.effect, request.campaign)
     if text in parent.effects:
@@ -87,7 +95,7 @@ def version_with(db: Database, request: AddEffectRequest) -> StoredModel:
         raise InputError(
             f"there is a model {name} already: add to it with --to {name}, or choose another name"
         )
-    return save_model(
+    return next_version(
         db, _checked_name(name, parent), (*parent.effects, text), parent=(parent.name, parent.version),
         note=request.note,
     )  # fmt: skip

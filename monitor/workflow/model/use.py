@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from monitor.effects import parse_effect
-from monitor.exceptions import EffectError, InputError, MonitorError, NotFoundError
+from monitor.exceptions import EffectError, InputError, MonitorError, NotFoundError, did_you_mean
 from monitor.methods import ChainMethod, methods
 from monitor.methods.model import chain_of
 from monitor.store import (
@@ -68,7 +68,8 @@ def _check_effects(db: Database, model: StoredModel, machine: str) -> None:
     described = {entry.id: entry for entry in described_machines(db)}
     if machine not in described:
         raise NotFoundError(
-            f"there is no machine '{machine}'; there are {', '.join(described) or 'none yet'}"
+            f"there is no machine '{machine}'; {did_you_mean(machine, described)}"
+            f"there are {', '.join(described) or 'none yet'}"
         )
     chain = chain_of(described[machine])
     for effect in model.effects:

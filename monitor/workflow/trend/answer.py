@@ -13,6 +13,7 @@ from enum import Enum
 from monitor.documents import INLINED, OMITTED, named
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
+from monitor.workflow.history.weekly_looks import WeeklyNotices
 
 #: Fewer days than this cannot tell a change from days that differ by much more than runs scatter.
 FEW_DAYS = DAYS_THAT_SHOW
@@ -56,8 +57,8 @@ class DriftStatement:
 
     ``robust_slope_per_year`` by Theil and Sen, ``monotone_p`` by Mann and Kendall; ``between_days`` and
     ``within_days`` are standard deviations about the line. ``resemblance`` says how the slope's interval allows for
-    days
-    that resemble each other, ``season`` whether a wave of a year is allowed for.
+    days that resemble each other, ``season`` whether a wave of a year is allowed for, ``temperature`` names the
+    recorded one that is fitted beside the line.
     """
 
     slope_per_year: float | None = None
@@ -72,6 +73,7 @@ class DriftStatement:
     within_days: float | None = None
     resemblance: DayResemblance | None = None
     season: Season | None = None
+    temperature: str | None = field(default=None, metadata=OMITTED)
     since: str | None
     n: int
     days: int
@@ -110,7 +112,8 @@ class DatedChange:
 class StepAtEvent:
     """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
 
-    ``scatter_of`` says by what the uncertainty is: ``days`` or, where they are too few, ``runs``.
+    ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
+    then it is not decided whether it is a step.
     """
 
     at: str
@@ -383,3 +386,4 @@ class TrendAnswer:
     parameters: Mapping[str, ParameterTrend]
     volumetric_error: VolumetricForecast | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
+    weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)

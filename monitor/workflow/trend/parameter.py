@@ -72,6 +72,7 @@ def drift_statement(drift: PieceDrift) -> DriftStatement:
             resemblance.correlation, resemblance.allowed, resemblance.widening, resemblance.blocks
         ),
         season=Season.ALLOWED_FOR if resemblance.cyclic else Season.NOT_TOLD,
+        temperature=drift.thermometer,
     )
 
 

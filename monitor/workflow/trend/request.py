@@ -16,7 +16,8 @@ class TrendRequest:
     ``parameter`` alone, runs from ``since`` on, of the ``campaigns`` (empty: all), under a ``model`` (by default the
     method's own). The control charts compare with a ``reference`` period (by default the first third). ``reliability``
     is the wanted probability of being in tolerance until the ``next_check``; ``volumetric_limit_um`` takes the place of
-    the machine file's. ``figures`` are drawn into a folder.
+    the machine file's. ``figures`` are drawn into a folder. ``weekly_looks`` adds what looks at the whole fleet
+    every week noticed of the machine.
     """
 
     machine: str
@@ -29,6 +30,7 @@ class TrendRequest:
     model: str | None = None
     volumetric_limit_um: float | None = None
     figures: Path | None = None
+    weekly_looks: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.reliability < 1.0:

@@ -9,7 +9,7 @@ from datetime import UTC
 import numpy as np
 
 from monitor.documents import to_document
-from monitor.exceptions import DataError, InputError, NotFoundError
+from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.records import Array
 from monitor.statistics import control_false_discoveries
 from monitor.store import (
@@ -28,6 +28,7 @@ from monitor.workflow.history.changes import FALSE_ALARM, SEED
 from monitor.workflow.history.event_steps import EventStep, event_steps
 from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.runs import same_hours, selected_campaigns
+from monitor.workflow.history.weekly_looks import weekly_notices
 from monitor.workflow.trend.answer import (
     ControlCharts,
     ParameterTrend,
@@ -66,6 +67,8 @@ def trend(db: Database, request: TrendRequest) -> TrendAnswer:
         save_analysis(
             db, "trend", to_document(answer), method="all parameters", machine=request.machine, seed=SEED
         )
+    if request.weekly_looks:
+        answer = replace(answer, weekly_looks=weekly_notices(db).of_machines({request.machine}))
     if request.figures is None:
         return answer
     # Loaded here: the libraries that draw take longer to load than a page to make.
@@ -106,8 +109,9 @@ def _history(db: Database, request: TrendRequest) -> MachineHistory:
     history = selected_campaigns(history, request.campaigns)
     if request.parameter is not None and len(history.run) and request.parameter not in history.parameters:
         every = _history(db, replace(request, parameter=None, volumetric_limit_um=None)).parameters
+        hint = did_you_mean(request.parameter, every)
         raise NotFoundError(
-            f"machine {machine} has no parameter {request.parameter!r}; it has {', '.join(every) or 'none yet'}"
+            f"machine {machine} has no parameter {request.parameter!r}; {hint}it has {', '.join(every) or 'none yet'}"
         )
     return history
 

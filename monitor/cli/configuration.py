@@ -1,0 +1,117 @@
+"""The configuration of a place: one TOML file with what would be typed again and again.
+
+``$MONITOR_CONFIG``, else ``monitor.toml`` in the working folder, else ``monitor/monitor.toml`` in the user's folder of
+configurations (``$XDG_CONFIG_HOME``, else ``~/.config``). An option that is typed and ``$MONITOR_DB`` stand above it.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+import zoneinfo
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from monitor.exceptions import InputError, did_you_mean
+
+NAME = "monitor.toml"
+TEMPLATE = """# The configuration of monitor. Take the # away from what you need; `monitor config check` says
+# whether it can be read.
+# Paths without a leading / are counted from the folder of this file.
+
+# database = "shop.duckdb"         # in place of --db
+# laboratory = "laboratory.toml"   # in place of --laboratory of a certificate
+# language = "en"                  # of `certificate template`: en or de
+# mail = "mail.toml"               # what `report --mail` without a file sends by
+# time_zone = "Europe/Berlin"      # of moments that are typed without an offset from UTC; else that of this computer
+"""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """What a configuration says, None where it says nothing; ``file`` is None where there is none."""
+
+    file: Path | None = None
+    database: Path | None = None
+    laboratory: Path | None = None
+    language: str | None = None
+    mail: Path | None = None
+    time_zone: str | None = None
+
+
+def place() -> Path | None:
+    """The file that is read; None where there is none. Raises InputError where $MONITOR_CONFIG names no file."""
+    named = os.environ.get("MONITOR_CONFIG")
+    if named:
+        if not Path(named).is_file():
+            raise InputError(
+                f"MONITOR_CONFIG names {named}, which is no file; `monitor config init` writes one"
+            )
+        return Path(named)
+    home = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return next((file for file in (Path(NAME), Path(home) / "monitor" / NAME) if file.is_file()), None)
+
+
+def configuration() -> Configuration:
+    """The configuration of the working folder or the user. Raises InputError with every fault of the file."""
+    file = place()
+    return Configuration() if file is None else read(file.absolute())
+
+
+def read(file: Path) -> Configuration:
+    """Read a configuration. Raises InputError with every fault of the file."""
+    try:
+        document = tomllib.loads(file.read_bytes().decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
+    except ValueError as error:
+        raise InputError(f"{file} is no TOML in UTF-8: {error}") from error
+    faults = [fault for key, value in document.items() if (fault := _fault(key, value, file))]
+    if faults:
+        raise InputError("\n  ".join([f"{file} was refused:", *faults]))
+    paths = {
+        key: file.parent / document[key] for key in ("database", "laboratory", "mail") if key in document
+    }
+    texts = {key: document[key] for key in ("language", "time_zone") if key in document}
+    return Configuration(file, **paths, **texts)
+
+
+def _fault(key: str, value: object, file: Path) -> str | None:
+    """What is wrong with a key; None where nothing is."""
+    if key not in _CHECKS:
+        return f"there is no key {key}; {did_you_mean(key, _CHECKS)}there are {', '.join(_CHECKS)}"
+    if not isinstance(value, str) or not value.strip():
+        return f'{key} is a text in quotes, such as {key} = "..."'
+    wrong = _CHECKS[key](value, file)
+    return f"{key} = {value!r}: {wrong}" if wrong else None
+
+
+def _database(value: str, file: Path) -> str:
+    folder = (file.parent / value).parent
+    return "" if folder.is_dir() else f"the folder {folder} does not exist"
+
+
+def _file(value: str, file: Path) -> str:
+    return "" if (file.parent / value).is_file() else f"there is no file {file.parent / value}"
+
+
+def _language(value: str, file: Path) -> str:
+    return "" if value in ("de", "en") else "write de or en"
+
+
+def _zone(value: str, file: Path) -> str:
+    try:
+        zoneinfo.ZoneInfo(value)
+    except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
+        return "there is no such time zone; write for example Europe/Berlin or UTC"
+    return ""
+
+
+_CHECKS: dict[str, Callable[[str, Path], str]] = {
+    "database": _database,
+    "laboratory": _file,
+    "language": _language,
+    "mail": _file,
+    "time_zone": _zone,
+}

@@ -1,0 +1,50 @@
+"""Predict rows that took no part in a fit."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from monitor.cli import output
+from monitor.cli.database import opened
+from monitor.cli.parser import common
+from monitor.workflow.predict.predict import predict
+from monitor.workflow.predict.request import PredictRequest
+
+EXAMPLE = "monitor predict tracked-robot --model tracker"
+
+
+def options(parser: ArgumentParser) -> None:
+    common(parser)
+    parser.add_argument("campaign", metavar="CAMPAIGN")
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="a model, or a version of it: NAME@2 (default: that of the campaign's method)",
+    )
+    parser.add_argument(
+        "--of",
+        metavar="CAMPAIGN",
+        help="rows of this campaign, of the same set-up (default: ten parts of CAMPAIGN, each from the others)",
+    )
+
+
+def run(options: Namespace) -> int:
+    with opened(options) as db, output.working("predicting"):
+        answer = predict(db, PredictRequest(options.campaign, options.model, options.of))
+    if options.json:
+        output.document(answer)
+        return 0
+    how = f"{answer.blocks} parts, each from the others" if answer.blocks > 1 else f"from {answer.campaign}"
+    output.say(f"{answer.of} predicted by {answer.model} ({how}): RMS {output.micrometres(answer.rms_um)} µm")
+    output.say(
+        f"fitted rows {output.micrometres(answer.fitted_rms_um)} µm, stated uncertainty of a reading "
+        f"{output.micrometres(answer.stated_uncertainty_um)} µm"
+    )
+    if answer.resting_rms_um is not None:
+        output.say(f"targets beside the machine: RMS {output.micrometres(answer.resting_rms_um)} µm")
+    rows = [
+        [name, output.micrometres(part.rms_um), output.micrometres(part.largest_um), str(part.n)]
+        for name, part in answer.by_target.items()
+    ]
+    output.table("", ["by target", "RMS / µm", "largest / µm", "readings"], rows)
+    return 0

@@ -1,0 +1,148 @@
+"""Tables as a spreadsheet saves them, workbooks and CSV with semicolons and decimal commas, made plain CSV.
+
+A German Excel writes ``1,5;WAHR``. Cells may have a decimal comma there, because the comma separates nothing; a table
+that has decimal points as well is left as it is, since then nobody can know what its commas mean.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import warnings
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any
+
+from monitor.exceptions import Fault
+from monitor.readers.faults import Faults
+from monitor.readers.files import LARGEST_CSV, decode, read_bytes
+from monitor.records import SourceFile
+
+#: Instead of NAME.csv: a workbook of that table, or one workbook with a sheet of its name for every table.
+WORKBOOK = "campaign.xlsx"
+_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
+_POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+([eE][+-]?[0-9]+)?")
+_TRUTHS = {"WAHR": "true", "FALSCH": "false", "TRUE": "true", "FALSE": "false"}
+#: Columns of true and false.
+_OF_TRUTHS = ("warm_up",)
+
+
+def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | None, str | None]:
+    """Return the file that holds the table ``name`` (``runs.csv``) with its text as plain CSV.
+
+    A workbook is read where there is no such file. What cannot be read is noted, and is None.
+    """
+    stem = name.removesuffix(".csv")
+    books = [] if (folder / name).exists() else [f"{stem}.xlsx", WORKBOOK]
+    book = next((book for book in books if (folder / book).is_file()), None)
+    content = read_bytes(folder, book or name, LARGEST_CSV, faults)
+    if content is None:
+        return None, None
+    text = decode(name, content, faults) if book is None else _sheet_text(book, content, stem, faults)
+    return SourceFile(book or name, content), text
+
+
+def renamed(faults: Iterable[Fault], files: Mapping[str, str]) -> list[Fault]:
+    """Return the faults under the names of the files that their tables were read from."""
+    return [replace(fault, file=files.get(fault.file, fault.file)) for fault in faults]
+
+
+def plain_csv(text: str) -> str:
+    """Return a table that is separated by semicolons or tabs as plain CSV with the same lines; any other as it is."""
+    header = text.partition("\n")[0]
+    mark = next((mark for mark in ";\t" if mark in header and "," not in header), None)
+    if mark is None:
+        return text
+    lines = text.split("\n")
+    try:
+        rows = [next(csv.reader([line.rstrip("\r")], delimiter=mark, strict=True), []) for line in lines]
+    except csv.Error:
+        return text
+    return _written(_with_points(rows))
+
+
+def _with_points(rows: Sequence[list[str]]) -> Iterable[list[str]]:
+    """Yield the rows with decimal points, where no cell has one, and with true and false in their column."""
+    body = rows[1:]
+    commas = not any(_POINT.fullmatch(cell) for row in body for cell in row)
+    truths = {index for index, name in enumerate(rows[0]) if name in _OF_TRUTHS}
+    yield rows[0]
+    for row in body:
+        yield [
+            _TRUTHS.get(cell, cell) if index in truths
+            else cell.replace(",", ".") if commas and _COMMA.fullmatch(cell)
+            else cell
+            for index, cell in enumerate(row)
+        ]  # fmt: skip
+
+
+def _written(rows: Iterable[Sequence[str]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    for row in rows:
+        # An empty row stays an empty line, so that all lines keep their numbers.
+        if any(row):
+            writer.writerow(row)
+        else:
+            stream.write("\n")
+    return stream.getvalue()
+
+
+def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | None:
+    try:
+        from openpyxl import load_workbook
+    except ImportError:
+        faults.add(
+            file, None, None,
+            "workbooks need openpyxl: pip install 'machine-health-monitor[excel]', or save the table as CSV",
+        )  # fmt: skip
+        return None
+    try:
+        with warnings.catch_warnings():
+            # What openpyxl does not keep (drop-down lists, colours) is not read either.
+            warnings.simplefilter("ignore")
+            book = load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+    except (zipfile.BadZipFile, KeyError, ValueError, OSError, SyntaxError) as error:
+        faults.add(
+            file, None, None, f"this is no workbook of Excel (.xlsx) that can be read: {str(error)[:100]}"
+        )
+        return None
+    names = {name.casefold(): name for name in book.sheetnames}
+    sheet = names.get(stem, None if file == WORKBOOK else book.sheetnames[0])
+    if sheet is None:
+        listed = ", ".join(book.sheetnames)
+        faults.add(
+            file,
+            None,
+            None,
+            f"there is no sheet '{stem}'; name the sheet of that table so; there are {listed}",
+        )
+        return None
+    rows = [[_cell(value) for value in row] for row in book[sheet].iter_rows(values_only=True)]
+    width = max((index + 1 for index, cell in enumerate(rows[0] if rows else []) if cell), default=0)
+    # A row ends with its last cell that was ever filled; what stands beside the table is a fault of its row.
+    kept = [
+        [*row, *[""] * (width - len(row))][:width] + [cell for cell in row[width:] if cell] for row in rows
+    ]
+    text = _written(kept).rstrip("\n")
+    if not text:
+        faults.add(file, None, None, f"the sheet '{sheet}' is empty; its first row names the columns")
+        return None
+    return text + "\n"
+
+
+def _cell(value: Any) -> str:
+    """A cell as CSV writes it: decimal points, true and false, moments in ISO 8601."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+    if isinstance(value, datetime | date):
+        return value.isoformat()
+    return " ".join(str(value).splitlines())

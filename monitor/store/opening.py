@@ -1,0 +1,176 @@
+"""Opens and makes database files by DuckDB, and says in words why a file cannot be opened."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+from pathlib import Path
+
+import duckdb
+
+from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
+from monitor.store import migrations
+from monitor.store.turns import Holder, Patience, holder_in, turn_to_write, writer_at_work
+
+#: Of a new file, in bytes. One machine's history lies in as many blocks as it has campaigns, and a block is read whole:
+#: a quarter of DuckDB's own size reads a fleet's machine in half the time, and a small file is a third as large.
+BLOCK_SIZE = 65536
+
+#: What a file is called while it is made: it gets its name when it is whole.
+_UNFINISHED = ".new"
+#: A new database is its owner's alone; whoever wants a group to use it changes the mode, and log and lock follow it.
+_MODE = 0o600
+
+
+def connect(
+    path: str, read_only: bool, threads: int | None, patience: Patience | None = None
+) -> duckdb.DuckDBPyConnection:
+    """Open a file by DuckDB; as often as the patience lasts where another process has it.
+
+    Raises BusyError naming that process, StoreError for a file that cannot be opened.
+    """
+    # Nothing is fetched from the network behind the user's back.
+    config: dict[str, str | bool | int | float | list[str]] = {
+        "autoinstall_known_extensions": "false",
+        "autoload_known_extensions": "false",
+        "default_block_size": str(BLOCK_SIZE),
+    }
+    if threads is not None:
+        config["threads"] = str(threads)
+    _refuse_what_is_no_file(path)
+    patience = patience or Patience()
+    holder: Holder | None = None
+
+    def last_holder() -> Holder | None:
+        return holder
+
+    for _ in patience.tries(last_holder):
+        if read_only and patience.seconds > 0:
+            holder = writer_at_work(path)
+            if holder is not None:
+                continue
+        try:
+            connection = duckdb.connect(path, read_only=read_only, config=config)
+            # Written where a process looks interactive to DuckDB: between the lines of a JSON document.
+            connection.execute("SET enable_progress_bar = false")
+            return connection
+        except (duckdb.Error, ValueError) as fault:
+            holder = holder_in(str(fault))
+            if patience.seconds > 0 and "different configuration" in str(fault):
+                holder = Holder(os.getpid(), "another part of this process")
+            if holder is None:
+                if read_only and "replaying WAL" in str(fault):
+                    raise UnfinishedLogError(_in_words(path, read_only, str(fault))) from fault
+                raise StoreError(_in_words(path, read_only, str(fault))) from fault
+    raise busy(path, holder, patience)
+
+
+def busy(path: str, holder: Holder | None, patience: Patience) -> BusyError:
+    """Return the refusal of a file that another process has for longer than one would wait."""
+    waited = f"waited {patience.seconds:g} s for it; " if patience.seconds else ""
+    return BusyError(
+        f"{path} is in use by another process, {holder or 'unknown'}; {waited}"
+        "wait until it has finished, or stop it"
+    )
+
+
+def make(path: str, patience: Patience) -> None:
+    """Make a database of the present schema where there is none, or an empty file.
+
+    It gets its name when it is whole: a process that is killed or finds the disk full leaves no half of one. Raises
+    StoreError, BusyError.
+    """
+    if not Path(path).absolute().parent.is_dir():
+        raise StoreError(f"the folder of {path} does not exist; make it first")
+    with turn_to_write(path, patience) as holder:
+        if holder is not None:
+            raise busy(path, holder, patience)
+        if is_missing(path):
+            _make(path, path + _UNFINISHED)
+
+
+def is_missing(path: str) -> bool:
+    """Whether there is no file, or one without a byte, as a full disk leaves."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return not os.path.lexists(path)
+    except ValueError as fault:
+        raise StoreError(f"{path!a} cannot be the name of a file: {fault}") from fault
+    return stat.S_ISREG(status.st_mode) and status.st_size == 0
+
+
+def _make(path: str, partial: str) -> None:
+    _remove(partial)
+    try:
+        connection = connect(partial, False, None)
+        try:
+            os.chmod(partial, _MODE)
+            migrations.migrate(connection, migrations.available())
+        finally:
+            connection.close()
+        os.replace(partial, path)
+        sync_folder(Path(path).absolute().parent)
+    except (OSError, StoreError) as fault:
+        said = str(fault).replace(partial, path)
+        raise StoreError(
+            said if isinstance(fault, StoreError) else f"{path} could not be made: {said}"
+        ) from fault
+    finally:
+        _remove(partial)
+
+
+def sync_folder(folder: Path) -> None:
+    """Write the names of a folder to the disk, so that a file keeps the name that it was given when the power fails."""
+    # A file system that cannot do so (some of networks) has its own way.
+    with contextlib.suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def _remove(partial: str) -> None:
+    for name in (partial, partial + ".wal"):
+        Path(name).unlink(missing_ok=True)
+
+
+def _refuse_what_is_no_file(path: str) -> None:
+    """Refuse a pipe or device, which would be waited for or read for ever."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return
+    except ValueError as fault:
+        raise StoreError(f"{path!a} cannot be the name of a file: {fault}") from fault
+    if stat.S_ISDIR(status.st_mode):
+        raise StoreError(f"{path} is a folder; name a file")
+    if not stat.S_ISREG(status.st_mode):
+        raise StoreError(f"{path} is a pipe or device, not a file; name a file")
+
+
+def _in_words(path: str, read_only: bool, message: str) -> str:
+    if "different configuration" in message:
+        return f"{path} is open in this process already, with other options; close it first"
+    if "not a valid DuckDB database file" in message:
+        return f"{path} is not a database of this software; name another file, or one that does not exist yet"
+    if read_only and "does not exist" in message:
+        return f"there is no database {path}; `monitor --db {path} import FOLDER` makes one"
+    if "No such file or directory" in message:
+        return f"the folder of {path} does not exist; make it first"
+    if "Is a directory" in message:
+        return f"{path} is a folder; name a file"
+    if "Permission denied" in message:
+        return (
+            f"{path} may not be opened by this user{'' if read_only else ' for writing'}: permission denied"
+        )
+    return damaged(path, message)
+
+
+def damaged(path: str, message: str) -> str:
+    """Return the sentence about a file that DuckDB cannot read, or not write."""
+    if "Could not write" in message or "No space left" in message:
+        return f"{path} could not be written, nothing was kept: {message.splitlines()[0]}"
+    return f"{path} cannot be read, it may be damaged: {message.splitlines()[0]}; restore a backup: `monitor restore`"

@@ -1,0 +1,187 @@
+"""A database whose file is held only while it is read or written, so that many processes work beside each other.
+
+It is opened for reading at the first question and let go when nothing was asked for a moment, so that a fit or a page
+that is rendered keeps nobody waiting. A transaction takes the turn to write (``turns``), waits until those who read
+have left, and lets go soon after. Both waits end with ``patience``, in words that name the process.
+
+Between two questions others may add rows. Nothing that is stored is ever changed, so a number that was read stays true;
+but a campaign may be withdrawn, and its name given to another, while somebody computes with the first. What was
+computed is then refused (``is_same_campaign``). A block that has to see one moment takes ``reading``.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import duckdb
+
+from monitor.exceptions import BusyError, StoreError, UnfinishedLogError
+from monitor.store import migrations
+from monitor.store.connection import Database
+from monitor.store.opening import busy, connect, is_missing
+from monitor.store.turns import Patience, turn_to_write, writer_at_work
+
+#: How long the file stays open for the next question, in s: to open it takes some 10 ms.
+_IDLE_READING_S, _IDLE_WRITING_S, _LOOK_S = 0.05, 0.02, 0.01
+#: How long it is kept without a pause, in s; longer only by the one question or transaction that is under way.
+_LONGEST_S = 0.5
+
+
+class SharedDatabase(Database):
+    """A database file that others use, too; use it in a ``with`` statement.
+
+    ``patience`` says how long another process is waited for. A file that is not there is made, unless ``read_only``. An
+    older schema is brought to the present one where this user may write. Raises BusyError, StoreError.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        read_only: bool = False,
+        threads: int | None = None,
+        actor: str = "",
+        patience: Patience | None = None,
+    ) -> None:
+        self._waiting = patience or Patience()
+        self._turn = ExitStack()
+        self._writes = False
+        self._blocks = 0
+        self._opened_at = self._used_at = 0.0
+        self._numbers: dict[str, int] = {}
+        super().__init__(path, read_only=read_only, threads=threads, actor=actor)
+
+    def close(self) -> None:
+        """Let go of the file for good."""
+        with self._lock:
+            self._let_go()
+
+    def is_same_campaign(self, name: str, number: int) -> bool:
+        """Whether a name still is that of the campaign that it was when it was first asked for."""
+        return self._numbers.setdefault(name, number) == number
+
+    def forget_campaigns(self) -> None:
+        self._numbers.clear()
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        with self._used():
+            self._blocks += 1
+            try:
+                yield
+            finally:
+                self._blocks -= 1
+
+    def _patience(self) -> Patience:
+        return self._waiting
+
+    def _open(self) -> None:
+        with self._used():
+            return
+
+    @contextmanager
+    def _used(self) -> Iterator[duckdb.DuckDBPyConnection]:
+        with self._lock:
+            if self._connection is not None and self._is_overdue():
+                self._let_go()
+            if self._connection is None:
+                self._open_to_read()
+            with super()._used() as connection:
+                yield connection
+            self._used_at = time.monotonic()
+
+    @contextmanager
+    def _writing(self) -> Iterator[duckdb.DuckDBPyConnection]:
+        if not self._writes or self._is_overdue():
+            self._let_go()
+            self._open_to_write()
+        with super()._writing() as connection:
+            yield connection
+
+    def _is_overdue(self) -> bool:
+        """Whether the file was kept for long enough and somebody else may want it."""
+        if self._blocks or self._in_transaction or time.monotonic() - self._opened_at < _LONGEST_S:
+            return False
+        return self._writes or writer_at_work(self.path) is not None
+
+    def _open_to_read(self) -> None:
+        if self.path == ":memory:" or (is_missing(self.path) and not self.read_only):
+            raise StoreError(f"the database {self.path} is no longer there")
+        try:
+            connection = connect(self.path, True, self._threads, self._waiting)
+        except UnfinishedLogError:
+            # A process died, or found the disk full, in a checkpoint: whoever may write finishes it.
+            if self.read_only:
+                raise
+            self._open_to_write()
+            return
+        try:
+            waiting = migrations.pending(connection, self._available)
+        except StoreError as fault:
+            connection.close()
+            raise StoreError(f"{self.path}: {fault}") from fault
+        except BaseException:
+            connection.close()
+            raise
+        if waiting:
+            connection.close()
+            self._bring_up_to_date()
+        else:
+            self._keep(connection)
+
+    def _bring_up_to_date(self) -> None:
+        """Apply the waiting migrations where this user may, as every verb did that met an old database."""
+        try:
+            if self.read_only:
+                raise StoreError("it was opened for reading only")
+            self._open_to_write()
+        except BusyError:
+            raise
+        except StoreError as fault:
+            raise StoreError(
+                f"{self.path} is older than this software and has to be brought to the present schema once, by "
+                f"somebody who may write it: `monitor --db {self.path} verify`. Here: {fault}"
+            ) from fault
+
+    def _open_to_write(self) -> None:
+        with ExitStack() as turn:
+            holder = turn.enter_context(turn_to_write(self.path, self._waiting))
+            if holder is not None:
+                raise busy(self.path, holder, self._waiting)
+            connection = connect(self.path, False, self._threads, self._waiting)
+            try:
+                self._fit(connection)
+            except BaseException:
+                connection.close()
+                raise
+            self._turn = turn.pop_all()
+        self._writes = True
+        self._keep(connection)
+
+    def _keep(self, connection: duckdb.DuckDBPyConnection) -> None:
+        self._connection = connection
+        self._opened_at = self._used_at = time.monotonic()
+        threading.Thread(target=self._watch, args=(connection,), daemon=True).start()
+
+    def _watch(self, connection: duckdb.DuckDBPyConnection) -> None:
+        """Let go of the file once nothing was asked for a moment."""
+        while self._connection is connection:
+            time.sleep(_LOOK_S)
+            if not self._lock.acquire(blocking=False):
+                continue
+            try:
+                idle_s = _IDLE_WRITING_S if self._writes else _IDLE_READING_S
+                if self._connection is connection and time.monotonic() - self._used_at > idle_s:
+                    self._let_go()
+            finally:
+                self._lock.release()
+
+    def _let_go(self) -> None:
+        super().close()
+        self._connection = None
+        self._writes = False
+        self._turn.close()

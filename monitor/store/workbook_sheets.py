@@ -1,0 +1,168 @@
+"""The tables of a workbook for people: parameters wide and long, runs, conditions, changes, and any other view.
+
+A header says the unit behind a slash (``EXX / µm/m``, ISO 80000-1, 7.1.4); times are in UTC.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from monitor.exceptions import NotFoundError, did_you_mean
+from monitor.store.connection import Database
+
+#: Ends of names of columns, and the units that they stand for.
+_UNITS = {
+    "mm": "mm", "um": "µm", "deg": "°", "degC": "°C", "degc": "°C", "s": "s", "min": "min", "percent": "%",
+    "hPa": "hPa",
+}  # fmt: skip
+_WHERE = "WHERE $machine IS NULL OR machine = $machine"
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """One table: ``columns`` are its headers with units, ``meanings`` what each column holds (may be empty)."""
+
+    name: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+    meanings: tuple[str, ...]
+
+
+def header(column: str, comment: str = "") -> str:
+    """The header of a column: its name and unit, ``ambient / °C`` of ``ambient_degC``, ``started_at / UTC``."""
+    if "(UTC" in comment:
+        return f"{column} / UTC"
+    stem, _, suffix = column.rpartition("_")
+    return f"{stem} / {_UNITS[suffix]}" if stem and suffix in _UNITS else column
+
+
+def sheets(db: Database, names: Sequence[str] | None, machine: str | None) -> tuple[Sheet, ...]:
+    """The sheets of these names, of all machines or one. Without names those that people ask for first.
+
+    Raises NotFoundError, listing what is there, for a name that is neither one of ``SHEETS`` nor a view.
+    """
+    views = [
+        name
+        for (name,) in db.rows(
+            "SELECT view_name FROM duckdb_views() WHERE NOT internal AND starts_with(view_name, 'v_') ORDER BY ALL"
+        )
+    ]
+    made = []
+    for name in SHEETS if names is None else names:
+        view = name if name in views else f"v_{name}"
+        if name in SHEETS:
+            made.append(SHEETS[name](db, machine))
+        elif view in views:
+            made.append(_view(db, view, machine))
+        else:
+            every = [*SHEETS, *views]
+            hint = did_you_mean(name, every)
+            raise NotFoundError(f"there is no table {name!r}; {hint}there are {', '.join(every)}")
+    return tuple(made)
+
+
+def _view(db: Database, view: str, machine: str | None, name: str | None = None) -> Sheet:
+    """A view as it stands, without the columns of maps, which have no cell."""
+    described = db.rows(
+        "SELECT column_name, data_type, coalesce(comment, '') FROM duckdb_columns() WHERE table_name = ? "
+        "AND database_name = current_database() ORDER BY column_index",
+        [view],
+    )
+    plain = [(column, comment) for column, kind, comment in described if not kind.startswith("MAP")]
+    listed = ", ".join(f'"{column}"' for column, _ in plain)
+    # The names come from the catalogue.
+    if any(column == "machine" for column, _ in plain):
+        rows = db.rows(f"SELECT {listed} FROM {view} {_WHERE} ORDER BY ALL", {"machine": machine})
+    else:
+        rows = db.rows(f"SELECT {listed} FROM {view} ORDER BY ALL")
+    return Sheet(
+        name or view,
+        tuple(header(column, comment) for column, comment in plain),
+        tuple(rows),
+        tuple(comment for _, comment in plain),
+    )
+
+
+def _parameters_long(db: Database, machine: str | None) -> Sheet:
+    return _view(db, "v_parameters", machine, "parameters long")
+
+
+def _parameters(db: Database, machine: str | None) -> Sheet:
+    """A row for every run of every model, an estimate and its standard uncertainty a parameter."""
+    keys = ("campaign", "machine", "model", "model_version", "run", "started_at", "day", "warm_up")
+    columns = db.rows(
+        f"SELECT DISTINCT parameter, unit FROM v_parameters {_WHERE} ORDER BY ALL", {"machine": machine}
+    )
+    places = {pair: index for index, pair in enumerate(columns)}
+    table: dict[tuple[Any, ...], list[Any]] = {}
+    for *key, parameter, unit, value, u in db.rows(
+        f"SELECT {', '.join(keys)}, parameter, unit, value, u FROM v_parameters {_WHERE} "
+        "ORDER BY started_at, campaign, run, model, model_version",
+        {"machine": machine},
+    ):
+        row = table.setdefault(tuple(key), [None] * (2 * len(columns)))
+        index = 2 * places[parameter, unit]
+        row[index : index + 2] = [value, u]
+    heads = [text for name, unit in columns for text in (f"{name} / {unit}", f"u({name}) / {unit}")]
+    meanings = ["Estimate, empty where refused", "Standard uncertainty"] * len(columns)
+    return Sheet(
+        "parameters",
+        tuple(f"{key} / UTC" if key == "started_at" else key for key in keys) + tuple(heads),
+        tuple((*key, *row) for key, row in table.items()),
+        ("",) * len(keys) + tuple(meanings),
+    )
+
+
+def _runs(db: Database, machine: str | None) -> Sheet:
+    return _view(db, "v_runs", machine, "runs")
+
+
+def _conditions(db: Database, machine: str | None) -> Sheet:
+    """A row for every run, a column for every condition that any run recorded."""
+    keys = ("campaign", "machine", "run", "started_at")
+    recorded = db.rows(
+        f"SELECT {', '.join(keys)}, conditions FROM v_runs {_WHERE} ORDER BY campaign, run",
+        {"machine": machine},
+    )
+    names = sorted({name for *_, conditions in recorded for name in conditions or {}})
+    rows = tuple((*key, *((conditions or {}).get(name) for name in names)) for *key, conditions in recorded)
+    columns = ("campaign", "machine", "run", "started_at / UTC", *map(header, names))
+    return Sheet("conditions", columns, rows, ("",) * len(keys) + ("Condition of the run",) * len(names))
+
+
+def _changes(db: Database, machine: str | None) -> Sheet:
+    """What people recorded of the machines, and the changes that the last `trend` of each machine found."""
+    events = db.rows(
+        "SELECT machine, happened_at, 'event: ' || kind, NULL, NULL, NULL, NULL, NULL, description "
+        f"FROM v_events {_WHERE}",
+        {"machine": machine},
+    )
+    found: list[tuple[Any, ...]] = []
+    for owner, text in db.rows(
+        "SELECT machine, arg_max(document, analysis_id) FROM v_analyses "
+        "WHERE kind = 'trend' AND ($machine IS NULL OR machine = $machine) GROUP BY machine ORDER BY machine",
+        {"machine": machine},
+    ):
+        for parameter, followed in json.loads(text)["parameters"].items():
+            found += [
+                (owner, change["at"], change["kind"], parameter, change["size"], change["u"], change["unit"],
+                 change["p_value"], "found by trend")
+                for kind in ("changes", "drifts")
+                for change in followed.get(kind, ())
+            ]  # fmt: skip
+    columns = ("machine", "at / UTC", "kind", "parameter", "size", "u", "unit of size and u", "p", "what")
+    ordered = sorted([*events, *found], key=lambda row: (row[0], str(row[1])))
+    return Sheet("changes", columns, tuple(ordered), ("",) * len(columns))
+
+
+#: The sheets that people ask for first, by name.
+SHEETS: dict[str, Callable[[Database, str | None], Sheet]] = {
+    "parameters": _parameters,
+    "parameters long": _parameters_long,
+    "runs": _runs,
+    "conditions": _conditions,
+    "changes": _changes,
+}

@@ -1,0 +1,96 @@
+"""Which questions can be asked over HTTP, who may ask them, and which of their files travel."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from monitor.web.users import Role
+from monitor.workflow.contract import QUESTIONS
+
+#: What changes the history of machines, models or campaigns.
+ENGINEERS = frozenset(
+    {"add effect", "event", "identify all", "import", "remove effect", "select", "use model"}
+)
+#: What the laboratory answers for, and what takes something away.
+APPROVERS = frozenset(
+    {"amend certificate", "issue certificate", "withdraw campaign", "withdraw certificate", "backup"}
+)
+#: Questions about files of the computer itself: they stay with the command line there.
+NOT_OFFERED: Mapping[str, str] = {
+    "restore": "a backup is restored beside the server, by monitor restore: no second database is served",
+    "simulate": "a rehearsal is written by monitor simulate; upload its folder",
+}
+
+
+@dataclass(frozen=True)
+class FileFields:
+    """How the files of a question travel: the field ``upload`` is filled from the body, ``download`` is sent back.
+
+    ``file_name`` is that of the file to be made; None where a folder is filled, of which several files make a zip.
+    """
+
+    upload: str | None = None
+    download: str | None = None
+    file_name: str | None = None
+
+
+#: Questions that read an upload or make a file, by name; every other field that names a path is not taken over HTTP.
+FILES: Mapping[str, FileFields] = {
+    "amend certificate": FileFields(upload="laboratory", download="out"),
+    "backup": FileFields(download="target", file_name="backup.duckdb"),
+    "digital certificate": FileFields(download="path"),
+    "export": FileFields(download="folder"),
+    "import": FileFields(upload="folders"),
+    "issue certificate": FileFields(upload="laboratory", download="out"),
+    "issued certificate": FileFields(download="path"),
+    "report": FileFields(download="out"),
+    "verify certificate": FileFields(upload="file"),
+}
+#: Fields that would spend processes of the server, make it speak to another address, or write where it was started.
+NOT_TAKEN = frozenset({"cluster", "workers", "compensation"})
+
+
+def role_needed(question: str) -> Role:
+    """Return the lowest role that may ask a question."""
+    if question in APPROVERS:
+        return Role.APPROVER
+    return Role.ENGINEER if question in ENGINEERS else Role.VIEWER
+
+
+def offered() -> tuple[str, ...]:
+    """Return the questions that can be asked over HTTP, in the order of the contract."""
+    return tuple(name for name in QUESTIONS if name not in NOT_OFFERED)
+
+
+def writes(question: str) -> bool:
+    """Whether a question changes what other answers are made of."""
+    return role_needed(question) is not Role.VIEWER
+
+
+def taken_fields(question: str) -> tuple[str, ...]:
+    """Return the fields of a question's request that are taken over HTTP."""
+    kind = QUESTIONS[question].request
+    if kind is None:
+        return ()
+    left_out = path_fields(kind) | NOT_TAKEN
+    return tuple(field.name for field in fields(kind) if field.init and field.name not in left_out)
+
+
+def path_fields(kind: Any) -> frozenset[str]:
+    """Return the fields of a request that name files of the computer it is answered on, or hold such fields."""
+    if kind is None:
+        return frozenset()
+    hints = typing.get_type_hints(kind)
+    return frozenset(field.name for field in fields(kind) if _names_path(hints[field.name]))
+
+
+def _names_path(hint: Any) -> bool:
+    if hint is Path:
+        return True
+    if is_dataclass(hint) and isinstance(hint, type):
+        return bool(path_fields(hint))
+    return any(_names_path(member) for member in typing.get_args(hint))

@@ -1,0 +1,81 @@
+"""Puts the server together: the gate before everything, the interface, the pages, and words for what goes wrong."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from fastapi import FastAPI, Request
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, Response
+
+from monitor.exceptions import MonitorError
+from monitor.store import Database
+from monitor.web.asking import Asker
+from monitor.web.desk import Desk
+from monitor.web.faults import Refusal, refusal_of
+from monitor.web.gate import Gate
+from monitor.web.interface import ROOT, interface
+from monitor.web.opening import host_user_name
+from monitor.web.pages import campaign as campaign_page
+from monitor.web.pages import certificates, importing, keeping, model, visiting
+from monitor.web.pages import fleet as fleet_page
+from monitor.web.pages import machine as machine_page
+from monitor.web.rendering import refusal_page
+from monitor.web.sessions import Sessions
+from monitor.web.settings import ServerSettings
+from monitor.web.static import static_routes
+from monitor.web.users import Role, User, read_users
+
+_log = logging.getLogger("monitor.web")
+_PAGES = (fleet_page, machine_page, campaign_page, model, importing, certificates, keeping, visiting)
+
+
+def application(db: Database, settings: ServerSettings, working_folder: Path) -> Gate:
+    """Return the server of an open database. Raises InputError for a file of users that is wrong."""
+    users = None if settings.users is None else read_users(settings.users)
+    role = Role.APPROVER
+    if settings.reading_only:
+        role, users = Role.VIEWER, None if users is None else users.looking_only()
+    # Documentation of FastAPI's own would load scripts from elsewhere; the interface describes itself.
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    asker = Asker(db)
+    app.state.settings = settings
+    app.state.sessions = Sessions(users, User(host_user_name(), role))
+    app.state.asker = asker
+    desk = Desk(asker)
+    app.state.desk = desk
+    app.state.working_folder = working_folder
+    app.include_router(static_routes())
+    app.include_router(interface(asker, working_folder))
+    for room in _PAGES:
+        app.include_router(room.routes())
+    app.add_exception_handler(HTTPException, _of_http)
+    app.add_exception_handler(MonitorError, _of_question)
+    app.add_exception_handler(Exception, _of_question)
+    # Around everything, what answers a fault of the software included.
+    return Gate(app, settings, app.state.sessions, desk.close)
+
+
+async def _of_http(request: Request, error: Exception) -> Response:
+    """Answer what has no page, or not with this method."""
+    assert isinstance(error, HTTPException)
+    text = {
+        404: f"there is no page {request.url.path}; the first page is /",
+        405: f"{request.url.path} is not asked with {request.method}",
+    }.get(error.status_code, str(error.detail))
+    return _refused(request, Refusal(error.status_code, text))
+
+
+async def _of_question(request: Request, error: Exception) -> Response:
+    """Answer what a question raised."""
+    refusal = refusal_of(error)
+    if refusal.status == 500:
+        _log.error("a page failed", exc_info=error)
+    return _refused(request, refusal)
+
+
+def _refused(request: Request, refusal: Refusal) -> Response:
+    if request.url.path.startswith(ROOT):
+        return JSONResponse({"error": refusal.error}, refusal.status)
+    return refusal_page(request, refusal)

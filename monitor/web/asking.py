@@ -1,0 +1,108 @@
+"""Asks a question of the contract for a user: a document in, checked against the request's type, the answer out."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from contextlib import closing
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from monitor.exceptions import InputError, MonitorError
+from monitor.store import Database
+from monitor.web.access import FILES, NOT_OFFERED, offered, role_needed, taken_fields, writes
+from monitor.web.users import User
+from monitor.workflow.contract import QUESTIONS
+
+
+class ForbiddenError(MonitorError):
+    """A question that the user's role may not ask."""
+
+
+class Asker:
+    """Asks questions of the served database; ``generation`` grows with every question that changes other answers."""
+
+    def __init__(self, db: Database) -> None:
+        self._db = db
+        self.generation = 0
+
+    def __call__(
+        self, user: User, question: str, document: Mapping[str, Any] | None = None,
+        files: Mapping[str, Any] | None = None,
+    ) -> Any:  # fmt: skip
+        """Return the typed answer; ``files`` are paths that the server itself fills in.
+
+        Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
+        """
+        check_role(user, question)
+        request = request_of(question, document or {}, files or {})
+        asked = QUESTIONS[question]
+        arguments = [] if request is None else [request]
+        if not asked.needs_database:
+            return asked.load()(*arguments)
+        try:
+            with closing(self._db.session(user.name)) as session:
+                return asked.load()(session, *arguments)
+        finally:
+            if writes(question):
+                self.generation += 1
+
+
+def check_role(user: User, question: str) -> None:
+    """Raise ForbiddenError where a question needs a higher role, InputError where it is not offered."""
+    if question in NOT_OFFERED:
+        raise InputError(f"'{question}' is not asked over HTTP: {NOT_OFFERED[question]}")
+    if question not in QUESTIONS:
+        raise InputError(f"there is no question '{question}'; there are {', '.join(offered())}")
+    role = role_needed(question)
+    if user.role < role:
+        raise ForbiddenError(
+            f"{user.name} is a {user.role.word}; '{question}' needs the role {role.word}: ask whoever keeps the users"
+        )
+
+
+def request_of(question: str, document: Mapping[str, Any], files: Mapping[str, Any]) -> Any:
+    """Return the typed request of a document. Raises InputError that names the key and the rule."""
+    kind = QUESTIONS[question].request
+    taken = taken_fields(question)
+    for key in document:
+        if key not in taken:
+            raise InputError(_unknown(question, str(key), taken))
+    if kind is None:
+        return None
+    try:
+        return _adapter(kind).validate_python({**document, **files})
+    except ValidationError as error:
+        raise InputError("; ".join(_fault(fault) for fault in error.errors())) from error
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def _fault(fault: Any) -> str:
+    """A fault of a document as a sentence; pydantic counts a missing field as one."""
+    path = ".".join(str(part) for part in fault["loc"]) or "the document"
+    if fault["type"] == "missing":
+        return f"'{path}' is missing"
+    return f"'{path}': {str(fault['msg'])[:1].lower()}{str(fault['msg'])[1:]}"
+
+
+def _unknown(question: str, key: str, taken: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(key, taken, n=1)
+    if near:
+        return f"'{question}' takes no '{key}'; did you mean '{near[0]}'?"
+    listed = f"it takes {', '.join(taken)}" if taken else "it takes nothing"
+    return f"'{question}' takes no '{key}'; {listed}"
+
+
+def download_path(question: str, folder: Path) -> dict[str, Path]:
+    """Return the field of the file that a question writes, as a path in a folder of the server's own."""
+    travelling = FILES.get(question)
+    if travelling is None or travelling.download is None:
+        return {}
+    return {travelling.download: folder / travelling.file_name if travelling.file_name else folder}

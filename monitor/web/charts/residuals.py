@@ -1,0 +1,156 @@
+"""The residual vectors of a campaign in three dimensions, and the error as it falls from version to version."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from monitor.web.charts.chart import Chart, Trace, axis
+from monitor.workflow.explain.compare_answer import CompareAnswer, MachinePart
+from monitor.workflow.explain.explain_answer import MachineMissing
+from monitor.workflow.explain.residual_vectors import ResidualsAnswer
+from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+
+#: Steps of the magnification slider: 1 µm is drawn as so many millimetres.
+MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100)
+
+
+def scene_chart(residuals: ResidualsAnswer) -> Chart:
+    """Show the probed places with the residual of each run; the script magnifies the arrows and changes the run."""
+    frame = {
+        name: axis(f"{name[0].upper()} / mm", backgroundcolor="rgba(0,0,0,0)", showbackground=False)
+        for name in ("xaxis", "yaxis", "zaxis")
+    }
+    return Chart(
+        key="scene",
+        says=f"{len(residuals.run)} residuals of {residuals.campaign} at the probed places, model {residuals.model}",
+        traces=[],
+        layout={
+            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 0.95, "y": -1.15, "z": 0.6}}},
+            "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+            "uirevision": "scene",
+            "showlegend": True,
+        },
+        height=520,
+    )
+
+
+def scene_vectors(residuals: ResidualsAnswer) -> Mapping[str, Any]:
+    """Return the places and vectors for the script; probings that were left out are marked."""
+    return {
+        "run": residuals.run,
+        "target": residuals.target,
+        "place": residuals.place_mm,
+        "residual": residuals.residual_um,
+        "with_effect": residuals.with_effect_um,
+        "effect": residuals.effect,
+        "left_out": residuals.left_out,
+        "axes": [name for name in residuals.axes if name[:1] in "XYZ"],
+    }
+
+
+def failing_charts(answer: CompareAnswer) -> list[Chart]:
+    """Show where the model fails: the RMS by target, axis and run, beside what is expected."""
+    comparison = answer.comparison
+    expected = comparison.expected_rms_um
+    charts = []
+    for name, parts in comparison.by.items():
+        shown = {
+            label: part
+            for label, part in parts.items()
+            if isinstance(part, MachinePart) and part.rms_um > 0.005
+        }
+        if len(shown) < 2 or name not in ("target", "axis", "run"):
+            continue
+        lines = [] if expected is None else [_level(expected, "expected")]
+        charts.append(
+            Chart(
+                key=f"by-{name}",
+                says=f"RMS of the residual by {name} in µm",
+                traces=[
+                    {
+                        "type": "bar", "x": list(shown), "y": [part.rms_um for part in shown.values()],
+                        "marker": {"color": "@blue"}, "hovertemplate": "%{x}: %{y:.2f} µm<extra></extra>",
+                    }
+                ],
+                layout={
+                    "xaxis": axis(name, type="category"), "yaxis": axis("RMS / µm", rangemode="tozero"),
+                    "shapes": lines,
+                },
+                height=260,
+            )
+        )  # fmt: skip
+    return charts
+
+
+def ranking_chart(missing: Sequence[MachineMissing]) -> Chart:
+    """Show the missing effects by size, the strongest evidence first."""
+    names = [f"{effect.rank}. {effect.effect}" for effect in missing]
+    return Chart(
+        key="ranking",
+        says="missing effects by rank with their peak displacement in µm",
+        traces=[
+            {
+                "type": "bar", "orientation": "h", "y": names, "x": [effect.peak_um for effect in missing],
+                "marker": {"color": "@orange"}, "hovertemplate": "%{y}: %{x:.2f} µm at most<extra></extra>",
+            }
+        ],
+        layout={
+            "yaxis": axis("", autorange="reversed"), "xaxis": axis("peak displacement / µm", rangemode="tozero"),
+            "margin": {"l": 160, "r": 16, "t": 8, "b": 44},
+        },
+        height=110 + 34 * len(names),
+    )  # fmt: skip
+
+
+def falling_chart(
+    steps: Sequence[MachineVersion | CurveVersion], proposed: MachineMissing | None
+) -> Chart | None:
+    """Show the error of each version, on the fitted runs and on held-out ones, down to the noise; None for curves."""
+    versions = [step for step in steps if isinstance(step, MachineVersion)]
+    if not versions:
+        return None
+    names = [step.model for step in versions]
+    fitted = [step.rms_um for step in versions]
+    held_out = [step.heldout_rms_um for step in versions]
+    traces: list[Trace] = [
+        _steps(names, fitted, "RMS on all runs", "@blue", "circle"),
+        _steps(names, held_out, "RMS on held-out runs", "@orange", "diamond"),
+    ]
+    if proposed is not None:
+        label = f"with {proposed.effect}"
+        traces.append(
+            {
+                "type": "scatter", "mode": "markers+lines", "name": "if the best effect is added",
+                "x": [names[-1], label], "y": [fitted[-1], proposed.rms_after_um],
+                "line": {"color": "@teal", "dash": "dot", "shape": "hv"},
+                "marker": {"color": "@teal", "symbol": "square", "size": 10},
+            }
+        )  # fmt: skip
+    noise = versions[-1].repeatability_um
+    lines = [] if noise is None else [_level(noise, "repeatability of the runs")]
+    return Chart(
+        key="falling",
+        says="RMS of the residual from version to version in µm",
+        traces=traces,
+        layout={
+            "xaxis": axis("", type="category"), "yaxis": axis("RMS / µm", rangemode="tozero"), "shapes": lines,
+        },
+        height=340,
+    )  # fmt: skip
+
+
+def _steps(names: list[str], values: Sequence[float | None], title: str, colour: str, marker: str) -> Trace:
+    return {
+        "type": "scatter", "mode": "lines+markers", "name": title, "x": names, "y": list(values),
+        "line": {"shape": "hv", "color": colour, "width": 2}, "marker": {"size": 9, "color": colour, "symbol": marker},
+        "hovertemplate": "%{x}: %{y:.2f} µm<extra>" + title + "</extra>",
+    }  # fmt: skip
+
+
+def _level(value: float, name: str) -> Any:
+    return {
+        "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value,
+        "line": {"color": "@mid", "dash": "longdash", "width": 1.5},
+        "label": {"text": f"{name} {value:.2f} µm", "textposition": "end", "font": {"size": 11, "color": "@mid"}},
+    }  # fmt: skip

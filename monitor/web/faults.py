@@ -1,0 +1,34 @@
+"""What went wrong, as a status of HTTP and a plain sentence; the user's faults are never a server error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from monitor.exceptions import CampaignError, InputError, MonitorError, NotFoundError
+from monitor.web.asking import ForbiddenError
+
+OUR_FAULT = "this is a fault of the software, please report it; nothing was stored by this request"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A refusal: its ``status``, its sentence, and where a campaign was refused every fault with file and line."""
+
+    status: int
+    error: str
+    faults: tuple[str, ...] = ()
+
+
+def refusal_of(error: Exception) -> Refusal:
+    """Return the refusal for what a question raised; 500 for what it should not have raised."""
+    if isinstance(error, ForbiddenError):
+        return Refusal(403, str(error))
+    if isinstance(error, NotFoundError):
+        return Refusal(404, str(error))
+    if isinstance(error, CampaignError):
+        return Refusal(422, str(error).splitlines()[0], tuple(str(fault) for fault in error.faults))
+    if isinstance(error, InputError):
+        return Refusal(400, str(error))
+    if isinstance(error, MonitorError):
+        return Refusal(422, str(error))
+    return Refusal(500, OUR_FAULT)

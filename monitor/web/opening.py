@@ -1,0 +1,28 @@
+"""Opens the database that is served: one process holds the file, each request its own session of it."""
+
+from __future__ import annotations
+
+import getpass
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from monitor.exceptions import NotFoundError
+from monitor.store import Database
+
+
+def host_user_name() -> str:
+    """Return the name of the account that the server runs under; a container may run under a number without a name."""
+    with suppress(OSError, KeyError):
+        return getpass.getuser()
+    return "somebody"
+
+
+@contextmanager
+def opened(path: Path, working_folder: Path, *, must_exist: bool = False) -> Iterator[Database]:
+    """Open the database; its queries reach files in ``working_folder`` alone. Raises NotFoundError, StoreError."""
+    if must_exist and not path.exists():
+        raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
+    with Database(path, threads=1, actor=host_user_name()) as db:
+        db.confine(working_folder)
+        yield db

@@ -1,0 +1,103 @@
+"""The page of a campaign: its runs and conditions, whether the days differ, and which numbers belong together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from monitor.exceptions import InputError, MonitorError, NotFoundError
+from monitor.web.charts.chart import Chart
+from monitor.web.charts.statistics import correlation_chart, p_value_chart, region_chart
+from monitor.web.desk import Ticket
+from monitor.web.rendering import page
+from monitor.workflow.intake.campaigns import RunsAnswer
+from monitor.workflow.run_statistics.answer import StatisticsAnswer
+
+
+def routes() -> APIRouter:
+    """Return the routes of the list of campaigns and of the page of one."""
+    router = APIRouter()
+
+    @router.get("/campaigns")
+    def campaigns(request: Request) -> Response:
+        """List the campaigns."""
+        return page(
+            request, "campaigns.html", answer=request.app.state.asker(request.state.user, "campaigns")
+        )
+
+    @router.get("/campaign")
+    def campaign(
+        request: Request, name: str, by: str = "day", first: str = "", second: str = "", run: str = ""
+    ) -> Response:
+        """Show a campaign; two of its parameters with the regions that hold all of them."""
+        ask, user, desk = request.app.state.asker, request.state.user, request.app.state.desk
+        row = next((row for row in ask(user, "campaigns").campaigns if row.campaign == name), None)
+        if row is None:
+            raise NotFoundError(f"there is no campaign '{name}'; the page Campaigns lists them")
+        if row.rows is not None:
+            return page(request, "curve.html", row=row)
+        runs: RunsAnswer = ask(user, "runs", {"campaign": name})
+        tickets = [desk.ask(user, "statistics", {"campaign": name, "by": by})]
+        statistics, why_no_statistics = _answered(tickets[0])
+        trials = bool(request.query_params.get("trials"))
+        regions, why_no_regions = None, ""
+        if first or second:
+            tickets.append(
+                desk.ask(user, "uncertainty", _regions_asked(name, first, second, run, trials=trials))
+            )
+            regions, why_no_regions = _answered(tickets[1])
+        return page(
+            request, "campaign.html",
+            row=row, runs=runs, conditions=_conditions(runs), by=by, run=run,
+            statistics=statistics, why_no_statistics=why_no_statistics,
+            charts=[] if statistics is None else _charts(statistics),
+            regions=regions, why_no_regions=why_no_regions, first=first, second=second,
+            region=None if regions is None else _region(regions, first, second),
+            trials=trials, waiting=next((ticket for ticket in tickets if not ticket.is_done), None),
+        )  # fmt: skip
+
+    return router
+
+
+def _answered(ticket: Ticket) -> tuple[Any, str]:
+    """The answer of a ticket and why there is none; both empty while it is computed."""
+    try:
+        return ticket.answer(), ""
+    except MonitorError as error:
+        return None, str(error)
+
+
+def _regions_asked(name: str, first: str, second: str, run: str, *, trials: bool) -> dict[str, Any]:
+    """The document that asks for the regions of a pair. Raises InputError where it is none."""
+    if not (first and second and first != second):
+        raise InputError("choose two different parameters for the ellipse and the rectangle")
+    return {"campaign": name, "method": "both" if trials else "guf"} | ({"run": _number(run)} if run else {})
+
+
+def _number(text: str) -> int:
+    if not text.isdecimal() or len(text) > 9:
+        raise InputError(f"run '{text}': a run has a number, such as 20")
+    return int(text)
+
+
+def _conditions(runs: RunsAnswer) -> list[str]:
+    return list(dict.fromkeys(name for run in runs.runs for name in run.conditions))
+
+
+def _charts(statistics: StatisticsAnswer) -> list[Chart]:
+    histograms = [
+        p_value_chart(name, histogram, statistics.coordinates.n)
+        for name, histogram in statistics.coordinates.histograms.items()
+    ]
+    return [correlation_chart(statistics), *histograms]
+
+
+def _region(regions: Any, first: str, second: str) -> Chart:
+    for name in (first, second):
+        if name not in regions.parameters:
+            raise InputError(
+                f"'{name}' has no number in this campaign; choose of {', '.join(regions.parameters)}"
+            )
+    return region_chart(regions, first, second)

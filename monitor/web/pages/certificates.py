@@ -1,0 +1,90 @@
+"""Certificates: listed, shown, sent as they were issued, and verified."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from monitor.exceptions import InputError, MonitorError
+from monitor.web.asking import Asker, check_role
+from monitor.web.faults import Refusal, refusal_of
+from monitor.web.forms import Form, read_form
+from monitor.web.rendering import page
+from monitor.web.users import User
+from monitor.workflow.certificate.answer import VerificationAnswer
+
+
+def routes() -> APIRouter:
+    """Return the routes of the list, the documents and the check."""
+    router = APIRouter()
+
+    @router.get("/certificates")
+    def certificates(request: Request) -> Response:
+        """List the certificates."""
+        return _listed(request)
+
+    @router.get("/certificate.pdf")
+    def document(request: Request, number: str) -> Response:
+        """Send the document of a certificate, as it was issued, to be looked at."""
+        return _sent(request, "issued certificate", number, "application/pdf")
+
+    @router.get("/certificate.xml")
+    def digital(request: Request, number: str) -> Response:
+        """Send the digital calibration certificate."""
+        return _sent(request, "digital certificate", number, "application/xml")
+
+    @router.post("/certificates/verify")
+    async def verify(request: Request) -> Response:
+        """Check a file: is it what was issued, and does it hold?"""
+        async with read_form(request) as form:
+            outcome = await run_in_threadpool(
+                _verified, request.app.state.asker, request.state.user, form, request.app.state.working_folder
+            )
+        refused = isinstance(outcome, Refusal)
+        return _listed(
+            request,
+            status=outcome.status if isinstance(outcome, Refusal) else 200,
+            verification=None if refused else outcome,
+            refusal=outcome if refused else None,
+        )
+
+    return router
+
+
+def _listed(request: Request, status: int = 200, **outcome: Any) -> Response:
+    answer = request.app.state.asker(request.state.user, "certificates")
+    context = {"verification": None, "refusal": None, **outcome}
+    return page(request, "certificates.html", status=status, certificates=answer.certificates, **context)
+
+
+def _sent(request: Request, question: str, number: str, media_type: str) -> Response:
+    with tempfile.TemporaryDirectory(dir=request.app.state.working_folder) as folder:
+        answer = request.app.state.asker(
+            request.state.user, question, {"number": number}, {"path": Path(folder)}
+        )
+        path = Path(answer.file)
+        return Response(
+            path.read_bytes(),
+            media_type=media_type,
+            headers={"Content-Disposition": f'inline; filename="{path.name}"'},
+        )
+
+
+def _verified(asker: Asker, user: User, form: Form, working_folder: Path) -> VerificationAnswer | Refusal:
+    check_role(user, "verify certificate")
+    if not form.files:
+        raise InputError("choose the PDF of a certificate")
+    with tempfile.TemporaryDirectory(dir=working_folder) as folder:
+        path = Path(folder, "certificate.pdf")
+        path.write_bytes(form.files[0].content.read())
+        try:
+            answer: VerificationAnswer = asker(user, "verify certificate", {}, {"file": path})
+        except MonitorError as error:
+            refusal = refusal_of(error)
+            return Refusal(refusal.status, refusal.error.replace(str(path), form.files[0].name))
+        return answer

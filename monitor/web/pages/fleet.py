@@ -1,0 +1,158 @@
+"""The first page: every machine, the most urgent first, with what is wrong, how far, since when and what to do next."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from fastapi import APIRouter, Request
+from starlette.responses import RedirectResponse, Response
+
+from monitor.exceptions import NotFoundError
+from monitor.reporting.health.records import History, ParameterHealth
+from monitor.reporting.svg.sparkline import MOST, sparkline
+from monitor.web.desk import Ticket
+from monitor.web.forms import read_form
+from monitor.web.rendering import page
+from monitor.web.words import URGENCIES, Urgency, how_far, since
+from monitor.workflow.fleet import ATTENTION, FleetAnswer, FleetTableRow
+from monitor.workflow.history.values import ValuesAnswer
+from monitor.workflow.query import TableAnswer
+
+IDENTIFY = "identify all"
+#: Machines of one page.
+PAGE_SIZE = 40
+
+
+@dataclass(frozen=True)
+class MachineRow:
+    """A machine with its most urgent parameter; ``others`` are further parameters that need attention."""
+
+    machine: str
+    plant: str
+    urgency: Urgency
+    attention: str
+    worst: FleetTableRow
+    how_far: str
+    since: str
+    others: int
+
+
+def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> list[MachineRow]:
+    """Return a row a machine, in the order of the table, which has the most urgent first."""
+    rows: dict[str, list[FleetTableRow]] = {}
+    for row in table:
+        rows.setdefault(row.machine, []).append(row)
+    usual = ATTENTION.index("as usual")
+    return [
+        MachineRow(
+            machine=machine,
+            plant=plants.get(machine, ""),
+            urgency=URGENCIES[of_machine[0].attention],
+            attention=of_machine[0].attention,
+            worst=of_machine[0],
+            how_far=how_far(of_machine[0]),
+            since=since(of_machine[0]),
+            others=sum(ATTENTION.index(row.attention) < usual for row in of_machine[1:]),
+        )
+        for machine, of_machine in rows.items()
+    ]
+
+
+def _summed(request: Request, machines: TableAnswer) -> tuple[FleetAnswer | None, Ticket | None]:
+    """The fleet's answer, None where there is nothing to sum yet, and what the page waits for."""
+    desk = request.app.state.desk
+    answer, ticket = None, None
+    if machines.rows:
+        ticket = desk.ask(request.state.user, "fleet", {"top": 0})
+        try:
+            answer = ticket.answer()
+        except NotFoundError:
+            ticket = None
+    identifying = [other for other in desk.under_way() if other.question == IDENTIFY]
+    waiting = identifying[0] if identifying else ticket
+    return answer, waiting if waiting is not None and not waiting.is_done else None
+
+
+def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
+    """How many machines there are of each word, the most urgent first."""
+    counts: dict[str, tuple[Urgency, int]] = {}
+    for row in rows:
+        urgency, count = counts.get(row.urgency.word, (row.urgency, 0))
+        counts[row.urgency.word] = (urgency, count + 1)
+    return list(counts.values())
+
+
+def plants_of(machines: TableAnswer) -> dict[str, str]:
+    """Return the location of every machine that states one."""
+    name, location = machines.columns.index("machine"), machines.columns.index("location")
+    return {str(row[name]): str(row[location]) for row in machines.rows if row[location]}
+
+
+def routes() -> APIRouter:
+    """Return the routes of the page and of its small pictures."""
+    router = APIRouter()
+
+    @router.get("/")
+    def fleet(request: Request, state: str = "", plant: str = "", first: int = 0) -> Response:
+        """Show the machines; of one state, of one plant."""
+        machines: TableAnswer = request.app.state.asker(request.state.user, "machines")
+        answer, waiting = _summed(request, machines)
+        rows = [] if answer is None else machine_rows(answer.table, plants_of(machines))
+        listed = {row.machine for row in rows}
+        every = [str(row[machines.columns.index("machine")]) for row in machines.rows]
+        counts = {label: sum(row.attention == label for row in rows) for label in ATTENTION}
+        shown = [row for row in rows if state in ("", row.attention) and plant in ("", row.plant)]
+        first = min(max(first, 0), max(len(shown) - 1, 0))
+        return page(
+            request, "fleet.html",
+            empty=not machines.rows, waiting=waiting,
+            rows=shown[first : first + PAGE_SIZE],
+            count=len(shown), first=first, page_size=PAGE_SIZE,
+            tally=_tally(rows),
+            states=[(label, URGENCIES[label], count) for label, count in counts.items() if count],
+            state=state, plant=plant, plants=sorted({row.plant for row in rows if row.plant}),
+            unlisted=[name for name in every if name not in listed],
+            not_identified=() if answer is None else answer.not_identified,
+        )  # fmt: skip
+
+    @router.post("/fleet/identify")
+    async def identify(request: Request) -> Response:
+        """Identify the errors of every campaign, in a thread of its own."""
+        async with read_form(request):
+            request.app.state.desk.ask(request.state.user, IDENTIFY, {})
+        return RedirectResponse("/", status_code=303)
+
+    @router.get("/machine/history.svg")
+    def history(request: Request, name: str, parameter: str) -> Response:
+        """Draw the latest runs of one parameter in one line of a table."""
+        values: ValuesAnswer = request.app.state.asker(
+            request.state.user, "values", {"machine": name, "parameter": parameter}
+        )
+        if parameter not in values.parameters:
+            raise NotFoundError(f"machine {name} has no run with {parameter}")
+        address = sparkline(_drawn(values, parameter), factor=2.0)
+        picture = base64.b64decode(address.partition(",")[2])
+        return Response(picture, media_type="image/svg+xml", headers={"Cache-Control": "no-cache"})
+
+    return router
+
+
+def _drawn(values: ValuesAnswer, parameter: str) -> ParameterHealth:
+    """The runs of a parameter as the small picture takes them: the last day dark, the others grey."""
+    series = values.parameters[parameter]
+    rows = [row for row, value in enumerate(series.values) if value is not None][-MOST:]
+    last = values.started_at[rows[-1]].date()
+    numbers = [series.values[row] for row in rows]
+    return ParameterHealth(
+        name=parameter, description="", unit=series.unit, estimate=numbers[-1] or 0.0, u=series.u[rows[-1]] or 0.0,
+        expanded=0.0, tolerance=series.tolerance, probability_out=None, out_since=None,
+        history=History(
+            times=tuple(values.started_at[row] for row in rows),
+            values=tuple(number for number in numbers if number is not None),
+            u=tuple(series.u[row] or 0.0 for row in rows),
+            this_week=tuple(values.started_at[row].date() == last for row in rows),
+        ),
+        changed_at=(), drift=None,
+    )  # fmt: skip

@@ -1,0 +1,74 @@
+"""What was done and by whom, what is computed now, and everything to take along."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from pathlib import Path
+
+from fastapi import APIRouter, Request
+from starlette.responses import RedirectResponse, Response
+
+from monitor.exceptions import InputError
+from monitor.web.access import offered, role_needed
+from monitor.web.forms import read_form
+from monitor.web.interface import address_of, attachment
+from monitor.web.rendering import page
+from monitor.workflow.contract import QUESTIONS
+
+#: Entries of the audit on its page.
+ENTRIES = 200
+
+
+def routes() -> APIRouter:
+    """Return the routes of the audit, the work under way, the export and the interface's list."""
+    router = APIRouter()
+
+    @router.get("/audit")
+    def audit(request: Request) -> Response:
+        """List who changed what and when."""
+        answer = request.app.state.asker(request.state.user, "audit", {"last": ENTRIES})
+        return page(request, "audit.html", entries=tuple(reversed(answer.entries)))
+
+    @router.get("/work")
+    def work(request: Request) -> Response:
+        """List what is being computed."""
+        return page(request, "work.html", tickets=request.app.state.desk.under_way())
+
+    @router.post("/work/cancel")
+    async def cancel(request: Request) -> Response:
+        """Take back a question that still waits."""
+        async with read_form(request) as form:
+            number = form.text("number")
+        if not number.isdecimal() or not request.app.state.desk.cancel(int(number)):
+            raise InputError("it is answered already, or being computed: that ends by itself")
+        return RedirectResponse("/work", status_code=303)
+
+    @router.get("/export")
+    def export(request: Request, format: str = "csv") -> Response:
+        """Send every table as CSV or Parquet, packed."""
+        with tempfile.TemporaryDirectory(dir=request.app.state.working_folder) as folder:
+            target = Path(folder, "export")
+            request.app.state.asker(request.state.user, "export", {"format": format}, {"folder": target})
+            packed = io.BytesIO()
+            with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+                for path in sorted(path for path in target.rglob("*") if path.is_file()):
+                    archive.write(path, path.relative_to(folder).as_posix())
+        return attachment(f"export-{format}.zip", packed.getvalue())
+
+    @router.get("/interface")
+    def interface_list(request: Request) -> Response:
+        """List the questions of the HTTP interface."""
+        questions = [
+            (
+                name,
+                address_of(name),
+                role_needed(name).word,
+                (QUESTIONS[name].load().__doc__ or "").strip().splitlines()[0],
+            )
+            for name in offered()
+        ]
+        return page(request, "interface.html", questions=questions)
+
+    return router

@@ -1,0 +1,174 @@
+"""The page of a machine: one parameter over time with all that is known of it, the others in a table, events."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse, Response
+
+from monitor.exceptions import InputError, NotFoundError
+from monitor.web.charts.trend import GROUPINGS, trend_chart
+from monitor.web.forms import read_form
+from monitor.web.interface import attachment
+from monitor.web.rendering import link, page
+from monitor.workflow.history.values import ValuesAnswer
+
+#: Usual kinds of events; any word is one.
+KINDS = ("crash", "repair", "compensation", "probe", "note")
+
+
+def routes() -> APIRouter:
+    """Return the routes of the page, its download and its form."""
+    router = APIRouter()
+
+    @router.get("/machine")
+    def machine(
+        request: Request, name: str, parameter: str = "", since: str = "", until: str = "",
+        colour: str = GROUPINGS[0], campaign: str = "",
+    ) -> Response:  # fmt: skip
+        """Show a machine; one parameter, one period."""
+        ask, user, desk = request.app.state.asker, request.state.user, request.app.state.desk
+        if colour not in GROUPINGS:
+            raise InputError(f"runs are coloured by {', '.join(GROUPINGS)}, not by '{colour}'")
+        asked = _asked(name, since, campaign)
+        ticket = desk.ask(user, "trend", asked)
+        values: ValuesAnswer = ask(user, "values", _period(name, since, until))
+        trend = ticket.answer()
+        if trend is not None and not values.parameters:
+            # The trend has identified what nobody had identified before.
+            values = ask(user, "values", _period(name, since, until))
+        if campaign:
+            values = _of_campaign(values, campaign)
+        names = list(values.parameters)
+        _check_names(values, parameter, campaign, may_lack=not ticket.is_done)
+        shown = (parameter or _most_urgent(request, name, names)) if names else ""
+        campaigns = [row for row in ask(user, "campaigns").campaigns if row.machine == name]
+        return page(
+            request, "machine.html",
+            name=name, parameter=shown, parameters=names, values=values, trend=trend,
+            statement=None if trend is None else trend.parameters.get(shown),
+            waiting=None if ticket.is_done else ticket,
+            chart=trend_chart(values, shown, trend, colour) if shown else None,
+            groupings=GROUPINGS, colour=colour, since=since, until=until, campaign=campaign,
+            campaigns=campaigns, kinds=KINDS,
+        )  # fmt: skip
+
+    @router.get("/machine/values.csv")
+    def values_csv(request: Request, name: str, since: str = "", until: str = "") -> Response:
+        """Send the values of a machine, a row a run, units in the column names."""
+        values: ValuesAnswer = request.app.state.asker(
+            request.state.user, "values", _period(name, since, until)
+        )
+        return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
+
+    @router.post("/machine/event")
+    async def event(request: Request) -> Response:
+        """Record what happened to a machine."""
+        async with read_form(request) as form:
+            machine = form.text("machine")
+            document = {"machine": machine, "text": form.text("text"), **form.filled("at", "kind")}
+        await run_in_threadpool(request.app.state.asker, request.state.user, "event", document)
+        return RedirectResponse(link("/machine", name=machine), status_code=303)
+
+    return router
+
+
+def _check_names(values: ValuesAnswer, parameter: str, campaign: str, *, may_lack: bool) -> None:
+    """Raise NotFoundError for names that the period lacks; while it is being identified it ``may_lack`` a campaign."""
+    machine, names = values.machine, list(values.parameters)
+    if campaign and not values.run and not may_lack:
+        raise NotFoundError(
+            f"machine {machine} has no identified run of campaign '{campaign}' in this period"
+        )
+    if parameter and names and parameter not in names:
+        raise NotFoundError(
+            f"machine {machine} has no parameter '{parameter}' here; it has {', '.join(names)}"
+        )
+
+
+def _asked(name: str, since: str, campaign: str) -> dict[str, Any]:
+    document: dict[str, Any] = {"machine": name}
+    if since:
+        document["since"] = f"{since}T00:00:00Z"
+    if campaign:
+        document["campaigns"] = [campaign]
+    return document
+
+
+def _period(name: str, since: str, until: str) -> dict[str, Any]:
+    ends = {"since": since, "until": until}
+    return {"machine": name, **{key: f"{date}T00:00:00Z" for key, date in ends.items() if date}}
+
+
+def _of_campaign(values: ValuesAnswer, campaign: str) -> ValuesAnswer:
+    """The runs of one campaign alone, all parameters and conditions."""
+    rows = [row for row, name in enumerate(values.campaign) if name == campaign]
+
+    def taken(column: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(column[row] for row in rows)
+
+    return replace(
+        values,
+        started_at=taken(values.started_at), campaign=taken(values.campaign), method=taken(values.method),
+        run=taken(values.run), day=taken(values.day), warm_up=taken(values.warm_up),
+        parameters={
+            name: replace(series, values=taken(series.values), u=taken(series.u))
+            for name, series in values.parameters.items()
+            if any(value is not None for value in taken(series.values))
+        },
+        conditions={
+            name: taken(column)
+            for name, column in values.conditions.items()
+            if any(value is not None for value in taken(column))
+        },
+    )  # fmt: skip
+
+
+def _most_urgent(request: Request, name: str, names: list[str]) -> str:
+    """The parameter that the fleet names first, where that is computed already; else the first by name."""
+    ticket = request.app.state.desk.ask(request.state.user, "fleet", {"top": 0})
+    try:
+        answer = ticket.answer(patience=0.5)
+    except NotFoundError:
+        answer = None
+    rows = () if answer is None else answer.table
+    return next((row.parameter for row in rows if row.machine == name and row.parameter in names), names[0])
+
+
+def _csv(values: ValuesAnswer) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text)
+    columns = [(name, series) for name, series in values.parameters.items()]
+    writer.writerow(
+        ["started_at", "campaign", "method", "run", "day", "warm_up"]
+        + [
+            title
+            for name, series in columns
+            for title in (f"{name} / {series.unit}", f"u({name}) / {series.unit}")
+        ]
+        + list(values.conditions)
+    )
+    for row, at in enumerate(values.started_at):
+        cells = [_cell(value) for _, series in columns for value in (series.values[row], series.u[row])]
+        cells += [_cell(column[row]) for column in values.conditions.values()]
+        writer.writerow(
+            [
+                at.isoformat(),
+                values.campaign[row],
+                values.method[row],
+                values.run[row],
+                values.day[row],
+                str(values.warm_up[row]).lower(),
+                *cells,
+            ]
+        )
+    return text.getvalue()
+
+
+def _cell(value: float | None) -> str:
+    return "" if value is None else repr(value)

@@ -1,0 +1,129 @@
+"""Model against measurement: where it fails, what is missing, add it, watch the error fall, take it out again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import RedirectResponse, Response
+
+from monitor.exceptions import MonitorError, NotFoundError
+from monitor.web.charts.residuals import (
+    MAGNIFICATIONS,
+    failing_charts,
+    falling_chart,
+    ranking_chart,
+    scene_chart,
+    scene_vectors,
+)
+from monitor.web.desk import Ticket
+from monitor.web.forms import read_form
+from monitor.web.rendering import link, page
+from monitor.workflow.explain.explain_answer import MachineExplanation
+from monitor.workflow.model.answer import ChangeModelAnswer
+
+
+def routes() -> APIRouter:
+    """Return the routes of the page and of its two buttons."""
+    router = APIRouter()
+
+    @router.get("/model")
+    def model(request: Request, campaign: str, model: str = "", effect: str = "", note: str = "") -> Response:
+        """Compare a model with a campaign; with an effect tried beside it."""
+        ask, user = request.app.state.asker, request.state.user
+        row = next((row for row in ask(user, "campaigns").campaigns if row.campaign == campaign), None)
+        if row is None:
+            raise NotFoundError(f"there is no campaign '{campaign}'; the page Campaigns lists them")
+        answers = _Answers(request, campaign, model, effect, in_machine=row.rows is None)
+        compare, explanation = answers.compare, answers.explanation
+        missing = explanation.missing if isinstance(explanation, MachineExplanation) else ()
+        residuals, steps = answers.residuals, answers.steps
+        label = model if compare is None else compare.comparison.model
+        versions = ask(user, "models").models
+        return page(
+            request, "model.html",
+            row=row, campaign=campaign, compare=compare, explanation=explanation,
+            missing=() if explanation is None else explanation.missing, refusals=answers.refusals,
+            model=label,
+            effect=effect, note=note, effects=[candidate.effect for candidate in missing],
+            scene=None if residuals is None else scene_chart(residuals),
+            vectors=None if residuals is None else scene_vectors(residuals),
+            residuals=residuals, magnifications=MAGNIFICATIONS,
+            failing=[] if compare is None else failing_charts(compare),
+            ranking=ranking_chart(missing) if missing else None,
+            falling=falling_chart(steps, missing[0] if missing else None), steps=steps,
+            versions=versions, current=_version(versions, label), waiting=answers.waiting,
+        )  # fmt: skip
+
+    @router.post("/model/add")
+    async def add(request: Request) -> Response:
+        """Add an effect: a new version of the model, or a new model."""
+        async with read_form(request) as form:
+            campaign, effect = form.text("campaign"), form.text("effect")
+            document = {"effect": effect, "campaign": campaign, "to": form.text("to")}
+            document |= form.filled("new_name", "note")
+        answer = await _asked(request, "add effect", document)
+        return _back(campaign, answer, f"{effect} was added")
+
+    @router.post("/model/undo")
+    async def undo(request: Request) -> Response:
+        """Take an effect out again: a new version without it."""
+        async with read_form(request) as form:
+            campaign, effect = form.text("campaign"), form.text("effect")
+            document = {"effect": effect, "model": form.text("model")}
+        answer = await _asked(request, "remove effect", document)
+        return _back(campaign, answer, f"{effect} was taken out")
+
+    return router
+
+
+class _Answers:
+    """What the page shows of a model and a campaign, as far as it is computed; ``refusals`` say why a part is not."""
+
+    def __init__(self, request: Request, campaign: str, model: str, effect: str, *, in_machine: bool) -> None:
+        user, desk = request.state.user, request.app.state.desk
+        asked = {"campaign": campaign, **({"model": model} if model else {})}
+        # All are asked before any is waited for.
+        tickets: dict[str, Ticket] = {"explain": desk.ask(user, "explain", asked)}
+        if in_machine:
+            tickets["residuals"] = desk.ask(user, "residuals", asked | ({"effect": effect} if effect else {}))
+        tickets["compare"] = desk.ask(user, "compare", asked)
+        self.refusals = dict.fromkeys(("explain", "residuals", "compare", "history"), "")
+        self.compare = self._take("compare", tickets["compare"])
+        if self.compare is not None:
+            version = {"campaign": campaign, "model": self.compare.comparison.model}
+            tickets["history"] = desk.ask(user, "model history", version)
+        explained = self._take("explain", tickets["explain"])
+        self.explanation = None if explained is None else explained.explanation
+        self.residuals = self._take("residuals", tickets.get("residuals"))
+        history = self._take("history", tickets.get("history"))
+        self.steps = () if history is None else history.steps
+        self.waiting = next((ticket for ticket in tickets.values() if not ticket.is_done), None)
+
+    def _take(self, name: str, ticket: Ticket | None) -> Any:
+        """The answer of a ticket; None while it is computed, and where it was refused."""
+        try:
+            return None if ticket is None else ticket.answer()
+        except MonitorError as error:
+            self.refusals[name] = str(error)
+            return None
+
+
+async def _asked(request: Request, question: str, document: dict[str, Any]) -> Any:
+    return await run_in_threadpool(request.app.state.asker, request.state.user, question, document)
+
+
+def _back(campaign: str, answer: ChangeModelAnswer, what: str) -> Response:
+    name = answer.model.version.model
+    note = f"{what}: the model is now {name}"
+    return RedirectResponse(link("/model", campaign=campaign, model=name, note=note), status_code=303)
+
+
+def _version(versions: Any, name: str) -> Any:
+    """The version by its label, ``samba`` or ``samba@2``; None for a model that was never stored."""
+    base, _, number = name.partition("@")
+    return next(
+        (version for version in versions if version.name == base and version.version == int(number or 1)),
+        None,
+    )

@@ -1,0 +1,77 @@
+"""Renders the templates of ``reports/pages`` for a request; every text from outside is escaped."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+from urllib.parse import urlencode
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
+from starlette.requests import Request
+from starlette.responses import HTMLResponse
+
+from monitor import __version__
+from monitor.reporting.plain_names import plain_name
+from monitor.reporting.resources import report_text
+from monitor.web import words
+from monitor.web.faults import Refusal
+from monitor.web.sessions import Sessions
+
+
+def page(request: Request, template: str, *, status: int = 200, **context: Any) -> HTMLResponse:
+    """Return a page; every template also has the user, the path and the proof that its forms carry."""
+    sessions: Sessions = request.app.state.sessions
+    session = getattr(request.state, "session", None)
+    text = _environment().get_template(template).render(
+        user=getattr(request.state, "user", None),
+        path=request.url.path,
+        proof=sessions.proof(session) if session else "",
+        logs_in=sessions.users is not None,
+        reads_only=request.app.state.settings.reading_only,
+        **context,
+    )  # fmt: skip
+    return HTMLResponse(text, status_code=status)
+
+
+def refusal_page(request: Request, refusal: Refusal) -> HTMLResponse:
+    """Return the page that says what was wrong."""
+    return page(request, "refusal.html", status=refusal.status, refusal=refusal)
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FunctionLoader(lambda name: report_text(f"pages/{name}")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.globals |= {
+        "version": __version__,
+        "link": link,
+        "plain_name": plain_name,
+        "number": words.number,
+        "with_u": words.with_u,
+        "probability": words.probability,
+        "day": words.day,
+        "counted": words.counted,
+        "listed": words.listed,
+        "embedded": _embedded,
+    }
+    return environment
+
+
+def link(path: str, **query: Any) -> str:
+    """Return an address with its query; what is None is left out."""
+    named = {key: value for key, value in query.items() if value is not None}
+    return f"{path}?{urlencode(named)}" if named else path
+
+
+def _embedded(document: Any) -> Markup:
+    """Return a document as JSON that can stand in a script element of type application/json, which never runs."""
+    text = json.dumps(document, ensure_ascii=False, allow_nan=False, default=str)
+    escaped = text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+    return Markup(escaped)

@@ -1,0 +1,129 @@
+"""Unpacks uploads into a folder of their own: no path out of it, no link, no bomb, no more than a campaign can need.
+
+A campaign comes as a zip of its folder, or as its files one by one; a zip may hold several folders.
+"""
+
+from __future__ import annotations
+
+import stat
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import IO
+
+from monitor.exceptions import InputError
+from monitor.web.settings import UPLOAD_BYTES
+
+#: Unpacked, all files together; text packs to a tenth, and what unpacks to a thousand times its size is an attack.
+UNPACKED_BYTES = 8 * UPLOAD_BYTES
+MOST_FILES = 2000
+LONGEST_NAME = 200
+_CHUNK = 2**20
+#: The file that makes a folder a campaign.
+CAMPAIGN_FILE = "campaign.toml"
+
+
+@dataclass(frozen=True)
+class UploadedFile:
+    """A file as a form sends it: its ``name``, with the folder where the browser says it, and its content."""
+
+    name: str
+    content: IO[bytes]
+
+
+def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
+    """Write uploaded files below ``folder`` and return the campaign folders among them, in the order of their names.
+
+    Raises InputError for a zip that cannot be trusted or read, and where no folder holds a campaign.toml.
+    """
+    if not files:
+        raise InputError("choose the folder of a campaign, its files, or a zip of it")
+    room = _Room(folder)
+    for file in files:
+        if zipfile.is_zipfile(file.content):
+            file.content.seek(0)
+            _unpack_zip(file, room)
+        else:
+            file.content.seek(0)
+            room.write(_safe_path(file.name), file.content)
+    campaigns = tuple(sorted(path.parent for path in folder.rglob(CAMPAIGN_FILE)))
+    if not campaigns:
+        raise InputError(
+            f"no folder of the upload has a {CAMPAIGN_FILE}; choose the folder of a campaign or a zip of it "
+            "(docs/campaign-format.md says which files it has)"
+        )
+    return campaigns
+
+
+class _Room:
+    """A folder that takes so many files and bytes and no more."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._bytes = self._files = 0
+
+    def write(self, path: PurePosixPath, content: IO[bytes]) -> None:
+        """Write a file; what it says of its own size is not believed."""
+        self._files += 1
+        if self._files > MOST_FILES:
+            raise InputError(f"the upload has more than {MOST_FILES} files; upload fewer campaigns at a time")
+        target = self._folder.joinpath(*path.parts)
+        if target.exists():
+            raise InputError(f"the upload has {path} twice; upload each file once")
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with target.open("xb") as out:
+                for chunk in iter(lambda: content.read(_CHUNK), b""):
+                    self._bytes += len(chunk)
+                    if self._bytes > UNPACKED_BYTES:
+                        raise InputError(
+                            f"the upload holds more than {UNPACKED_BYTES // 2**20} MiB; upload fewer at a time"
+                        )
+                    out.write(chunk)
+        except OSError as error:
+            raise InputError(
+                f"{path} of the upload cannot be written under this name: {error.strerror}"
+            ) from error
+
+
+def _unpack_zip(file: UploadedFile, room: _Room) -> None:
+    try:
+        with zipfile.ZipFile(file.content) as archive:
+            members = archive.infolist()
+            if len(members) > MOST_FILES:
+                raise InputError(
+                    f"{file.name} holds more than {MOST_FILES} files; upload fewer campaigns at a time"
+                )
+            if sum(member.file_size for member in members) > UNPACKED_BYTES:
+                raise InputError(
+                    f"{file.name} unpacks to more than {UNPACKED_BYTES // 2**20} MiB; that is no campaign"
+                )
+            for member, path in _regular(archive, file.name):
+                with archive.open(member) as content:
+                    room.write(path, content)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
+        raise InputError(f"{file.name} cannot be unpacked: {error}; pack the folder again") from error
+
+
+def _regular(archive: zipfile.ZipFile, name: str) -> Iterator[tuple[zipfile.ZipInfo, PurePosixPath]]:
+    for member in archive.infolist():
+        if member.is_dir():
+            continue
+        kind = stat.S_IFMT(member.external_attr >> 16)
+        if kind not in (0, stat.S_IFREG):
+            raise InputError(
+                f"{name} holds {member.filename}, which is a link or a device; pack the files themselves"
+            )
+        yield member, _safe_path(member.filename)
+
+
+def _safe_path(name: str) -> PurePosixPath:
+    """Return a path that stays in its folder. Raises InputError for any other."""
+    path = PurePosixPath(name.replace("\\", "/"))
+    harmless = path.parts and all(part not in ("", ".", "..") and ":" not in part for part in path.parts)
+    if not harmless or path.is_absolute() or not name.isprintable() or len(name) > LONGEST_NAME:
+        raise InputError(
+            f"the upload names a file {name[:LONGEST_NAME]!r}; names must stay inside their folder"
+        )
+    return path

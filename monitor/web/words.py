@@ -1,0 +1,137 @@
+"""The words, shapes and colours of the pages: what is wrong, how urgent it is, and what to do next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime
+
+from monitor.exceptions import MonitorError
+from monitor.reporting.numbers import round_result, written
+from monitor.workflow.fleet import ATTENTION, FleetTableRow
+
+
+@dataclass(frozen=True)
+class Urgency:
+    """How urgent a class of the fleet is: a colour (class of the style sheet), a shape, a word, and the next step."""
+
+    colour: str
+    shape: str
+    word: str
+    next_step: str
+
+
+_STOP = Urgency("stop", "■", "act now", "")
+_SOON = Urgency("soon", "▲", "plan", "")
+_LOOK = Urgency("look", "◆", "look", "")
+_GOOD = Urgency("good", "●", "as usual", "")
+_OPEN = Urgency("open", "○", "not judged", "")
+#: The classes of the fleet (``monitor.workflow.fleet.ATTENTION``, the most urgent first) as people read them.
+URGENCIES = dict(
+    zip(
+        ATTENTION,
+        (
+            Urgency(
+                _STOP.colour,
+                _STOP.shape,
+                _STOP.word,
+                "stop precision work; adjust or compensate, then measure again",
+            ),
+            Urgency(_SOON.colour, _SOON.shape, _SOON.word, "plan an adjustment before the limit is reached"),
+            Urgency(
+                _LOOK.colour,
+                _LOOK.shape,
+                _LOOK.word,
+                "measure again; if it stays, ask what happened on that day",
+            ),
+            Urgency(_LOOK.colour, _LOOK.shape, _LOOK.word, "keep measuring; look for what wears or settles"),
+            Urgency(_LOOK.colour, _LOOK.shape, _LOOK.word, "compare the days: temperature, set-up, warm-up"),
+            Urgency(_GOOD.colour, _GOOD.shape, _GOOD.word, "nothing to do"),
+            Urgency(_OPEN.colour, _OPEN.shape, _OPEN.word, "measure on another day"),
+            Urgency(_OPEN.colour, _OPEN.shape, _OPEN.word, "compute a map (monitor map CAMPAIGN)"),
+        ),
+        strict=True,
+    )
+)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number as the tables show it, a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    text = f"{value:.{digits}g}"
+    if "e" in text and 1e-4 <= abs(value) < 1e7:
+        text = f"{value:.0f}"
+    return text.replace("-", "−")
+
+
+def with_u(value: float | None, u: float | None, unit: str) -> str:
+    """Return a value with its standard uncertainty, rounded together (JCGM 100, 7.2.6)."""
+    if value is None or u is None or not math.isfinite(value) or not math.isfinite(u) or u <= 0.0:
+        return f"{number(value)} {unit}"
+    try:
+        rounded = round_result(value, u)
+    except (MonitorError, ArithmeticError):
+        return f"{number(value)} ± {number(u, 2)} {unit}"
+    return f"{written(rounded.estimate)} ± {written(rounded.uncertainty)} {unit}"
+
+
+def probability(p: float | None) -> str:
+    """Return a probability as text: "< 0.0001" instead of powers of ten."""
+    if p is None or not math.isfinite(p):
+        return "–"
+    return "< 0.0001" if p < 1e-4 else f"{p:.4f}"
+
+
+def day(moment: str | datetime | None) -> str:
+    """Return the date of a moment, a dash where there is none."""
+    if moment is None:
+        return "–"
+    text = moment if isinstance(moment, str) else moment.isoformat()
+    return text[:10]
+
+
+def how_far(row: FleetTableRow) -> str:
+    """Say how far a parameter is, in words that its class asks for."""
+    unit = "" if row.unit == "1" else f" {row.unit}"
+    latest = f"{number(row.latest)}{unit}"
+    if row.limit is not None and row.latest is not None and row.limit > 0.0:
+        share = abs(row.latest) / row.limit
+        reach = f"{latest}, {100.0 * share:.0f} % of its limit of {number(row.limit)}{unit}"
+        if row.years_to_limit is not None:
+            return f"{reach}; reached in {_span(row.years_to_limit)} at this rate"
+        return reach
+    if row.attention == ATTENTION[2] and row.mean is not None and row.latest is not None:
+        return f"{latest}, where the days are at {number(row.mean)}{unit} on average"
+    if row.attention == ATTENTION[3] and row.slope_per_year is not None:
+        return f"{latest}, moving by {number(row.slope_per_year)}{unit} a year"
+    if row.attention == ATTENTION[4] and row.sd_pooled:
+        days, runs = number(row.between_days, 2), number(row.sd_pooled, 2)
+        return f"{latest}; days scatter by {days}{unit}, runs by {runs}{unit}"
+    return latest
+
+
+def since(row: FleetTableRow) -> str:
+    """Say since when: the latest day where it alone stands out, else the last event, else the first run."""
+    if row.attention == ATTENTION[2]:
+        return day(row.latest_at)
+    return "the first run" if row.since is None else f"{day(row.since)}, the last event"
+
+
+def _span(years: float) -> str:
+    if years * 365.25 < 60.0:
+        return f"{max(years * 365.25, 0.0):.0f} days"
+    return f"{12.0 * years:.0f} months"
+
+
+def counted(count: int, word: str, plural: str | None = None) -> str:
+    """Return "1 run", "2 runs"."""
+    return f"{count} {word if count == 1 else plural or word + 's'}"
+
+
+def listed(names: Iterable[str], most: int = 6) -> str:
+    """Return some names and how many more there are."""
+    every = list(names)
+    rest = f" and {len(every) - most} more" if len(every) > most else ""
+    return ", ".join(every[:most]) + rest

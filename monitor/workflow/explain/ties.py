@@ -1,0 +1,70 @@
+"""What breaks a tie: for every rival that the data do not rule out, what to do differently in the next run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from monitor.discovery import ChainMissing
+from monitor.documents import OMITTED
+
+#: Drivers that follow from where the axes stand.
+OF_POSES = ("", "gravity")
+
+
+class TieBreak(Enum):
+    """What tells an effect from its rivals."""
+
+    #: The poses of ``tell_apart_by``.
+    POSES = "poses"
+    #: Columns that go with each other today: recorded, and different, in the next runs.
+    DRIVERS = "drivers"
+    #: More indexations while the driver, which both have, acts.
+    INDEXATIONS = "indexations"
+    #: Poses that `monitor plan --separate` selects for one pair.
+    PLAN = "plan"
+    #: They move the tip alike wherever this machine can touch these targets: a correction serves for both.
+    NOTHING = "nothing"
+
+
+@dataclass(frozen=True)
+class Tie:
+    """``rivals`` that the same action tells from the effect; ``drivers`` are the columns or conditions to vary,
+    ``axes`` those to index."""
+
+    rivals: tuple[str, ...]
+    broken_by: TieBreak
+    drivers: tuple[str, ...] = field(default=(), metadata=OMITTED)
+    axes: tuple[str, ...] = field(default=(), metadata=OMITTED)
+
+
+def ties_of(effect: ChainMissing, rivals: Sequence[str]) -> tuple[Tie, ...]:
+    """What breaks the tie between an effect and each of its ``rivals``, by the action."""
+    actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...]], list[str]] = {}
+    for rival in rivals:
+        actions.setdefault(_action(effect, rival), []).append(rival)
+    return tuple(Tie(tuple(names), kind, drivers, axes) for (kind, drivers, axes), names in actions.items())
+
+
+def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...], tuple[str, ...]]:
+    own, other = _driver(effect.effect), _driver(rival)
+    if own not in OF_POSES or other not in OF_POSES:
+        if own != other:
+            return TieBreak.DRIVERS, tuple(name for name in (own, other) if name not in OF_POSES), ()
+        return TieBreak.INDEXATIONS, (own,), tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
+    if {effect.effect, rival} in [set(pair) for pair in effect.separation.together]:
+        return TieBreak.NOTHING, (), ()
+    return (TieBreak.POSES if effect.separation.poses else TieBreak.PLAN), (), ()
+
+
+def _driver(text: str) -> str:
+    name = text.rpartition("@")[2] if "@" in text else ""
+    # A time constant that was searched (@warmup45min) is no other driver.
+    return "warmup" if name.startswith("warmup") else name
+
+
+def _axis(text: str) -> str:
+    """The axis that a term names last: C1 of EXC1:const, of a location error C1 of EX0C1."""
+    term = text.partition(":")[0].partition("@")[0]
+    return term[2:].lstrip("0123456789")

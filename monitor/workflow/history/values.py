@@ -1,0 +1,107 @@
+"""The values of a machine's parameters run by run, with the conditions of the runs: what a picture of a trend shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+from monitor.exceptions import InputError, NotFoundError
+from monitor.store import Database, followed_by, machine_history
+from monitor.workflow.models import resolve
+
+
+@dataclass(frozen=True)
+class ValuesRequest:
+    """The runs of a machine under a ``model`` (None: those by which it is followed); one ``parameter``, or all.
+
+    ``since`` and ``until`` have an offset from UTC; the first belongs to the period, the second does not.
+    """
+
+    machine: str
+    parameter: str | None = None
+    since: datetime | None = None
+    until: datetime | None = None
+    model: str | None = None
+
+    def __post_init__(self) -> None:
+        for moment in (self.since, self.until):
+            if moment is not None and moment.tzinfo is None:
+                raise InputError(
+                    f"{moment.isoformat()} has no offset from UTC; write for example {moment.isoformat()}+01:00"
+                )
+        if self.since is not None and self.until is not None and self.since >= self.until:
+            raise InputError(
+                f"the period from {self.since:%Y-%m-%d} to {self.until:%Y-%m-%d} is empty; begin it before its end"
+            )
+
+
+@dataclass(frozen=True)
+class ParameterValues:
+    """Values of a parameter with their standard uncertainties, a number a run, None where a run has none.
+
+    ``tolerance`` is the limit of the absolute value by the machine's latest campaign.
+    """
+
+    unit: str
+    values: tuple[float | None, ...]
+    u: tuple[float | None, ...]
+    tolerance: float | None
+
+
+@dataclass(frozen=True)
+class ValuesAnswer:
+    """The n runs of a machine in the order of time, with n values of each parameter and each condition."""
+
+    machine: str
+    started_at: tuple[datetime, ...]
+    campaign: tuple[str, ...]
+    method: tuple[str, ...]
+    run: tuple[int, ...]
+    day: tuple[int, ...]
+    warm_up: tuple[bool, ...]
+    parameters: Mapping[str, ParameterValues]
+    conditions: Mapping[str, tuple[float | None, ...]]
+
+
+def values_of_machine(db: Database, request: ValuesRequest) -> ValuesAnswer:
+    """List the values of a machine's parameters in display units. Raises NotFoundError; nothing is stored."""
+    name, version = None, None
+    if request.model is not None:
+        stored = resolve(db, request.model)
+        name, version = stored.name, stored.version
+    history = machine_history(
+        db, request.machine, model=name, version=version,
+        parameter=request.parameter, since=request.since, followed_by=followed_by(db, request.machine),
+    )  # fmt: skip
+    if request.until is not None:
+        history = history.part(np.array([at < request.until for at in history.started_at], dtype=np.bool_))
+    if request.parameter is not None and len(history.run) and request.parameter not in history.parameters:
+        raise NotFoundError(
+            f"machine {request.machine} has no parameter {request.parameter!r} in any run of this period"
+        )
+    return ValuesAnswer(
+        machine=request.machine,
+        started_at=history.started_at,
+        campaign=tuple(history.campaign.tolist()),
+        method=tuple(history.method.tolist()),
+        run=tuple(history.run.tolist()),
+        day=tuple(history.day.tolist()),
+        warm_up=tuple(history.warm_up.tolist()),
+        parameters={
+            name: ParameterValues(
+                history.units[column],
+                _numbers(history.values[:, column].tolist()),
+                _numbers(history.u[:, column].tolist()),
+                history.tolerances.get(name),
+            )
+            for column, name in enumerate(history.parameters)
+        },
+        conditions={name: _numbers(values.tolist()) for name, values in history.conditions.items()},
+    )
+
+
+def _numbers(values: list[float]) -> tuple[float | None, ...]:
+    return tuple(value if np.isfinite(value) else None for value in values)

@@ -1,0 +1,254 @@
+"""What weekly looks at the whole fleet noticed: the one answer that report, trend page and fleet table give.
+
+The past of every machine is gone through week by week, as if each week had been looked at when it ended: the same runs
+give the same notices, whoever asks. Runs that are imported, withdrawn or identified otherwise later change what was
+noticed in the past, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.documents import OMITTED
+from monitor.records import Array
+from monitor.statistics.weekly_looks import RATE, Look, WeeklyLooks
+from monitor.store import (
+    NOTE,
+    Database,
+    followed_by,
+    machine_descriptions,
+    machine_events,
+    machine_history,
+    machine_runs,
+)
+from monitor.workflow.health.weeks import Week
+from monitor.workflow.history.runs import only_runs, possible_campaigns
+from monitor.workflow.history.series import steady_runs
+
+#: A change of the whole vector names so many parameters at most, those that moved most for their scatter first.
+NAMED = 3
+
+
+class NoticeKind(Enum):
+    """One parameter, or all of a machine together, which may show what none of them shows alone."""
+
+    PARAMETER = "parameter"
+    VECTOR = "vector"
+
+
+@dataclass(frozen=True)
+class WeeklyNotice:
+    """A change that was noticed in ``week``; it probably happened between the values of ``after`` and ``since``.
+
+    ``parameters`` is the one, or those that moved most for their scatter. ``size`` in ``unit`` is the mean since the
+    change less the mean before; None for a vector.
+    """
+
+    machine: str
+    week: str
+    kind: NoticeKind
+    parameters: tuple[str, ...]
+    after: str
+    since: str
+    size: float | None = field(default=None, metadata=OMITTED)
+    unit: str | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
+class WeeklyNotices:
+    """Every notice up to a week, in the order of time.
+
+    ``expected_false`` of them are false at most, on average, which is kept below ``false_discovery_rate`` of all (or of
+    one, before the first). ``weeks`` with runs were looked at, ``series`` (parameters and vectors) in the last of them.
+    """
+
+    false_discovery_rate: float
+    weeks: int
+    machines: int
+    series: int
+    expected_false: float
+    notices: tuple[WeeklyNotice, ...]
+
+    def of_machines(self, machines: Collection[str], week: str | None = None) -> WeeklyNotices:
+        """The same with the notices of some machines only, of one week or of all."""
+        part = (
+            notice for notice in self.notices if notice.machine in machines and week in (None, notice.week)
+        )
+        return replace(self, notices=tuple(part))
+
+
+def sentence(notice: WeeklyNotice) -> str:
+    """What is said of a notice, wherever it is printed."""
+    when = f"between {notice.after} and {notice.since}"
+    if notice.kind is NoticeKind.VECTOR or notice.size is None:
+        return (
+            f"noticed in {notice.week} under weekly looks: all parameters together changed {when}, "
+            f"most of all {', '.join(notice.parameters)}"
+        )
+    return (
+        f"noticed in {notice.week} under weekly looks: {notice.parameters[0]} changed by {notice.size:+.3g} "
+        f"{notice.unit} {when}"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _MachineWeeks:
+    """The weeks of a machine that have runs: ``weeks`` (n,) Mondays as ordinals, ``values`` (n, p) their means.
+
+    ``anew`` (n,): something was done to the machine before this week's runs.
+    """
+
+    machine: str
+    parameters: tuple[str, ...]
+    units: Mapping[str, str]
+    weeks: npt.NDArray[np.int64]
+    values: Array
+    anew: npt.NDArray[np.bool_]
+
+
+def weekly_notices(db: Database, last: Week | None = None) -> WeeklyNotices:
+    """Go through all weeks of all machines up to ``last`` (by default the last with a run) and say what was noticed.
+
+    Each machine by the model that it is followed by and the method of its last run, the steady runs of campaigns that
+    one machine can have made. Recorded events that may have changed a machine let it begin anew.
+    """
+    fleet = [
+        machine
+        for description in machine_descriptions(db)
+        if (machine := _machine_weeks(db, description.machine, last)) is not None
+    ]
+    return _looked(fleet)
+
+
+def _machine_weeks(db: Database, name: str, last: Week | None) -> _MachineWeeks | None:
+    """The weeks of a machine; None where it has no value."""
+    history = machine_history(db, name, followed_by=followed_by(db, name))
+    recorded = machine_runs(db, name)
+    campaigns, _ = possible_campaigns(recorded, ())
+    history = only_runs(
+        history,
+        [
+            run
+            for run in recorded
+            if run.campaign in campaigns and (last is None or run.local_start < last.ends)
+        ],
+    )
+    if not len(history.run):
+        return None
+    history = history.part(history.method == history.method[-1])
+    history = history.part(steady_runs(history))
+    if not len(history.run) or not history.parameters:
+        return None
+    # The week of a run by the shop's clock, as its Monday.
+    days = [at.date() for at in history.started_at]
+    mondays = np.array([day.toordinal() - day.weekday() for day in days], dtype=np.int64)
+    moments = [event.at.timestamp() for event in machine_events(db, name) if event.kind != NOTE]
+    era = np.searchsorted(np.sort(moments), history.seconds, side="right")
+    # Of a week that an event divides the runs after it count.
+    weeks, place = np.unique(mondays, return_inverse=True)
+    latest = np.zeros(len(weeks), dtype=np.int64)
+    np.maximum.at(latest, place, era)
+    counts = era == latest[place]
+    present = np.isfinite(history.values) & counts[:, np.newaxis]
+    sums, runs = (
+        np.zeros((len(weeks), len(history.parameters))),
+        np.zeros((len(weeks), len(history.parameters))),
+    )
+    np.add.at(sums, place, np.where(present, history.values, 0.0))
+    np.add.at(runs, place, present)
+    with np.errstate(invalid="ignore"):
+        means = sums / np.where(runs > 0.0, runs, np.nan)
+    return _MachineWeeks(
+        name,
+        history.parameters,
+        dict(zip(history.parameters, history.units, strict=True)),
+        weeks,
+        means,
+        np.diff(latest, prepend=latest[:1]) > 0,
+    )
+
+
+def _looked(fleet: Sequence[_MachineWeeks]) -> WeeklyNotices:
+    names = sorted({name for machine in fleet for name in machine.parameters})
+    column = {name: j for j, name in enumerate(names)}
+    columns = [np.array([column[name] for name in machine.parameters], dtype=np.int64) for machine in fleet]
+    has = np.zeros((len(fleet), len(names)), dtype=np.bool_)
+    for row, of_machine in enumerate(columns):
+        has[row, of_machine] = True
+    looks = WeeklyLooks(has)
+    every = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *(machine.weeks for machine in fleet)]))
+    notices: list[WeeklyNotice] = []
+    series = 0
+    for week in every.tolist():
+        values, anew = np.full(has.shape, np.nan), np.zeros(len(fleet), dtype=np.bool_)
+        places = [int(np.searchsorted(machine.weeks, week)) for machine in fleet]
+        for row, (machine, place) in enumerate(zip(fleet, places, strict=True)):
+            if place < len(machine.weeks) and machine.weeks[place] == week:
+                values[row, columns[row]] = machine.values[place]
+                anew[row] = machine.anew[place]
+        looks.restart(anew)
+        look = looks.look(values)
+        series = look.series
+        notices += _notices(fleet, names, places, look)
+    return WeeklyNotices(
+        false_discovery_rate=RATE,
+        weeks=len(every),
+        machines=len(fleet),
+        series=series,
+        expected_false=looks.spent,
+        notices=tuple(notices),
+    )
+
+
+def _notices(
+    fleet: Sequence[_MachineWeeks], names: Sequence[str], places: Sequence[int], look: Look
+) -> list[WeeklyNotice]:
+    notices = []
+    for row in np.flatnonzero(look.parameters.any(axis=1) | look.vectors).tolist():
+        machine, place = fleet[row], places[row]
+        for j in np.flatnonzero(look.parameters[row]).tolist():
+            name = names[j]
+            before, since = _sides(machine, (name,), place, int(look.since[row, j]))
+            values = machine.values[:, machine.parameters.index(name)]
+            notices.append(
+                WeeklyNotice(
+                    machine.machine, _week(machine, place), NoticeKind.PARAMETER, (name,),
+                    _week(machine, int(before[-1])), _week(machine, int(since[0])),
+                    float(values[since].mean() - values[before].mean()), machine.units[name],
+                )
+            )  # fmt: skip
+        if look.vectors[row]:
+            before, since = _sides(machine, machine.parameters, place, int(look.vector_since[row]))
+            moved = machine.values[since].mean(axis=0) - machine.values[before].mean(axis=0)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                scores = np.nan_to_num(np.abs(moved) / machine.values[before].std(axis=0))
+            most = tuple(machine.parameters[k] for k in np.argsort(-scores, kind="stable")[:NAMED])
+            notices.append(
+                WeeklyNotice(
+                    machine.machine, _week(machine, place), NoticeKind.VECTOR, most,
+                    _week(machine, int(before[-1])), _week(machine, int(since[0])),
+                )
+            )  # fmt: skip
+    return notices
+
+
+def _sides(
+    machine: _MachineWeeks, parameters: Sequence[str], place: int, since: int
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The weeks (indices) before and since a change; the latter are ``since`` and end at ``place``."""
+    began = int(np.flatnonzero(machine.anew[: place + 1])[-1]) if machine.anew[: place + 1].any() else 0
+    columns = [machine.parameters.index(name) for name in parameters]
+    measured = np.flatnonzero(np.isfinite(machine.values[: place + 1, columns]).all(axis=1))
+    measured = measured[measured >= began]
+    after = min(max(since, 1), len(measured) - 1)
+    return measured[:-after], measured[-after:]
+
+
+def _week(machine: _MachineWeeks, place: int) -> str:
+    return Week(date.fromordinal(int(machine.weeks[place]))).name

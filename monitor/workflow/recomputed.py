@@ -1,0 +1,71 @@
+"""Identifications computed anew from the stored readings: the numbers are those that the readings give."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+
+from monitor import __version__
+from monitor.exceptions import MonitorError
+from monitor.store import (
+    Database,
+    StoredIdentification,
+    identification_by_number,
+    identification_numbers,
+    load_campaign,
+    load_model,
+)
+
+#: In standard uncertainties: the last bits depend on the processor and its libraries; 1e-3 u moves no printed digit.
+TOLERANCE_U = 1e-3
+
+
+def recompute(db: Database, seed: str, count: int) -> tuple[int, tuple[str, ...]]:
+    """Identify campaigns again, drawn by the hash ``seed``; how many, and a sentence for each that is another now.
+
+    Only identifications of this version of the software are drawn: another may have estimated otherwise.
+    """
+    numbers = identification_numbers(db, __version__)
+    drawn = np.random.default_rng(int(seed, 16)).permutation(numbers)[:count].tolist()
+    faults, computed = [], 0
+    for number in sorted(drawn):
+        # What cannot be computed is no evidence: the hashes say whether readings or model were altered.
+        with contextlib.suppress(MonitorError):
+            fault = _difference(db, number)
+            computed += 1
+            if fault is not None:
+                faults.append(
+                    f"identification {number} cannot be reproduced from the stored readings: {fault}"
+                )
+    return computed, tuple(faults)
+
+
+def _difference(db: Database, number: int) -> str | None:
+    """Where a stored identification differs from the same one computed now; None where it does not."""
+    # Loaded here: a verification without a recomputation waits for no solver.
+    from monitor.workflow.campaign_parts import only_run
+    from monitor.workflow.identify.machine import identified
+
+    stored = identification_by_number(db, number)
+    campaign = load_campaign(db, stored.campaign)
+    if len(stored.runs) == 1:
+        campaign = only_run(campaign, stored.runs[0].run)
+    again = identified(campaign, load_model(db, stored.model, stored.model_version))[1]
+    return _first_difference(stored, again)
+
+
+def _first_difference(stored: StoredIdentification, again: StoredIdentification) -> str | None:
+    if stored.parameters != again.parameters or [run.run for run in stored.runs] != [
+        run.run for run in again.runs
+    ]:
+        return "its runs or parameters are others"
+    for before, after in zip(stored.runs, again.runs, strict=True):
+        u = np.sqrt(np.diag(after.covariance))
+        off = np.abs(before.estimate - after.estimate) / np.where(u > 0.0, u, 1.0)
+        refused = np.isnan(before.estimate) != np.isnan(after.estimate)
+        worst = int(np.argmax(np.where(refused, np.inf, np.nan_to_num(off))))
+        if refused[worst] or off[worst] > TOLERANCE_U:
+            name = stored.parameters[worst]
+            return f"{name} of run {before.run} of {stored.campaign} differs by {off[worst]:.2g} standard uncertainties"
+    return None

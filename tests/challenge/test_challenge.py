@@ -1,0 +1,79 @@
+"""The challenge: its campaigns are read, its truth does not move, and its scorer counts what it says."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+from by_path import load
+
+from monitor.readers import read_campaign
+
+HERE = Path(__file__).resolve().parent
+generate = load("challenge_generate", HERE / "generate.py")
+scorer = load("challenge_score", HERE / "score.py")
+
+
+def test_campaigns_are_read_and_the_truth_is_sealed(tmp_path: Path) -> None:
+    sealed = generate.write(tmp_path, 2, 2, generate.SEED)
+    text = (tmp_path / "truth.json").read_text(encoding="utf-8")
+    assert hashlib.sha256(text.encode()).hexdigest() == sealed
+    assert (tmp_path / "truth.sha256").read_text(encoding="utf-8").split()[0] == sealed
+    truth = json.loads(text)["campaigns"]
+    campaign = read_campaign(tmp_path / "campaigns" / "0002")
+    assert (campaign.method, len(campaign.runs)) == ("samba", truth[0]["runs"])
+    # What was drawn for the second campaign when the challenge was published.
+    assert [(effect["effect"], effect["peak_um"]) for effect in truth[0]["effects"]] == [
+        ("EZZ:reversal", 5.07),
+        ("EXX:poly2", 6.8),
+    ]
+
+
+def hidden(effect: str, peak: float, shape: str | None = None) -> dict[str, object]:
+    return {"effect": effect, "shape_outside": shape, "kind": "play", "peak_um": peak}
+
+
+TRUTH = [
+    {"campaign": "0001", "effects": [hidden("EXX:reversal", 5.0), hidden("EZC1:const@warmup", 4.0)]},
+    {"campaign": "0002", "effects": [hidden("EYZ", 6.0, "bump"), hidden("EXX:cyclic10mm", 2.0)]},
+    {"campaign": "0003", "effects": []},
+]
+
+
+def test_what_is_right_false_and_covered() -> None:
+    answers = [
+        {
+            "campaign": "0001", "seconds": 3.0,
+            "effects": [
+                # Found, within 2 u; then under a rival's name; then once more, which is false.
+                {"effect": "EXX:reversal", "rivals": [], "peak_um": 5.3, "u_um": 0.2},
+                {"effect": "EX0C1@warmup", "rivals": ["EZC1:const@warmup38min"], "peak_um": 4.0, "u_um": 0.1},
+                {"effect": "EXX:reversal", "rivals": [], "peak_um": 5.0, "u_um": 0.2},
+            ],
+        },
+        # Of a shape outside of the catalogue the term counts; the pitch is compared to the millimetre.
+        {
+            "campaign": "0002", "seconds": 1.0,
+            "effects": [
+                {"effect": "EYZ:poly2", "rivals": [], "peak_um": 1.0, "u_um": 0.1},
+                {"effect": "EXX:cyclic9.98mm", "rivals": [], "peak_um": 3.0, "u_um": 0.1},
+            ],
+        },
+    ]  # fmt: skip
+    result = scorer.score(TRUTH, answers)
+    assert (result.campaigns, result.hidden, result.right, result.false, result.clean) == (3, 4, 4, 1, 2)
+    assert (result.stated, result.covered, result.seconds) == (2, 1, 4.0)
+    assert scorer.smallest(result.by_kind["play"]) == "1.5 (4)"
+    assert scorer.smallest([(2.0, False), (5.0, True), (5.5, True), (7.0, True)]) == "3 (3)"
+    assert scorer.smallest([(5.0, False)]) == "none (1)"
+    (line,) = [row for row in scorer.tables({"one": result}) if row.startswith("| one | 100")]
+    assert "0.33" in line
+    with pytest.raises(ValueError, match="answers to campaigns that are not in the truth: 0009"):
+        scorer.score(TRUTH, [{"campaign": "0009", "effects": []}])
+
+
+def test_nothing_answered_is_nothing_found() -> None:
+    result = scorer.score(TRUTH, [])
+    assert (result.right, result.false, result.clean, result.hidden) == (0, 0, 3, 4)

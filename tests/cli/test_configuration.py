@@ -1,0 +1,104 @@
+"""One file says what would be typed again and again; what is typed stands above it. Quiet verbs and completion."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from monitor.cli.moments import moment
+from monitor.cli.parser import VERBS
+
+
+@pytest.fixture(autouse=True)
+def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "no configuration"))
+    monkeypatch.delenv("MONITOR_CONFIG", raising=False)
+
+
+def configured(text: str, file: str = "monitor.toml") -> Path:
+    Path(file).parent.mkdir(parents=True, exist_ok=True)
+    Path(file).write_text(text, encoding="utf-8")
+    return Path(file)
+
+
+def test_init_writes_a_file_that_says_nothing_yet(typed: Any) -> None:
+    assert typed("config", "init").status == 0
+    shown = typed("config", "check", "--json").document
+    assert Path(shown.pop("file")) == Path("monitor.toml").absolute()
+    assert set(shown.values()) == {None}
+    assert "is there already and is not written over" in typed("config", "init").err
+    live = Path("monitor.toml").read_text(encoding="utf-8").replace("# language", "language")
+    configured(live)
+    assert typed("config", "show", "--json").document["language"] == "en"
+
+
+def test_the_database_is_the_typed_the_environments_the_configurations(
+    typed: Any, db: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copyfile(db, "shop.duckdb")
+    configured('database = "../shop.duckdb"\n', "place/monitor.toml")
+    monkeypatch.setenv("MONITOR_CONFIG", "place/monitor.toml")
+    assert len(typed("campaigns", "--json").document["campaigns"]) == 3
+    monkeypatch.setenv("MONITOR_DB", "other.duckdb")
+    assert "there is no database other.duckdb" in typed("campaigns").err
+    assert "there is no database typed.duckdb" in typed("--db", "typed.duckdb", "campaigns").err
+
+
+def test_laboratory_language_and_time_zone_are_used(typed: Any, db: Path, laboratory: Path) -> None:
+    configured(f'laboratory = "{laboratory}"\nlanguage = "de"\ntime_zone = "Asia/Tokyo"\n')
+    assert typed("certificate", "template", "--json").document["language"] == "de"
+    assert moment("2026-03-05 07:00", "--at").isoformat() == "2026-03-05T07:00:00+09:00"
+    issued = typed("certificate", "issue", "cold-cold", "--run", 3, "--draft", db=db)
+    assert (issued.status, issued.err) == (0, "")
+
+
+def test_without_a_laboratory_the_certificate_says_what_would_be_right(typed: Any, db: Path) -> None:
+    answer = typed("certificate", "issue", "cold-cold", "--run", 3, db=db)
+    assert answer.status == 2
+    assert "--laboratory FILE says what the laboratory states; `monitor certificate template`" in answer.err
+    assert "--mail FILE: name a file, or write one as mail" in typed("report", "--mail", db=db).err
+
+
+def test_every_fault_of_the_file_is_told_at_once(typed: Any, db: Path) -> None:
+    configured(
+        'databse = "x"\nlanguage = "fr"\ntime_zone = "Mars/Olympus"\nmail = 3\nlaboratory = "no.toml"\n'
+    )
+    answer = typed("config", "check")
+    assert (answer.status, answer.out) == (2, "")
+    for words in (
+        "there is no key databse; did you mean 'database'? there are database, laboratory, language, mail, time_zone",
+        "language = 'fr': write de or en",
+        "time_zone = 'Mars/Olympus': there is no such time zone",
+        "mail is a text in quotes",
+        "laboratory = 'no.toml': there is no file",
+    ):
+        assert words in answer.err
+    assert "was refused" in typed("campaigns").err
+    # What is typed needs no configuration.
+    assert typed("campaigns", db=db).status == 0
+
+
+def test_quiet_says_nothing_but_what_went_wrong(typed: Any, db: Path) -> None:
+    answer = typed("campaigns", "--quiet", db=db)
+    assert (answer.status, answer.out, answer.err) == (0, "", "")
+    assert "there is no campaign 'nope'" in typed("runs", "nope", "--quiet", db=db).err
+    assert "--quiet says nothing and --json says all" in typed("campaigns", "--quiet", "--json", db=db).err
+
+
+def test_the_shell_completes_every_verb(typed: Any) -> None:
+    script = typed("completion", "bash").out
+    assert all(f"_shtab_monitor_{verb}_" in script for verb in VERBS)
+    Path("script.sh").write_text(script, encoding="utf-8")
+    bash = shutil.which("bash")
+    if bash is not None:
+        asked = (
+            "source script.sh; COMP_WORDS=(monitor ex); COMP_CWORD=1; _shtab_monitor; echo ${COMPREPLY[@]}"
+        )
+        told = subprocess.run([bash, "-c", asked], capture_output=True, text=True, check=False)
+        assert {"explain", "export"} <= set(told.stdout.split())
+    assert "complete -c monitor" in typed("completion", "fish").out
+    assert "#compdef monitor" in typed("completion", "zsh").out

@@ -1,0 +1,65 @@
+"""Every form of a moment that a message proposes is read, by every option that takes one."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from monitor.cli.moments import moment
+from monitor.exceptions import InputError
+
+
+@pytest.fixture
+def new_york(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv("TZ", "EST5EDT,M3.2.0,M11.1.0")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()
+
+
+@pytest.mark.parametrize(
+    ("text", "read"),
+    [
+        ("2025-07-20", "2025-07-20T00:00:00-04:00"),
+        ("2025-07-20 14:00", "2025-07-20T14:00:00-04:00"),
+        ("2025-07-20T14:00", "2025-07-20T14:00:00-04:00"),
+        ("2025-01-20 7:05", "2025-01-20T07:05:00-05:00"),
+        ("2025-07-20 14:00:30", "2025-07-20T14:00:30-04:00"),
+        ("2025-07-20T14:00:00+02:00", "2025-07-20T14:00:00+02:00"),
+        ("2025-07-20 14:00 +02:00", "2025-07-20T14:00:00+02:00"),
+        ("2025-07-20T14:00Z", "2025-07-20T14:00:00+00:00"),
+        (" 2025-07-20 ", "2025-07-20T00:00:00-04:00"),
+    ],
+)
+@pytest.mark.usefixtures("new_york")
+def test_a_moment_without_offset_is_the_time_of_this_computer(text: str, read: str) -> None:
+    assert moment(text, "--at").isoformat() == read
+
+
+@pytest.mark.parametrize(
+    "text", ["", "soon", "20250720", "2025-W10-1", "20.07.2025", "2025-02-30", "2025-07-20 25:00"]
+)
+def test_what_is_no_moment_is_refused_with_forms_that_are_read(text: str) -> None:
+    with pytest.raises(InputError, match=re.escape(f"--at {text}: write a day or a time as")) as refusal:
+        moment(text, "--at")
+    proposed = re.findall(r"2026-03-05(?:[T ][0-9:+-]+)?", str(refusal.value))
+    assert len(proposed) == 3
+    for form in proposed:
+        assert moment(form, "--at").tzinfo is not None
+
+
+@pytest.mark.parametrize("at", ["2025-07-20", "2025-07-20 14:00", "2025-07-20T14:00"])
+def test_every_option_with_a_moment_reads_the_same_forms(typed: Any, db: Path, at: str) -> None:
+    recorded = typed("event", "HU40-T", "belt changed", "--at", at, "--json", db=db)
+    stored = datetime.fromisoformat(recorded.document["events"][0]["happened_at"])
+    assert stored == moment(at, "--at").astimezone(UTC)
+    trend = ["trend", "HU40-T", "--parameter", "EXX", "--campaign", "cold-cold", "--since", at]
+    answer = typed(*trend, "--reference", f"{at}..2026-03-04", "--next-check", "2026-09-01", db=db)
+    assert (answer.status, answer.err) == (0, "")

@@ -1,0 +1,145 @@
+"""Joint curves of many lines, as measured robots have them, against a simulator of its own."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+import pytest
+from by_path import simulator
+
+from monitor.discovery import Fit, fit
+from monitor.discovery.machine.bad_poses import bad_poses
+from monitor.discovery.machine.explain import _variants
+from monitor.discovery.machine.held_out import LeftOutBlocks, pose_blocks
+from monitor.discovery.machine.joint_curves import joint_curves
+from monitor.discovery.machine.surroundings import surroundings_of
+from monitor.effects import ChainEffect, parse_effect
+from monitor.effects.shapes import Harmonics
+from monitor.exceptions import CampaignError, DataError, EffectError
+from monitor.methods.model import Model
+from monitor.methods.tracker.method import METHOD as tracker
+from monitor.readers import read_campaign
+from monitor.records import Campaign
+from monitor.workflow.predict.predict import beside
+
+ORDERS = {"J1": (1, 24, 121, 242), "J3": (2, 45, 121, 242)}
+
+
+@pytest.fixture(scope="module")
+def robots() -> ModuleType:
+    """The simulator of measured robots, loaded by path."""
+    simulator()
+    return importlib.import_module("simulator.measured_robot")
+
+
+@pytest.fixture(scope="module")
+def session(robots):
+    """A robot with two joint curves of four lines each, and compliances."""
+    rng = np.random.default_rng(4)
+    curves = {
+        joint: [robots.Line(order, 90e-6, rng.uniform(0.0, 6.0)) for order in orders]
+        for joint, orders in ORDERS.items()
+    }
+    scene = robots.Scene(softness={"J2": 8e-6, "J3": 8e-6}, curves=curves)
+    return robots.measure(rng, scene, poses=300, fixed_every=30)
+
+
+@pytest.fixture(scope="module")
+def campaign(robots, session, tmp_path_factory) -> Campaign:
+    read = read_campaign(robots.write_session(tmp_path_factory.mktemp("robot") / "robot", session))
+    assert isinstance(read, Campaign)
+    return read
+
+
+@pytest.fixture(scope="module")
+def plain(campaign) -> Fit:
+    return fit(tracker.problem_of(campaign))
+
+
+def curves_of(campaign: Campaign, plain: Fit) -> dict[str, tuple[float, ...]]:
+    variants = _variants(campaign, plain.problem, surroundings_of(campaign, plain.problem).drivers)
+    curves = {}
+    for variant in joint_curves(plain, variants, 0.01):
+        effect = variant.effect
+        assert isinstance(effect, ChainEffect)
+        assert isinstance(effect.shape, Harmonics)
+        curves[effect.joint.name] = effect.shape.orders
+    return curves
+
+
+def test_all_lines_of_two_joints_and_none_of_the_others(campaign, plain):
+    assert curves_of(campaign, plain) == {name: tuple(map(float, orders)) for name, orders in ORDERS.items()}
+
+
+def test_new_poses_are_predicted_to_the_noise(robots, session, campaign, plain):
+    texts = tuple(
+        f"E{'CB'[n]}J{2 * n + 1}:harmonics({','.join(map(str, ORDERS[f'J{2 * n + 1}']))})" for n in (0, 1)
+    )
+    texts += ("EBJ2:compliance@link_weights", "EBJ3:compliance@link_weights")
+    new = session.pose >= 240
+    fitted = fit(tracker.problem_of(campaign, Model("all", added=texts)), new)
+    tool = np.array([name.startswith("R") for name in session.tracked.target])
+    noise = np.sqrt(np.mean((session.tracked.points - session.exact)[new & tool] ** 2))
+    assert np.sqrt(np.mean(fitted.vectors[new & tool] ** 2)) < 1.15 * noise
+
+
+def test_bad_poses_are_one_each_and_no_other_is_dropped(robots, session, campaign):
+    points = session.tracked.points.copy()
+    pose = np.isin(session.pose, (50, 200)) & np.array(
+        [name.startswith("R") for name in session.tracked.target]
+    )
+    points[pose] += 0.3
+    single = int(np.flatnonzero(session.pose == 120)[0])
+    points[single, 1] -= 0.3
+    channels = {f"tracker_{axis}_mm": points[:, number] for number, axis in enumerate("xyz")}
+    changed = replace(campaign, probings=replace(campaign.probings, channels=channels))
+    texts = [
+        f"ECJ1:harmonics({','.join(map(str, ORDERS['J1']))})",
+        f"EBJ3:harmonics({','.join(map(str, ORDERS['J3']))})",
+    ]
+    texts += ["EBJ2:compliance@link_weights", "EBJ3:compliance@link_weights"]
+    points_off = bad_poses(fit(tracker.problem_of(changed, Model("all", added=tuple(texts)))))
+    rows = {row for point in points_off for row in point.all_rows}
+    wanted = {single} if session.tracked.target[single].startswith("R") else set()
+    assert rows == set(np.flatnonzero(pose).tolist()) | wanted
+    assert sum(len(point.rows) == 3 for point in points_off) == 2
+
+
+def test_blocks_left_out_against_fits_of_all_columns(plain):
+    parts = pose_blocks(plain)
+    rng = np.random.default_rng(0)
+    basis = plain.nuisance.basis.reshape(len(parts), -1)
+    columns = rng.normal(size=(len(parts), 3))
+    columns -= basis @ (basis.T @ columns)
+    residual = plain.white.reshape(-1)
+    whole = np.concatenate([basis, columns], axis=1)
+    total = 0.0
+    for part in range(10):
+        rows = parts == part
+        sizes = np.linalg.lstsq(whole[~rows], residual[~rows], rcond=None)[0]
+        total += float(np.sum((residual[rows] - whole[rows] @ sizes) ** 2))
+    assert LeftOutBlocks(basis, parts).sum_of_squares(residual, columns) == pytest.approx(total, rel=1e-8)
+
+
+def test_rows_of_a_lost_beam_are_refused_with_their_lines(robots, session, tmp_path):
+    lost = robots.lose_beam(session, [7, 9])
+    with pytest.raises(CampaignError, match=r"line 9.*lost the beam(.|\n)*line 11.*leave the row out"):
+        read_campaign(robots.write_session(tmp_path / "lost", lost))
+
+
+def test_rows_of_another_machine_or_target_are_not_predicted(campaign):
+    other = replace(campaign, machine=replace(campaign.machine, id="another"))
+    with pytest.raises(DataError, match="a model of the one says nothing of the other"):
+        beside(campaign, other)
+    joined, rows = beside(campaign, campaign)
+    assert len(joined.probings) == 2 * len(campaign.probings)
+    assert rows.sum() == len(campaign.probings)
+
+
+@pytest.mark.parametrize("orders", ["", "2,1", "0,1", "a"])
+def test_orders_that_are_none_are_refused(plain, orders):
+    with pytest.raises(EffectError, match="must be periods a turn, above 0 and rising"):
+        parse_effect(f"ECJ1:harmonics({orders})", plain.problem.context.chain)

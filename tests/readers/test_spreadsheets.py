@@ -1,0 +1,155 @@
+"""Folders whose tables come from a spreadsheet: the same campaign, to the last bit, as from plain CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import openpyxl
+import pytest
+
+from monitor.exceptions import CampaignError
+from monitor.readers import read_campaign
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+#: One campaign of every method that has tables of its own.
+FOLDERS = ("tilting-table", "load-cell", "mount-gem-28", "l-shape", "tracked-robot")
+
+
+def tables(folder: Path) -> dict[str, list[list[str]]]:
+    return {
+        path.name: list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
+        for path in sorted(folder.glob("*.csv"))
+    }
+
+
+def german(rows: list[list[str]], mark: str = ";") -> bytes:
+    """The rows as a German Excel saves "CSV UTF-8": BOM, semicolons, decimal commas, WAHR and FALSCH, CRLF."""
+    words = {"true": "WAHR", "false": "FALSCH"}
+    lines = [
+        mark.join(re.sub(r"^([+-]?\d*)\.(\d+(e-?\d+)?)$", r"\1,\2", words.get(cell, cell)) for cell in row)
+        for row in rows
+    ]
+    return b"\xef\xbb\xbf" + "\r\n".join([*lines, ""]).encode()
+
+
+def typed(cell: str) -> Any:
+    """A cell as Excel keeps it: numbers as numbers, true and false as such."""
+    if cell in ("true", "false"):
+        return cell == "true"
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
+
+
+def as_workbook(folder: Path, *, single: bool) -> None:
+    """Replace the CSV files by a workbook each, or by one with a sheet each."""
+    book = openpyxl.Workbook()
+    book.remove(book.worksheets[0])
+    for name, rows in tables(folder).items():
+        if not single:
+            book = openpyxl.Workbook()
+        page = book.create_sheet(name.removesuffix(".csv")) if single else book.worksheets[0]
+        for row in rows:
+            page.append([typed(cell) for cell in row])
+        if not single:
+            book.save(folder / name.replace(".csv", ".xlsx"))
+        (folder / name).unlink()
+    if single:
+        book.save(folder / "campaign.xlsx")
+
+
+def assert_same(ours: Any, theirs: Any) -> None:
+    """Compare what was read, but for the files themselves."""
+    for name in (field for field in ours.__dataclass_fields__ if field != "files"):
+        first, second = getattr(ours, name), getattr(theirs, name)
+        if hasattr(first, "__dataclass_fields__"):
+            assert_same(first, second)
+        elif isinstance(first, np.ndarray):
+            np.testing.assert_array_equal(first, second)
+        elif isinstance(first, dict) or hasattr(first, "keys"):
+            assert first.keys() == second.keys()
+            for key in first:
+                np.testing.assert_array_equal(first[key], second[key])
+        else:
+            assert first == second
+
+
+@pytest.fixture(params=FOLDERS)
+def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(EXAMPLES / request.param, tmp_path / request.param))
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_a_german_csv_is_the_same_campaign(folder: Path, mark: str) -> None:
+    original = read_campaign(folder)
+    for name, rows in tables(folder).items():
+        (folder / name).write_bytes(german(rows, mark))
+    assert_same(read_campaign(folder), original)
+
+
+@pytest.mark.parametrize("single", [True, False])
+def test_a_workbook_is_the_same_campaign(folder: Path, single: bool) -> None:
+    original = read_campaign(folder)
+    as_workbook(folder, single=single)
+    campaign = read_campaign(folder)
+    assert_same(campaign, original)
+    names = {file.name for file in campaign.files}
+    assert ("campaign.xlsx" in names) == single
+    assert not any(name.endswith(".csv") for name in names)
+
+
+def test_points_and_commas_in_one_table_are_refused_with_the_cause(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(EXAMPLES / "cold-cold", tmp_path / "cold-cold"))
+    rows = tables(folder)["probings.csv"]
+    mixed = [rows[0], [*rows[1][:-1], "1.5"], *([cell.replace(".", ",") for cell in row] for row in rows[2:])]
+    (folder / "probings.csv").write_text("\n".join(";".join(row) for row in mixed), encoding="utf-8")
+    with pytest.raises(CampaignError) as refusal:
+        read_campaign(folder)
+    lines = str(refusal.value).splitlines()
+    assert len(lines) < 12
+    assert re.search(
+        r"column x_mm: .* it has a decimal comma; .* \(and 131[0-9] more like it, to line 1321\)",
+        str(refusal.value),
+    )
+
+
+def test_faults_of_a_workbook_name_its_file_and_row(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(EXAMPLES / "load-cell", tmp_path / "load-cell"))
+    as_workbook(folder, single=False)
+    book = openpyxl.load_workbook(folder / "data.xlsx")
+    column = next(cell.column for cell in book.worksheets[0][1] if cell.value == "load_N")
+    book.worksheets[0].cell(row=7, column=column, value="none")
+    book.save(folder / "data.xlsx")
+    with pytest.raises(CampaignError, match=r"data\.xlsx, line 7, column load_N: 'none' is not a number"):
+        read_campaign(folder)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"PK\x03\x04 no workbook", "this is no workbook of Excel"), (b"text", "this is no workbook of Excel")],
+)
+def test_what_is_no_workbook_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
+    folder = Path(shutil.copytree(EXAMPLES / "load-cell", tmp_path / "load-cell"))
+    (folder / "data.csv").unlink()
+    (folder / "data.xlsx").write_bytes(content)
+    with pytest.raises(CampaignError, match=words):
+        read_campaign(folder)
+
+
+def test_a_workbook_without_the_sheet_says_what_it_has(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(EXAMPLES / "load-cell", tmp_path / "load-cell"))
+    as_workbook(folder, single=True)
+    book = openpyxl.load_workbook(folder / "campaign.xlsx")
+    book.worksheets[0].title = "Tabelle1"
+    book.save(folder / "campaign.xlsx")
+    with pytest.raises(
+        CampaignError, match="there is no sheet 'data'; name the sheet of that table so; there are Tabelle1"
+    ):
+        read_campaign(folder)

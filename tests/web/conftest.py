@@ -1,0 +1,89 @@
+"""A server of one database, asked without a network: on loopback, or with users who log in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("fastapi", reason="the extra web is not installed")
+pytest.importorskip("plotly", reason="the extra web is not installed")
+
+from starlette.testclient import TestClient
+
+from monitor.store import Database
+from monitor.web.app import application
+from monitor.web.opening import opened
+from monitor.web.settings import ServerSettings
+from monitor.web.users import add_user
+from monitor.workflow.intake.importing import ImportRequest, import_folders
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+CAMPAIGNS = ("hidden-spindle-growth", "load-cell")
+
+
+@dataclass(frozen=True)
+class Served:
+    """A server with its database; ``tokens`` by role where users log in."""
+
+    client: TestClient
+    db: Database
+    tokens: dict[str, str]
+
+    def ask(self, question: str, document: object = None, role: str = "") -> tuple[int, dict[str, object]]:
+        """Status and answer of a question of the interface."""
+        headers = {"Authorization": f"Bearer {self.tokens[role]}"} if role else {}
+        answer = self.client.post(
+            f"/api/v1/{question.replace(' ', '-')}", json=document or {}, headers=headers
+        )
+        return answer.status_code, answer.json()
+
+    def proof(self, page: str = "/import") -> str:
+        """The proof that the forms of the client's session carry."""
+        match = re.search(r'name="proof" value="([0-9a-f]{64})"', self.client.get(page).text)
+        assert match is not None
+        return match[1]
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("web") / "monitor.duckdb"
+    with Database(path, threads=1) as db:
+        import_folders(db, ImportRequest([EXAMPLES / name for name in CAMPAIGNS]))
+    return path
+
+
+Serve = Callable[[Path, bool], Served]
+
+
+@pytest.fixture(scope="module")
+def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
+    closing: list[Callable[[], object]] = []
+
+    def start(path: Path, with_users: bool) -> Served:
+        folder = tmp_path_factory.mktemp("served")
+        tokens, users = {}, None
+        if with_users:
+            users = folder / "users.toml"
+            tokens = {role: add_user(users, f"{role}-1", role) for role in ("viewer", "engineer", "approver")}
+        context = opened(path, folder)
+        db = context.__enter__()
+        settings = ServerSettings(database=path, users=users)
+        gate = application(db, settings, folder)
+        client = TestClient(
+            gate, base_url="http://127.0.0.1:8765", raise_server_exceptions=False, follow_redirects=False
+        )
+        closing.extend([lambda: context.__exit__(None, None, None), gate.close])
+        return Served(client, db, tokens)
+
+    yield start
+    for close in reversed(closing):
+        close()
+
+
+@pytest.fixture(scope="module")
+def local(imported: Path, serve: Serve) -> Served:
+    return serve(imported, False)

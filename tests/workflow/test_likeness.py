@@ -1,0 +1,113 @@
+"""Campaigns like one that was measured: what is identified is what was asked for, whatever the method."""
+
+from __future__ import annotations
+
+import csv
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.exceptions import DataError, EffectError, InputError
+from monitor.methods import campaign_method
+from monitor.methods.chain.likeness import Likeness
+from monitor.readers import read_campaign
+from monitor.workflow.likeness import Drift, LikeRequest, Step, simulate_like
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+START = date(2024, 1, 31)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "tilting-table",
+        "mount-gem-28",
+        *(
+            pytest.param(name, marks=pytest.mark.all_seeds)
+            for name in ("cold-cold", "free-form-pins", "free-form-pocket", "l-shape", "tracked-robot")
+        ),
+    ],
+)
+def test_identified_errors_scatter_about_the_true_ones_as_their_uncertainty_says(name: str) -> None:
+    pattern = read_campaign(EXAMPLES / name)
+    method = campaign_method(pattern)
+    likeness = Likeness(pattern, method)
+    local, count = likeness.solution.local.copy(), len(likeness.problem.base_names)
+    free = likeness.solution.local_free[:, :count]
+    rng = np.random.default_rng(5)
+    local[:, :count] += np.where(free, rng.normal(0.0, 2e-5, count), 0.0)
+    fitted = method.identify(likeness.campaign_with(local, rng))
+    deviations = np.array([run.estimate for run in fitted.runs]) - local[:, :count]
+    covariances = np.array([run.covariance for run in fitted.runs])
+    chi_square, degrees = 0.0, 0
+    for row, deviation, covariance in zip(free, deviations, covariances, strict=True):
+        solved = np.linalg.solve(covariance[np.ix_(row, row)], deviation[row])
+        chi_square += float(deviation[row] @ solved)
+        degrees += int(row.sum())
+    # Five standard deviations of chi-square: its variance is twice its degrees of freedom.
+    assert abs(chi_square - degrees) < 5.0 * np.sqrt(2.0 * degrees) + 5.0
+
+
+def test_months_drift_steps_and_scatter_are_those_asked_for(tmp_path: Path) -> None:
+    request = LikeRequest(
+        tmp_path / "shop", str(EXAMPLES / "tilting-table"), ("A", "B"), START, months=3,
+        drifts=(Drift("EY0A", 0.5),), events=(Step(date(2024, 2, 15), "EB0C", -7.0, "B"),), steady=True, seed=3,
+    )  # fmt: skip
+    answer = simulate_like(request)
+    names = [f"{machine}-2024-0{month}" for machine in "AB" for month in (1, 2, 3)]
+    assert [Path(folder).name for folder in answer.folders] == names
+    assert sorted(path.name for path in (tmp_path / "shop").iterdir()) == [*names, "truth.csv"]
+    with Path(answer.truth).open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    first_runs = {
+        (row["campaign"], row["parameter"]): float(row["value"])
+        for row in reversed(rows)
+        if row["parameter"] in ("EY0A", "EB0C", "EX0A")
+    }
+    # 31 January, 29 February and 31 March: 0, 29 and 60 days of 30.436875 a month.
+    for machine in "AB":
+        drift = [first_runs[f"{machine}-2024-0{month}", "EY0A"] for month in (1, 2, 3)]
+        assert np.diff(drift) == pytest.approx([0.5 * 29 / 30.436875, 0.5 * 31 / 30.436875], abs=1e-9)
+        still = [first_runs[f"{machine}-2024-0{month}", "EX0A"] for month in (1, 2, 3)]
+        assert still == pytest.approx([still[0]] * 3, abs=1e-9)
+    stepped = [first_runs[name, "EB0C"] for name in names]
+    assert np.diff(stepped) == pytest.approx([0, 0, 0, -7, 0], abs=1e-9)
+    made = read_campaign(Path(answer.folders[4]))
+    pattern = read_campaign(EXAMPLES / "tilting-table")
+    assert (made.machine.id, made.runs[0].started_at.date()) == ("B", date(2024, 2, 29))
+    assert made.runs[0].started_at.timetz() == pattern.runs[0].started_at.timetz()
+    np.testing.assert_array_equal(made.probings.target, pattern.probings.target)
+    np.testing.assert_array_equal(made.probings.readings["A"], pattern.probings.readings["A"])
+    assert np.abs(made.probings.readings["X"] - pattern.probings.readings["X"]).max() < 0.1
+    again = simulate_like(LikeRequest(**{**vars(request), "out": tmp_path / "again"}))
+    for ours, theirs in zip(answer.folders, again.folders, strict=True):
+        for file in ("campaign.toml", "runs.csv", "probings.csv"):
+            assert (Path(ours) / file).read_bytes() == (Path(theirs) / file).read_bytes()
+
+
+def test_a_hidden_effect_moves_a_row_by_its_peak() -> None:
+    likeness = Likeness(*(lambda c: (c, campaign_method(c)))(read_campaign(EXAMPLES / "tilting-table")))
+    problem, common = likeness.hidden("EXX:reversal", 4e-3)
+    pose = problem.evaluated(likeness.solution.local, common)
+    bare = likeness.problem.evaluated(likeness.solution.local, np.zeros(0))
+    moved = np.linalg.norm(pose.residual - bare.residual, axis=1)
+    assert moved.max() == pytest.approx(4e-3, rel=1e-3)
+    with pytest.raises(EffectError, match="there is no shape"):
+        likeness.hidden("EXX:nope", 1.0)
+
+
+def test_what_cannot_be_simulated_is_refused(tmp_path: Path) -> None:
+    like = str(EXAMPLES / "tilting-table")
+    with pytest.raises(InputError, match="there is no machine 'C' among those asked for; there are A, B"):
+        LikeRequest(tmp_path / "x", like, ("A", "B"), START, drifts=(Drift("EY0A", 1.0, "C"),))
+    with pytest.raises(InputError, match="has no parameter 'EY0a'; did you mean 'EY0A'"):
+        simulate_like(LikeRequest(tmp_path / "x", like, ("A",), START, drifts=(Drift("EY0a", 1.0),)))
+    with pytest.raises(InputError, match="is a curve, which has no machine"):
+        simulate_like(LikeRequest(tmp_path / "x", str(EXAMPLES / "load-cell"), ("A",), START))
+    with pytest.raises(InputError, match="--months 0: 1 or more"):
+        LikeRequest(tmp_path / "x", like, ("A",), START, months=0)
+    with pytest.raises((DataError, InputError), match=r"--peak 3 needs --effect"):
+        LikeRequest(tmp_path / "x", like, ("A",), START, peak_um=3.0)
+    assert list(tmp_path.iterdir()) == []
