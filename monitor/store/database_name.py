@@ -56,6 +56,9 @@ def check_database_name(path: str) -> None:
 
 def _first_bytes(path: str) -> bytes:
     try:
+        # Opening a pipe waits for somebody who writes; it is refused where the database is opened.
+        if not Path(path).is_file():
+            return b""
         with Path(path).open("rb") as stream:
             return stream.read(len(_SQLITE))
     except (OSError, ValueError):
