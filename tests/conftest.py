@@ -62,9 +62,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish() -> None:
-    """Look for rubbish rarely: after every 700 new objects, as Python does it, that was a third of the processor time.
+    """Search for rubbish rarely: Python does it after every 700 new objects, and a page laid out makes some 10^5.
 
-    What the modules of the tests hold lives until the end, so it is not searched at all.
+    What the modules of the tests hold lives until the end, so it is not searched at all. The tests of the workflow took
+    303 s of processor time with this, 318 s without.
     """
     gc.collect()
     gc.freeze()
