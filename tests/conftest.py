@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import importlib.util
 import os
 import sys
@@ -59,17 +58,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     all_seeds = config.getoption("--all-seeds")
     config.hook.pytest_deselected(items=[item for item in items if not is_run(item)])
     items[:] = filter(is_run, items)
-
-
-def pytest_collection_finish() -> None:
-    """Search for rubbish rarely: Python does it after every 700 new objects, and a page laid out makes some 10^5.
-
-    What the modules of the tests hold lives until the end, so it is not searched at all. The tests of the workflow took
-    303 s of processor time with this, 318 s without.
-    """
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(100_000, 20, 20)
 
 
 @pytest.fixture(scope="session")
