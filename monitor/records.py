@@ -36,6 +36,13 @@ class ValidationVerdict(StrEnum):
     UNDECIDED = "undecided"
 
 
+class Verdict(StrEnum):
+    """Whether a model explains the measurements."""
+
+    EXPLAINED = "explained"
+    SOMETHING_IS_MISSING = "something is missing"
+
+
 @dataclass(frozen=True)
 class AxisSettings:
     """What the machine file says of one axis; None where it says nothing.

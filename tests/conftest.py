@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import ModuleType
 
@@ -63,6 +64,27 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def seeds(pytestconfig: pytest.Config) -> Callable[[int, int], range]:
     """``seeds(600, 60)``: numbers for a rate over 600 in ``make trials``, over the first 60 in ``make test``."""
     return lambda count, sample: range(count if pytestconfig.getoption("--all-seeds") else sample)
+
+
+@pytest.fixture(scope="session")
+def pdf_unread() -> Callable[[], AbstractContextManager[None]]:
+    """``with pdf_unread():`` around certificates and reports of which nobody reads the PDF.
+
+    Layout takes a second of processor time each. The template is filled in as ever, with all its refusals, and the page
+    as HTML stands where the PDF would. Reports of several machines may lay out theirs in other processes.
+    """
+
+    def page(html: str, **_: object) -> bytes:
+        return html.encode()
+
+    @contextmanager
+    def unread() -> Iterator[None]:
+        with pytest.MonkeyPatch.context() as patch:
+            for room in ("pdf", "health"):
+                patch.setattr(f"monitor.reporting.{room}.render.pdf_of", page)
+            yield
+
+    return unread
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ from monitor.cli import output
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.records import FrameOfReference
 from monitor.reporting.frames import frame_words
-from monitor.workflow.explain.curve_sentences import correlation
+from monitor.workflow.explain.correlation_words import correlation
 from monitor.workflow.identify.answer import CurveRun, Estimate, IdentifyAnswer, MachineRun, StepwiseAnswer
 
 # A screen holds so many runs beside the names of the parameters.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from monitor.cli import output
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
-from monitor.workflow.explain.curve_sentences import correlation
+from monitor.workflow.explain.correlation_words import correlation
 
 
 def four_digits(value: float | None) -> str:

@@ -12,7 +12,7 @@ from monitor.discovery.machine.missing import ChainMissing
 from monitor.discovery.machine.mistakes import find_mistakes, find_other_names, is_gross
 from monitor.discovery.machine.robust import RobustFit, robust_fit
 from monitor.discovery.machine.version_error import VersionError, version_error
-from monitor.discovery.search.comparison import Verdict
+from monitor.records import Verdict
 
 __all__ = [
     "ChainComparison",

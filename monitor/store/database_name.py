@@ -57,6 +57,7 @@ def check_database_name(path: str) -> None:
 def _first_bytes(path: str) -> bytes:
     """The first bytes of a file; none of a pipe or device, which would be waited for."""
     try:
+        # Opening a pipe waits for somebody who writes; it is refused where the database is opened.
         if not Path(path).is_file():
             return b""
         with Path(path).open("rb") as stream:

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 
-from monitor.discovery.curve.catalogue import catalogue as curve_catalogue
 from monitor.documents import INLINED, OMITTED
 from monitor.effects import ParsedEffect
 from monitor.effects.catalogue import catalogue, drivers_of, of_balls, of_tracker
@@ -18,6 +17,7 @@ from monitor.exceptions import InputError
 from monitor.machine import parse_topology
 from monitor.methods import campaign_method
 from monitor.methods.chain.base_effects import base_effects
+from monitor.methods.curve.catalogue import catalogue as curve_catalogue
 from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import CurveProblem, grid
 from monitor.methods.curve.problem import problem_of as curve_problem_of

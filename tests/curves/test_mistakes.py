@@ -10,12 +10,11 @@ import pytest
 
 from monitor.discovery.curve.compare import compare_curve
 from monitor.discovery.curve.explain import explain_curve
-from monitor.discovery.search.comparison import Verdict
 from monitor.exceptions import CampaignError
 from monitor.methods.curve.fit import fit
 from monitor.methods.curve.problem import problem_of
 from monitor.readers import read_campaign
-from monitor.records import CurveCampaign, Instrument
+from monitor.records import CurveCampaign, Instrument, Verdict
 from monitor.workflow.explain.curve_answer import curve_explanation
 
 HOURS = np.arange(240.0)

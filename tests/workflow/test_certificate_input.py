@@ -21,8 +21,8 @@ LABORATORY = EXAMPLES / "laboratory.toml"
 DAY = date(2026, 3, 12)
 
 
-def test_the_run_may_be_left_out_where_there_is_one_only(tmp_path: Path) -> None:
-    with Database(tmp_path / "c.duckdb") as db:
+def test_the_run_may_be_left_out_where_there_is_one_only(tmp_path: Path, pdf_unread) -> None:
+    with Database(tmp_path / "c.duckdb") as db, pdf_unread():
         import_folders(db, ImportRequest([EXAMPLES / "tilting-table-compensated", EXAMPLES / "five-days"]))
         made = issue(
             db,

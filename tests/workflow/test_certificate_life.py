@@ -144,14 +144,15 @@ def test_a_signed_certificate_is_verified_check_by_check(db: Database, key: File
 
 
 def test_17025_7_8_8_a_withdrawn_draft_and_a_withdrawn_certificate_stay_what_they_are(
-    db: Database, tmp_path: Path
+    db: Database, tmp_path: Path, pdf_unread
 ) -> None:
-    issue(
-        db,
-        CertificateRequest(
-            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="W-1", issued_on=DAY, draft=True
-        ),
-    )
+    with pdf_unread():
+        issue(
+            db,
+            CertificateRequest(
+                "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="W-1", issued_on=DAY, draft=True
+            ),
+        )
     withdraw(db, WithdrawalRequest("W-1", "was only a try"))
     for number in ("W-1",):
         with pytest.raises(InputError, match=f"certificate {number} is withdrawn; that is final"):
@@ -300,11 +301,11 @@ def killed(*_: object, **__: object) -> None:
 
 
 def test_stopped_before_the_entry_no_file_bears_the_name_of_a_certificate(
-    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pdf_unread
 ) -> None:
     before = set(list_certificates(db)["number"])
     monkeypatch.setattr(certificates, "save_certificate", killed)
-    with pytest.raises(Killed, match="here"):
+    with pytest.raises(Killed, match="here"), pdf_unread():
         issue(
             db,
             CertificateRequest(
@@ -333,14 +334,17 @@ def test_stopped_behind_the_entry_the_database_gives_the_document_back(
 
 
 def test_a_file_that_cannot_get_its_name_says_where_the_certificate_is(
-    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pdf_unread
 ) -> None:
     def full(self: Path, target: Path) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(
-        InputError, match=r"certificate K-3 is in the database, .*`monitor certificate show K-3 --pdf"
+    with (
+        pytest.raises(
+            InputError, match=r"certificate K-3 is in the database, .*`monitor certificate show K-3 --pdf"
+        ),
+        pdf_unread(),
     ):
         issue(
             db,

@@ -55,7 +55,9 @@ def adjusted(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     return place
 
 
-def test_17025_7_8_4_1_d_results_as_found_and_as_left(db: Database, adjusted: Path, tmp_path: Path) -> None:
+def test_17025_7_8_4_1_d_results_as_found_and_as_left(
+    db: Database, adjusted: Path, tmp_path: Path, pdf_unread
+) -> None:
     german = adjusted.name == "laboratory-de.toml"
     made = issue(
         db, CertificateRequest("five-days", 10, laboratory=adjusted, out=tmp_path, issued_on=DAY, as_left=20)
@@ -71,9 +73,10 @@ def test_17025_7_8_4_1_d_results_as_found_and_as_left(db: Database, adjusted: Pa
     assert record.performed_on == (date(2026, 3, 4), date(2026, 3, 9))
     # Each state has its own numbers, those of a certificate of its run alone.
     for run, part in ((10, found), (20, left)):
-        alone = issue(
-            db, CertificateRequest("five-days", run, laboratory=adjusted, out=tmp_path, issued_on=DAY)
-        )
+        with pdf_unread():
+            alone = issue(
+                db, CertificateRequest("five-days", run, laboratory=adjusted, out=tmp_path, issued_on=DAY)
+            )
         single = from_document(
             CertificateRecord, load_certificate(db, alone.certificate.number).record
         ).results
@@ -103,20 +106,23 @@ def test_17025_7_8_4_1_d_results_as_found_and_as_left(db: Database, adjusted: Pa
     assert verify_file(db, VerificationRequest(Path(again.file))).ok is True
 
 
-def test_results_as_left_may_stand_alone(db: Database, adjusted: Path, tmp_path: Path) -> None:
-    made = issue(
-        db,
-        CertificateRequest("five-days", None, laboratory=adjusted, out=tmp_path, issued_on=DAY, as_left=20),
-    )
+def test_results_as_left_may_stand_alone(db: Database, adjusted: Path, tmp_path: Path, pdf_unread) -> None:
+    with pdf_unread():
+        made = issue(
+            db,
+            CertificateRequest(
+                "five-days", None, laboratory=adjusted, out=tmp_path, issued_on=DAY, as_left=20
+            ),
+        )
+        again = amend(
+            db,
+            AmendmentRequest(
+                made.certificate.number, "wrong customer", laboratory=adjusted, out=tmp_path, issued_on=DAY
+            ),
+        )
     record = from_document(CertificateRecord, load_certificate(db, made.certificate.number).record)
     assert record.results is not None
     assert [one.state for one in record.results] in (["as left"], ["wie hinterlassen"])
-    again = amend(
-        db,
-        AmendmentRequest(
-            made.certificate.number, "wrong customer", laboratory=adjusted, out=tmp_path, issued_on=DAY
-        ),
-    )
     record = from_document(CertificateRecord, load_certificate(db, again.certificate.number).record)
     assert record.results is not None
     assert [one.state for one in record.results] in (["as left"], ["wie hinterlassen"])

@@ -28,7 +28,7 @@ AS_STORED = ["show certificate.record[]: typing.Any"]
 BESIDES_QUESTIONS = {
     "demo:examples_folder",  # the demo types the verbs of the command line itself
     "demo:fresh_database",
-    "explain.curve_sentences:correlation",  # a sentence that two verbs print
+    "explain.correlation_words:correlation",  # a sentence that two verbs print
     "history.agreement:sentence",
     "history.weekly_looks:sentence",
     "health.mail:mail_report",  # sends what was written; nothing is asked

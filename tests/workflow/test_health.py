@@ -199,11 +199,14 @@ def test_a_week_without_runs_says_so(fleet: Database, tmp_path: Path) -> None:
     assert "No machine was measured in this week." in text_of(found["files"][1])[0]
 
 
-def test_a_machine_left_in_alarm_and_not_measured_since_is_told_so(fleet: Database, tmp_path: Path) -> None:
+def test_a_machine_left_in_alarm_and_not_measured_since_is_told_so(
+    fleet: Database, tmp_path: Path, pdf_unread
+) -> None:
     late = datetime.fromisoformat("2026-03-24T06:00:00+00:00")
-    (before,) = report(fleet, "2026-W11", "A quiet one", tmp_path, made_at=late)["machines"]
+    with pdf_unread():
+        (before,) = report(fleet, "2026-W11", "A quiet one", tmp_path, made_at=late)["machines"]
+        (row,) = report(fleet, "2026-W12", "A quiet one", tmp_path, made_at=late)["machines"]
     assert before["state"] == "out of tolerance"
-    (row,) = report(fleet, "2026-W12", "A quiet one", tmp_path, made_at=late)["machines"]
     assert row["state"] == "not measured"
     assert row["changed"].endswith("(campaign-A quiet one), when it was reported as: out of tolerance")
 
@@ -250,12 +253,13 @@ def test_parts_bound_what_is_laid_out_at_a_time(fleet: Database, week10: dict, m
 
 
 def test_campaigns_that_one_machine_cannot_have_made_at_once_are_not_mixed(
-    tmp_path: Path, make_folder: Callable[..., Path]
+    tmp_path: Path, make_folder: Callable[..., Path], pdf_unread
 ) -> None:
     with Database(tmp_path / "two.duckdb", threads=1) as db:
         for example in ("five-days", "hidden-reversal-x"):
             import_campaign(db, read_campaign(EXAMPLES / example))
-        found = report(db, "2026-W10", out=tmp_path, made_at=MADE)
+        with pdf_unread():
+            found = report(db, "2026-W10", out=tmp_path, made_at=MADE)
         (row,) = found["machines"]
         health = stored(db, "HU40-T")
         assert "campaign five-days" in health.run
@@ -278,19 +282,20 @@ def test_campaigns_that_one_machine_cannot_have_made_at_once_are_not_mixed(
 
 
 def test_fail_on_alarm_is_exit_status_1_and_json_is_one_document(
-    fleet: Database, week10: dict, tmp_path: Path, capsys
+    fleet: Database, week10: dict, tmp_path: Path, capsys, pdf_unread
 ) -> None:
     copy = tmp_path / "copy.duckdb"
     from monitor.store import take_backup
 
     take_backup(fleet, copy)
     arguments = ["--db", str(copy), "report", "--week", "2026-W10", "--out", str(tmp_path), "--json"]
-    assert main([*arguments, "--fail-on-alarm", "--machine", "A quiet one"]) == 1
-    assert json.loads(capsys.readouterr().out)["alarms"] == ["A quiet one"]
-    assert main([*arguments, "--fail-on-alarm", "--machine", "C-february"]) == 0
-    assert json.loads(capsys.readouterr().out)["alarms"] == []
-    assert main([*arguments, "--machine", "A quiet one"]) == 0
-    capsys.readouterr()
+    with pdf_unread():
+        assert main([*arguments, "--fail-on-alarm", "--machine", "A quiet one"]) == 1
+        assert json.loads(capsys.readouterr().out)["alarms"] == ["A quiet one"]
+        assert main([*arguments, "--fail-on-alarm", "--machine", "C-february"]) == 0
+        assert json.loads(capsys.readouterr().out)["alarms"] == []
+        assert main([*arguments, "--machine", "A quiet one"]) == 0
+        capsys.readouterr()
     assert main(["--db", str(copy), "report", "--week", "2026-W60"]) == 2
     assert "write a year and a week of it" in capsys.readouterr().err
 
@@ -418,7 +423,7 @@ def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_wi
 
 
 def test_a_report_made_late_says_what_one_made_on_monday_said(
-    week10: dict, fleet: Database, tmp_path: Path, make_folder: Callable[..., Path]
+    week10: dict, fleet: Database, tmp_path: Path, make_folder: Callable[..., Path], pdf_unread
 ) -> None:
     # The same campaign cut off at the week's end: runs 17 to 20 were not yet made.
     folder = make_folder("five-days", "B-stepped", WIDE)
@@ -431,9 +436,11 @@ def test_a_report_made_late_says_what_one_made_on_monday_said(
         record_event(
             db, "B-stepped", datetime.fromisoformat("2026-03-04T18:00:00-05:00"), "repair", "C axis brake changed"
         )  # fmt: skip
-        report(db, "2026-W10", out=tmp_path, made_at=MADE)
+        with pdf_unread():
+            report(db, "2026-W10", out=tmp_path, made_at=MADE)
         then = stored(db, "B-stepped")
-    report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
+    with pdf_unread():
+        report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
     late = stored(fleet, "B-stepped")
     assert [one.u for one in late.parameters] == pytest.approx([one.u for one in then.parameters], rel=1e-9)
     assert late.factor == then.factor
@@ -445,12 +452,15 @@ def test_a_report_made_late_says_what_one_made_on_monday_said(
     # The whole campaign's own result is another, and is left alone.
     whole = uncertainty(fleet, UncertaintyRequest("campaign-B-stepped", 16, method="guf"))
     assert whole.input_covariance == "repeated runs, pooled by day, 15 degrees of freedom"
-    report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
+    with pdf_unread():
+        report(fleet, "2026-W10", "B-stepped", tmp_path, made_at=MADE)
     assert stored(fleet, "B-stepped").basis == then.basis
 
 
-def test_a_first_report_has_the_whole_history_though_nothing_of_it_was_identified(tmp_path: Path) -> None:
-    with Database(tmp_path / "first.duckdb", threads=1) as db:
+def test_a_first_report_has_the_whole_history_though_nothing_of_it_was_identified(
+    tmp_path: Path, pdf_unread
+) -> None:
+    with Database(tmp_path / "first.duckdb", threads=1) as db, pdf_unread():
         for example in ("cold-cold", "five-days"):
             import_campaign(db, read_campaign(EXAMPLES / example))
         report(db, "2026-W10", out=tmp_path, made_at=MADE)

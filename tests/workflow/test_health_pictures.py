@@ -149,11 +149,13 @@ def test_the_same_pictures_stand_in_html_and_pdf_and_are_small(fleet: Database, 
 
 
 def test_after_the_effect_was_added_the_page_shows_how_far_the_error_fell(
-    fleet: Database, made: dict, tmp_path: Path
+    fleet: Database, made: dict, tmp_path: Path, pdf_unread
 ) -> None:
     add_effect(fleet, AddEffectRequest("EXX:reversal", "samba", "samba-2"))
     machine = "M-hidden-reversal-x"
-    found = report(fleet, "2026-W10", machine, tmp_path, options=ReportOptions(model="samba-2"), made_at=MADE)
+    options = ReportOptions(model="samba-2")
+    with pdf_unread():
+        found = report(fleet, "2026-W10", machine, tmp_path, options=options, made_at=MADE)
     model = page_of(fleet, machine).model
     assert model is not None
     assert model.where is None
@@ -188,14 +190,15 @@ def test_pictures_take_any_numbers_without_a_fault(fleet: Database, made: dict) 
 
 
 def test_a_refused_import_stands_on_its_machines_page_or_on_the_first(
-    fleet: Database, made: dict, tmp_path: Path
+    fleet: Database, made: dict, tmp_path: Path, pdf_unread
 ) -> None:
     at = datetime.fromisoformat("2026-03-04T11:00:00+01:00")
     machine = "M-nothing-hidden"
     record_refusal(fleet, "/in/late", ["probings.csv, line 7: <bad>", "b", "c", "d"], machine=machine, at=at)
     record_refusal(fleet, "/in/unknown", ["campaign.toml: the file is missing"], at=at)
     record_refusal(fleet, "/in/next-week", ["x"], machine=machine, at=at.replace(day=9))
-    found = report(fleet, "2026-W10", out=tmp_path, made_at=MADE)
+    with pdf_unread():
+        found = report(fleet, "2026-W10", out=tmp_path, made_at=MADE)
     (elsewhere,) = found["refused_imports"]
     assert (elsewhere["folder"], elsewhere["machine"], elsewhere["imported_at"]) == (
         "/in/unknown",
@@ -215,10 +218,10 @@ def test_a_refused_import_stands_on_its_machines_page_or_on_the_first(
     assert "/in/late" not in first
 
 
-def test_a_refusal_that_was_settled_is_marked_and_no_longer_news(tmp_path: Path) -> None:
+def test_a_refusal_that_was_settled_is_marked_and_no_longer_news(tmp_path: Path, pdf_unread) -> None:
     folder = folder_of("nothing-hidden", tmp_path, "M1")
     good = (folder / "runs.csv").read_bytes()
-    with Database(tmp_path / "one.duckdb", threads=1) as db:
+    with Database(tmp_path / "one.duckdb", threads=1) as db, pdf_unread():
         (folder / "runs.csv").write_bytes(good.replace(b"true", b"perhaps").replace(b"false", b"perhaps"))
         with pytest.raises(CampaignError, match="perhaps"):
             import_folders(db, ImportRequest([folder]))

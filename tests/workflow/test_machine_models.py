@@ -127,7 +127,7 @@ def test_refusals(worn):
         add_effect(worn, AddEffectRequest("EQQ:reversal", "samba", "wrong"))
 
 
-def test_the_weekly_report_follows_the_added_effect(worn, tmp_path):
+def test_the_weekly_report_follows_the_added_effect(worn, tmp_path, pdf_unread):
     from datetime import date, datetime
 
     from monitor.workflow.health.report import report, stored_health
@@ -137,7 +137,10 @@ def test_the_weekly_report_follows_the_added_effect(worn, tmp_path):
     ((started,),) = worn.rows("SELECT max(started_at) FROM run")
     day: date = started.date()
     week = f"{day.isocalendar().year}-W{day.isocalendar().week:02d}"
-    report(worn, ReportRequest(week=week, machine="V", out=tmp_path, workers=1, made_at=datetime(2027, 6, 1)))
+    with pdf_unread():
+        report(
+            worn, ReportRequest(week=week, machine="V", out=tmp_path, workers=1, made_at=datetime(2027, 6, 1))
+        )
     ((stored,),) = worn.rows("SELECT max(analysis_id) FROM analysis WHERE kind = 'health'")
     health = stored_health(worn, stored)
     (backlash,) = [parameter for parameter in health.parameters if parameter.name == BACKLASH]

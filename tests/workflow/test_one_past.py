@@ -42,8 +42,9 @@ def stepped(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
         yield db
 
 
-def reported(db: Database, week: str, out: Path):
-    answer = report(db, ReportRequest(week, out=out, made_at=MADE))
+def reported(db: Database, week: str, out: Path, pdf_unread):
+    with pdf_unread():
+        answer = report(db, ReportRequest(week, out=out, made_at=MADE))
     # Of weekly looks it says what page and fleet table say of that week.
     page = trend(db, TrendRequest("HU40-T", weekly_looks=True)).weekly_looks
     table = fleet(db, FleetRequest(top=1, weekly_looks=True)).weekly_looks
@@ -54,11 +55,13 @@ def reported(db: Database, week: str, out: Path):
     return stored_health(db, number)
 
 
-def test_the_reset_of_the_b_axis_is_one_change_for_page_and_report(stepped: Database, tmp_path: Path) -> None:
+def test_the_reset_of_the_b_axis_is_one_change_for_page_and_report(
+    stepped: Database, tmp_path: Path, pdf_unread
+) -> None:
     page = trend(stepped, TrendRequest("HU40-T"))
     assert (page.false_alarm, page.seed) == (FALSE_ALARM, SEED) == (0.01, 20260302)
     # The last runs were in week 11: a report of week 10 has not seen them yet.
-    health = reported(stepped, "2026-W11", tmp_path)
+    health = reported(stepped, "2026-W11", tmp_path, pdf_unread)
     past = machine_past(machine_history(stepped, "HU40-T", model="samba"), [])
     on_page = {name: parameter.changes for name, parameter in page.parameters.items() if parameter.changes}
     assert set(on_page) == {"EB0C"}
@@ -81,10 +84,10 @@ def test_the_reset_of_the_b_axis_is_one_change_for_page_and_report(stepped: Data
     assert parameter.drift is None
 
 
-def test_last_values_are_those_of_the_last_day(stepped: Database, tmp_path: Path) -> None:
+def test_last_values_are_those_of_the_last_day(stepped: Database, tmp_path: Path, pdf_unread) -> None:
     page = trend(stepped, TrendRequest("HU40-T"))
     table = {row.parameter: row for row in fleet(stepped, FleetRequest(top=0)).table}
-    health = reported(stepped, "2026-W11", tmp_path)
+    health = reported(stepped, "2026-W11", tmp_path, pdf_unread)
     history = machine_history(stepped, "HU40-T")
     for name, parameter in page.parameters.items():
         assert table[name].latest == pytest.approx(parameter.mean.latest, rel=1e-12, abs=1e-12)
@@ -97,7 +100,7 @@ def test_last_values_are_those_of_the_last_day(stepped: Database, tmp_path: Path
         assert stated.estimate == pytest.approx(stated.history.values[-1], rel=1e-9)
 
 
-def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path) -> None:
+def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path, pdf_unread) -> None:
     with Database(path, threads=1) as db:
         # The past weeks were written by SQL: that each of their runs was identified is written, too.
         db.execute(
@@ -107,7 +110,7 @@ def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path) -> None:
         page = trend(db, TrendRequest("HU40-T"))
         ((last,),) = db.rows("SELECT max(started_at_local) FROM v_runs")
         week = f"{last.isocalendar().year}-W{last.isocalendar().week:02d}"
-        health = reported(db, week, tmp_path)
+        health = reported(db, week, tmp_path, pdf_unread)
     stated = {parameter.name: parameter for parameter in health.parameters}
     compared = 0
     for name, parameter in page.parameters.items():
@@ -147,8 +150,10 @@ def test_fleet_and_page_fit_the_same_line_where_days_are_alike(tmp_path: Path) -
         assert row.latest == pytest.approx(parameter.mean.latest, rel=1e-12)
 
 
-def test_a_report_of_an_earlier_week_knows_what_was_known_then(stepped: Database, tmp_path: Path) -> None:
-    health = reported(stepped, "2026-W10", tmp_path)
+def test_a_report_of_an_earlier_week_knows_what_was_known_then(
+    stepped: Database, tmp_path: Path, pdf_unread
+) -> None:
+    health = reported(stepped, "2026-W10", tmp_path, pdf_unread)
     history = machine_history(stepped, "HU40-T", model="samba")
     before = [at.replace(tzinfo=None) < datetime(2026, 3, 9) for at in history.started_at]
     past = machine_past(history.part(np.array(before)), [])

@@ -12,9 +12,7 @@ from monitor.cli.parser import common, described
 from monitor.cli.residual_output import files, four_digits
 from monitor.workflow.explain.request import HistoryRequest
 from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
-from monitor.workflow.explain.versions import history
 from monitor.workflow.model.answer import AffectedAnswer, ChangeModelAnswer
-from monitor.workflow.model.change import add_effect, affected, remove_effect
 from monitor.workflow.model.request import (
     AddEffectRequest,
     RemoveEffectRequest,
@@ -117,6 +115,9 @@ def _show(options: Namespace) -> int:
 
 
 def _add(options: Namespace) -> int:
+    # What fits a model takes a third of a second to load: `model list` and `model show` do without it.
+    from monitor.workflow.model.change import add_effect, affected
+
     request = AddEffectRequest(options.effect, options.to, options.as_, options.note, options.campaign)
     with opened(options) as db:
         changed = affected(db, request)
@@ -168,6 +169,8 @@ def _use(options: Namespace) -> int:
 
 
 def _remove(options: Namespace) -> int:
+    from monitor.workflow.model.change import remove_effect
+
     with opened(options) as db:
         answer = remove_effect(db, RemoveEffectRequest(options.effect, options.from_, options.as_))
     return _changed(answer, options.json)
@@ -189,6 +192,8 @@ def _changed(answer: ChangeModelAnswer, as_json: bool) -> int:
 
 
 def _history(options: Namespace) -> int:
+    from monitor.workflow.explain.versions import history
+
     with opened(options) as db, output.working("fitting every version"):
         answer = history(db, HistoryRequest(options.name, options.campaign, options.figures))
     if options.json:

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from monitor.discovery.curve.candidates import at_best_value
-from monitor.discovery.curve.catalogue import POWERS
 from monitor.discovery.curve.noise_evidence import HALF, NoiseEvidence
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene
 from monitor.discovery.search.acceptance import Acceptance, lowers_held_out_error
@@ -18,6 +17,7 @@ from monitor.discovery.search.evidence import Evidence, Pool, weigh_beside
 from monitor.discovery.search.projection import orthonormal_to_full_precision, without
 from monitor.discovery.search.scene import family_count
 from monitor.effects.curve import SEARCHED, CurveEffect
+from monitor.methods.curve.catalogue import POWERS
 from monitor.records import Array
 
 #: Fewer cycles than these over the range of an input can be a bend.

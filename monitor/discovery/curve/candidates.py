@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from monitor.discovery.curve.catalogue import catalogue
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene, WhitenedCurve, variant_of
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.effects.curve import CurveEffect, group_names
+from monitor.methods.curve.catalogue import catalogue
 from monitor.methods.curve.problem import SHORTEST_CONSTANT, CurveProblem, grid
 from monitor.records import Array
 

@@ -20,7 +20,6 @@ from monitor.discovery.search.comparison import (
     Comparison,
     LackOfFit,
     Part,
-    Verdict,
     excess_p_value,
     lack_of_fit_test,
     part_of,
@@ -29,6 +28,7 @@ from monitor.discovery.search.comparison import (
 )
 from monitor.effects.curve import SEQUENCE
 from monitor.methods.curve.fit import CurveFit
+from monitor.records import Verdict
 from monitor.statistics.noise import Assessed, assess
 
 # A breakdown by an input shows where it fails in so many parts of equal numbers of rows.

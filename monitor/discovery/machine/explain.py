@@ -38,11 +38,10 @@ from monitor.discovery.machine.variants import (
     without_part_periods,
 )
 from monitor.discovery.machine.varying import varying_effects
-from monitor.discovery.search.comparison import Verdict
 from monitor.discovery.search.scan import MOST_EFFECTS
 from monitor.effects.catalogue import catalogue
 from monitor.methods.chain.problem import ChainProblem
-from monitor.records import Campaign
+from monitor.records import Campaign, Verdict
 
 # Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
 MOST_ROUNDS = 4

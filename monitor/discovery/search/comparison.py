@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
 import scipy
 
-from monitor.records import Array
+from monitor.records import Array, Verdict
 
 # Lack of fit is significant below this p-value: one false alarm in a thousand campaigns, so that it adds little to
 # the scan's own one in a hundred.
@@ -22,13 +21,6 @@ LACK_OF_FIT_LEVEL = 1e-3
 # A standard uncertainty from ten observations is itself known to 24 % (JCGM 100:2008, table E.1), and few probes
 # were tested with more; what exceeds the statement by less than that is not significant.
 STATEMENT_TOLERANCE = 1.25
-
-
-class Verdict(StrEnum):
-    """Whether a model explains the measurements."""
-
-    EXPLAINED = "explained"
-    SOMETHING_IS_MISSING = "something is missing"
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from monitor.discovery import Verdict
 from monitor.documents import INLINED, OMITTED
+from monitor.records import Verdict
 from monitor.units import MICROMETRE
 from monitor.workflow.identify.answer import CurveNoise
 

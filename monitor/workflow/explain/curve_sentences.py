@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from monitor.discovery import Verdict
 from monitor.discovery.curve.explain import CurveExplanation
 from monitor.methods.curve.problem import problem_of
-from monitor.records import CurveCampaign
+from monitor.records import CurveCampaign, Verdict
 from monitor.workflow.explain.compare_answer import CurveComparison
+from monitor.workflow.explain.correlation_words import correlation
 from monitor.workflow.explain.explain_answer import CurveMissing
 from monitor.workflow.identify.answer import CurveNoise
 
@@ -18,14 +18,6 @@ from monitor.workflow.identify.answer import CurveNoise
 ROWS_A_SETTING = 4
 #: So many outliers, none further from the next than this, are a stretch of the series rather than single readings.
 FEWEST_TOGETHER, NEAR = 5, 3
-
-
-def correlation(noise: CurveNoise) -> str:
-    """The correlation of neighbouring rows, and how slowly it fades: what a mean is worth depends on both."""
-    neighbours = f"correlation {noise.lag_one:.2f}"
-    return (
-        f"{neighbours}, times {noise.slow:.2f} with each further row" if noise.lag_one > 0.0 else neighbours
-    )
 
 
 def curve_sentences(

@@ -12,7 +12,6 @@ import numpy as np
 from monitor.discovery import (
     Explanation,
     RobustFit,
-    Verdict,
     find_mistakes,
     find_other_names,
     is_gross,
@@ -24,7 +23,7 @@ from monitor.discovery.curve.explain import explain_curve
 from monitor.documents import to_document
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
-from monitor.records import Campaign, CurveCampaign
+from monitor.records import Campaign, CurveCampaign, Verdict
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.explain.compare import Draw

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from monitor.discovery import ChainComparison, ChainMissing, Explanation, Verdict
+from monitor.discovery import ChainComparison, ChainMissing, Explanation
 from monitor.discovery.machine.steps import Step
+from monitor.records import Verdict
 from monitor.units import DEGREE, MICROMETRE, Unit
 from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from monitor.discovery import Explanation, Mistake, Verdict
+from monitor.discovery import Explanation, Mistake
 from monitor.discovery.machine.explain import Limit
 from monitor.discovery.machine.suspects import MOST_BAD_POINTS
 from monitor.discovery.search.scan import MOST_EFFECTS
+from monitor.records import Verdict
 from monitor.units import MICROMETRE
 from monitor.workflow.explain.explain_answer import (
     ChangedParameter,

@@ -9,7 +9,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from monitor.discovery import Verdict
+from monitor.records import Verdict
 from monitor.reporting.health.records import (
     ALARMS,
     Change,

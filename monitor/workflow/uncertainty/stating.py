@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from monitor.discovery import Verdict, compare
+from monitor.discovery import compare
 from monitor.machine import Chain
 from monitor.methods.model import chain_of
-from monitor.records import Array
+from monitor.records import Array, Verdict
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import refused_parameters
