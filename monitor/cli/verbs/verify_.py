@@ -36,9 +36,7 @@ def run(options: Namespace) -> int:
         if answer.anchored_entry is not None:
             output.say(f"the hash kept elsewhere is that of entry {answer.anchored_entry}")
         if answer.recomputed:
-            output.say(
-                f"{answer.recomputed} of the identifications were computed anew from the stored readings"
-            )
+            output.say(f"identifications computed anew from the stored readings: {answer.recomputed}")
         verdict = "as it was written" if answer.ok else "NOT as it was written"
         output.say(
             f"{options.db} is {verdict}: {answer.entries} entries, the last with hash {answer.last_sha256}"
