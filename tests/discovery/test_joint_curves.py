@@ -12,7 +12,7 @@ from by_path import simulator
 
 from monitor.discovery import Fit, fit
 from monitor.discovery.machine.bad_poses import bad_poses
-from monitor.discovery.machine.explain import _variants
+from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.held_out import LeftOutBlocks, pose_blocks
 from monitor.discovery.machine.joint_curves import joint_curves
 from monitor.discovery.machine.surroundings import surroundings_of
@@ -60,7 +60,7 @@ def plain(campaign) -> Fit:
 
 
 def curves_of(campaign: Campaign, plain: Fit) -> dict[str, tuple[float, ...]]:
-    variants = _variants(campaign, plain.problem, surroundings_of(campaign, plain.problem).drivers)
+    variants = variants_of_campaign(campaign, plain.problem, surroundings_of(campaign, plain.problem).drivers)
     curves = {}
     for variant in joint_curves(plain, variants, 0.01):
         effect = variant.effect
