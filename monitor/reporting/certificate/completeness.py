@@ -12,7 +12,7 @@ from datetime import date
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.laboratory_keys import key_of
-from monitor.reporting.certificate.record import ITEMS, CertificateRecord
+from monitor.reporting.certificate.record import ITEMS, CertificateRecord, Standard
 from monitor.reporting.certificate.results import ResultSet
 
 #: What only a certificate that replaces another has to say.
@@ -88,23 +88,30 @@ def date_faults(record: CertificateRecord) -> tuple[str, ...]:
             faults.append(f"the item was received on {record.received_on}, after the calibration of {first}")
         if record.issued_on is not None and record.issued_on < last:
             faults.append(f"it was issued on {record.issued_on}, before the calibration of {last}")
-        for standard in record.standards or ():
-            if standard.issued_on is not None and standard.issued_on > first:
-                faults.append(
-                    f"the certificate of {standard.name} was issued on {standard.issued_on}, after the calibration "
-                    f"of {first}"
-                )
-            if isinstance(standard.valid_until, date) and standard.valid_until < last:
-                faults.append(
-                    f"the certificate of {standard.name} was valid until {standard.valid_until}, which is before the "
-                    f"calibration of {last}"
-                )
+        faults += [
+            fault for standard in record.standards or () for fault in _standard_faults(standard, first, last)
+        ]
     issued, old = record.issued_on, record.replaces
     if issued is not None and old is not None and old.issued_on is not None and issued < old.issued_on:
         faults.append(
             f"it replaces certificate {old.number} of {old.issued_on}, and was issued on {issued}, before it"
         )
     return tuple(faults)
+
+
+def _standard_faults(standard: Standard, first: date, last: date) -> list[str]:
+    """What cannot be true of a standard's dates for a calibration from ``first`` to ``last``."""
+    faults = []
+    if standard.issued_on is not None and standard.issued_on > first:
+        faults.append(
+            f"the certificate of {standard.name} was issued on {standard.issued_on}, after the calibration of {first}"
+        )
+    if isinstance(standard.valid_until, date) and standard.valid_until < last:
+        faults.append(
+            f"the certificate of {standard.name} was valid until {standard.valid_until}, which is before the "
+            f"calibration of {last}"
+        )
+    return faults
 
 
 def check_complete(record: CertificateRecord) -> None:

@@ -47,10 +47,8 @@ def residual_bars(
     counts = [max(len(labels), 3, _LEAST_SHARE * total) for labels, _ in bars.values()]
     say = texts_of()
     limit = math.inf if level_um is None else 2.0 * level_um
-    printed = [
-        _labelled(labels, 0.88 * width_mm * share / sum(counts))
-        for (labels, _), share in zip(bars.values(), counts, strict=True)
-    ]
+    panels_mm = [0.88 * width_mm * share / sum(counts) for share in counts]
+    printed = [_labelled(labels, room) for (labels, _), room in zip(bars.values(), panels_mm, strict=True)]
     lines = max(name.count("\n") for names in printed for name in names)
     with style():
         figure = new_figure(width_mm, height_mm + 3.4 * lines, title)

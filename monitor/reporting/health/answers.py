@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from monitor.reporting.health.records import (
@@ -78,40 +78,67 @@ def _urgency(parameter: ParameterHealth) -> tuple[float, float, float]:
 
 def reason(health: MachineHealth) -> str:
     """Return why a machine is in its state, in plain words with numbers."""
+    words = _REASONS.get(health.state, _nearest_limit)(health)
+    return _sentence(words or STATES[health.state])
+
+
+def _out(health: MachineHealth) -> str:
+    """What is beyond its tolerance, or may be: a parameter, the volumetric error, or both."""
+    parameter, error_map, sentences = concern(health), health.map, []
+    if parameter is not None and parameter.probability_out:
+        sentences.append(_beyond(parameter))
+    if error_map is not None and error_map.probability_out and error_map.limit_um is not None:
+        sentences.append(
+            f"the volumetric error reaches {error_map.worst_um:.1f} µm, its limit is "
+            f"{plain(error_map.limit_um)} µm (beyond it with a probability of {percent(error_map.probability_out)})"
+        )
+    return "; ".join(sentences)
+
+
+def _not_evaluated(health: MachineHealth) -> str:
+    return "; ".join(health.quality.remarks[:1])
+
+
+def _unexplained(health: MachineHealth) -> str:
+    """The effect that the model lacks; what `explain` answers where none is named."""
+    if health.model is None:
+        return ""
+    if not health.model.missing:
+        return health.model.answer
+    effect = health.model.missing[0]
+    size = "" if effect.peak_um is None else f", up to {effect.peak_um:.1f} µm"
+    return f"the measurements show what the model does not have: {effect.meaning} ({effect.effect}){size}"
+
+
+def _changed(health: MachineHealth) -> str:
+    what = "; ".join(change.what for change in health.changes if change.this_week and change.kind == "change")
     parameter = concern(health)
-    if health.state in ("out of tolerance", "may be out of tolerance"):
-        sentences = []
-        if parameter is not None and parameter.probability_out:
-            sentences.append(_beyond(parameter))
-        error_map = health.map
-        if error_map is not None and error_map.probability_out and error_map.limit_um is not None:
-            sentences.append(
-                f"the volumetric error reaches {error_map.worst_um:.1f} µm, its limit is "
-                f"{plain(error_map.limit_um)} µm (beyond it with a probability of {percent(error_map.probability_out)})"
-            )
-        return _sentence("; ".join(sentences) or STATES[health.state])
-    if health.state == "not evaluated":
-        return _sentence("; ".join(health.quality.remarks[:1]) or STATES["not evaluated"])
-    if health.state == "model fails" and health.model is not None:
-        missing = health.model.missing
-        size = f", up to {missing[0].peak_um:.1f} µm" if missing and missing[0].peak_um is not None else ""
-        return _sentence(
-            f"the measurements show what the model does not have: {missing[0].meaning} ({missing[0].effect}){size}"
-            if missing
-            else health.model.answer
-        )
-    if health.state == "changed":
-        what = "; ".join(
-            change.what for change in health.changes if change.this_week and change.kind == "change"
-        )
-        name = f" ({plain_name(parameter.name)})" if parameter is not None and parameter.name in what else ""
-        return _sentence(f"{what}{name}")
-    if health.state == "suspect data":
-        count = len(health.quality.suspect)
-        return _sentence(f"{count} bad point{'s' if count != 1 else ''}: {health.quality.suspect[0]}")
-    if parameter is not None and parameter.drift is not None and parameter.drift.p_value < _DRIFT_P:
-        return _sentence(f"{_stands(parameter)}{_moves(parameter, parameter.drift)}")
-    return _sentence(STATES[health.state])
+    name = f" ({plain_name(parameter.name)})" if parameter is not None and parameter.name in what else ""
+    return f"{what}{name}"
+
+
+def _suspect(health: MachineHealth) -> str:
+    suspect = health.quality.suspect
+    return f"{len(suspect)} bad point{'s' if len(suspect) != 1 else ''}: {suspect[0]}" if suspect else ""
+
+
+def _nearest_limit(health: MachineHealth) -> str:
+    """The parameter that drifts, where one does."""
+    parameter = concern(health)
+    if parameter is None or parameter.drift is None or parameter.drift.p_value >= _DRIFT_P:
+        return ""
+    return f"{_stands(parameter)}{_moves(parameter, parameter.drift)}"
+
+
+#: What says why a machine is in a state; of the others, what drifts.
+_REASONS: Mapping[State, Callable[[MachineHealth], str]] = {
+    "out of tolerance": _out,
+    "may be out of tolerance": _out,
+    "not evaluated": _not_evaluated,
+    "model fails": _unexplained,
+    "changed": _changed,
+    "suspect data": _suspect,
+}
 
 
 def _beyond(parameter: ParameterHealth) -> str:
