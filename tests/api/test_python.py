@@ -137,7 +137,7 @@ def test_wrong_names_are_answered_with_the_right_ones(db: mm.Database, tmp_path:
     ):
         db.trend("HU40-T", reliabilty=0.9)
     with pytest.raises(
-        InputError, match=r"^there is no question 'trends'; did you mean 'trend'\\? there are add effect, "
+        InputError, match=r"^there is no question 'trends'; did you mean 'trend'\? there are add effect, "
     ):
         db.ask("trends")
     with pytest.raises(NotFoundError, match=r"open\('.*none.duckdb', new=True\) makes one$"):
