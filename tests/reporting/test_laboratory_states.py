@@ -100,7 +100,7 @@ def test_a_mark_is_a_picture_of_its_kind(tmp_path: Path) -> None:
 def test_no_text_of_a_sample_passes_into_a_laboratorys_own_certificate(tmp_path: Path, name: str) -> None:
     sample = (EXAMPLES / name).read_text(encoding="utf-8")
     own = re.sub(r'^name = ".*?"', 'name = "Steel & Sons Metrology"', sample, count=1, flags=re.M)
-    with pytest.raises(InputError) as refusal:
+    with pytest.raises(InputError, match="is still that of the sample file") as refusal:
         read_laboratory(written(tmp_path, own))
     faults = str(refusal.value)
     # Every text that only a sample has is named; the file itself is the list.
