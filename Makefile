@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: challenge concurrency kills pages real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
+.PHONY: challenge concurrency kills manual pages real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -45,6 +45,11 @@ pages: setup  ## the pages in a real browser; pictures of every page in pages-ou
 	@sh tests/setup/browser.sh
 	@$(PYTEST) -n 0 tests/browser $(ARGS)
 
+manual: setup  ## the manual as a site in manual-output/, and every block of code of its pages
+	@$(RUN) -c 'import furo, latex2mathml, myst_parser, sphinx' 2>/dev/null || $(RUN) -m pip install --quiet --constraint constraints.txt furo latex2mathml myst-parser sphinx
+	@OMP_NUM_THREADS=1 $(RUN) docs/site/build.py
+	@$(IN_MEMORY) $(PYTEST) $(PARALLEL) --dist load tests/manual $(ARGS)
+
 trials: setup  ## slow trials over many seeds, an hour; their last results are in docs/trials-*.md
 	@$(PYTEST) $(PARALLEL) --all-seeds --timeout 3600
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
@@ -85,7 +90,7 @@ wheel-parts: setup
 	@$(RUN) tests/setup/installed_wheel.py tests/cli tests/readers tests/store tests/reporting tests/test_wheel.py $(PARALLEL) $(ARGS)
 
 clean:  ## remove what the others left, except the virtual environment
-	@rm -rf demo-output pages-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
+	@rm -rf demo-output manual-output pages-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
 	@find monitor migrations reports tests examples -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean  ## remove the virtual environment too
