@@ -115,14 +115,14 @@ def _widened(
     factor, dof = np.ones(len(fit.coefficients)), fit.dof.copy()
     by_day = _mean_square(np.arange(len(times)), weight, means, residual)
     for at in range(1, design.shape[1]):
-        place = _blocks_of(times, periods[at])
-        if place is None:
+        block = _blocks_of(times, periods[at])
+        if block is None:
             continue
         # Blocks of several days scatter more than as many independent days would.
-        by_block = _mean_square(place, weight, means, residual)
+        by_block = _mean_square(block, weight, means, residual)
         swollen = max(by_block / by_day, 1.0) if by_day > 0.0 and np.isfinite(by_block) else 1.0
         beside = np.delete(means, [0, at], axis=1)
-        lines = block_lines(_cut(place, weight, means[:, at], residual, beside))
+        lines = block_lines(_cut(block, weight, means[:, at], residual, beside))
         widening, freedom = float(lines.widening[0]), float(lines.dof[0])
         if not np.isfinite(widening):
             continue
@@ -134,10 +134,10 @@ def _widened(
     return replace(fit, covariance=fit.covariance * np.outer(factor, factor), dof=dof)
 
 
-def _mean_square(place: npt.NDArray[np.intp], weight: Array, columns: Array, value: Array) -> float:
-    """Mean square of what weighted block means (place (d,) of each day) leave over columns (d, q); NaN without any."""
-    total = np.asarray(np.bincount(place, weight), dtype=np.float64)
-    both = np.column_stack([np.bincount(place, weight * column) for column in (*columns.T, value)])
+def _mean_square(block: npt.NDArray[np.intp], weight: Array, columns: Array, value: Array) -> float:
+    """Mean square of what weighted block means (``block`` (d,) of each day) leave over columns (d, q); NaN without any."""
+    total = np.asarray(np.bincount(block, weight), dtype=np.float64)
+    both = np.column_stack([np.bincount(block, weight * column) for column in (*columns.T, value)])
     rows = both / np.sqrt(total)[:, np.newaxis]
     solution, _, rank, _ = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=1e-9)
     free = len(rows) - int(rank)
@@ -155,15 +155,15 @@ def _blocks_of(times: Array, period: float | None) -> npt.NDArray[np.intp] | Non
     return np.asarray(np.unique(index, return_inverse=True)[1])
 
 
-def _cut(place: npt.NDArray[np.intp], weight: Array, along: Array, value: Array, beside: Array) -> Blocks:
+def _cut(block: npt.NDArray[np.intp], weight: Array, along: Array, value: Array, beside: Array) -> Blocks:
     """Blocks whose line goes along a column instead of time."""
-    total = np.asarray(np.bincount(place, weight), dtype=np.float64)
+    total = np.asarray(np.bincount(block, weight), dtype=np.float64)
 
     def mean(column: Array) -> Array:
-        return np.asarray(np.bincount(place, weight * column) / total)[np.newaxis]
+        return np.asarray(np.bincount(block, weight * column) / total)[np.newaxis]
 
     columns = np.stack([mean(column) for column in beside.T], axis=2) if beside.shape[1] else None
-    return Blocks(total[np.newaxis], mean(along), mean(value), np.array([float(len(place))]), columns)
+    return Blocks(total[np.newaxis], mean(along), mean(value), np.array([float(len(block))]), columns)
 
 
 def _design(

@@ -203,8 +203,8 @@ def _insert_values(db: Database, number: int, identification: StoredIdentificati
 def _insert_frames(db: Database, number: int, identification: StoredIdentification) -> None:
     if identification.refers_to:
         names = np.array(list(identification.refers_to), dtype=object)
-        words = np.array(list(identification.refers_to.values()), dtype=object)
-        incoming = {"parameter": names, "refers_to": words}
+        references = np.array(list(identification.refers_to.values()), dtype=object)
+        incoming = {"parameter": names, "refers_to": references}
         db.insert("INSERT INTO parameter_frame SELECT ?, * FROM incoming", incoming, [number])
 
 

@@ -139,13 +139,13 @@ class EllipsoidLaw:
     def _observed(self, part: Array, rest: Array, drawn: _World) -> _World:
         """Return what an observer of a drawn world takes for true, where its rest is the unit matrix."""
         count, a, b = len(rest), self.active, len(self.ratios)
-        seen = np.zeros((count, b, b))
-        seen[:, :a, :a] = part[:, :a, :a]
+        estimated = np.zeros((count, b, b))
+        estimated[:, :a, :a] = part[:, :a, :a]
         if self.beyond:
             across = part[:, :a, a]
-            seen[:, :a, :a] -= across[:, :, None] * across[:, None, :] / part[:, a, a][:, None, None]
+            estimated[:, :a, :a] -= across[:, :, None] * across[:, None, :] / part[:, a, a][:, None, None]
         whitener = np.linalg.inv(np.linalg.cholesky(rest))
-        values, vectors = np.linalg.eigh(whitener @ seen @ np.swapaxes(whitener, 1, 2))
+        values, vectors = np.linalg.eigh(whitener @ estimated @ np.swapaxes(whitener, 1, 2))
         turn = np.swapaxes(vectors[:, :, ::-1], 1, 2) @ whitener
         largest = np.zeros((count, b))
         if a:
@@ -216,10 +216,10 @@ class SizeLaw:
         squares /= squares.sum(axis=1, keepdims=True)
         # Truth 1 and an estimate of it; that estimate as truth, and an estimate of it in turn.
         once, twice = (1.0 + (size - 1.0) * self.shares for size in (second, first * second))
-        seen = 1.0 + (first - 1.0) * self.shares
+        estimated = 1.0 + (first - 1.0) * self.shares
         k_first, k_second = (
             radial_quantile(np.sqrt(np.sum(squares * true / estimate, axis=1)), rank, p)
-            for true, estimate in ((1.0, once), (seen, twice))
+            for true, estimate in ((1.0, once), (estimated, twice))
         )
         return k_first * k_first / k_second
 
@@ -246,13 +246,13 @@ def ellipsoid_law(parts: Sequence[BudgetLine], p: float) -> EllipsoidLaw | SizeL
         return ellipsoid_factor(rank, p)
     if any(kind is Estimated.MATRIX and dof < _rank(matrix) + 1.0 for matrix, dof, kind in white):
         return math.inf
-    known = _symmetric(np.eye(rank) - np.sum([matrix for matrix, _, _ in white], axis=0))
-    if len(white) == 1 and float(np.abs(np.linalg.eigvalsh(known)).max()) < _NEGLIGIBLE:
+    certain = _symmetric(np.eye(rank) - np.sum([matrix for matrix, _, _ in white], axis=0))
+    if len(white) == 1 and float(np.abs(np.linalg.eigvalsh(certain)).max()) < _NEGLIGIBLE:
         of_one = ellipsoid_factor if white[0][2] is Estimated.MATRIX else ellipsoid_factor_of_size
         return of_one(rank, p, white[0][1])
     if len(white) == 1 and white[0][2] is Estimated.SCALE:
         return SizeLaw(np.clip(np.linalg.eigvalsh(white[0][0]), 0.0, 1.0), white[0][1])
-    return _law(white, known, rank)
+    return _law(white, certain, rank)
 
 
 def ellipsoid_factor_of_size(outputs: int, p: float, dof: float) -> float:
@@ -260,7 +260,7 @@ def ellipsoid_factor_of_size(outputs: int, p: float, dof: float) -> float:
     return math.sqrt(outputs * float(scipy.special.fdtri(outputs, dof, p)))
 
 
-def _law(white: Sequence[tuple[Array, float, Estimated]], known: Array, rank: int) -> EllipsoidLaw:
+def _law(white: Sequence[tuple[Array, float, Estimated]], certain: Array, rank: int) -> EllipsoidLaw:
     matrices = [index for index, (_, _, kind) in enumerate(white) if kind is Estimated.MATRIX]
     reference = max(matrices, key=lambda index: float(np.trace(white[index][0])), default=None)
     rest = np.eye(rank) if reference is None else np.eye(rank) - white[reference][0]
@@ -275,7 +275,7 @@ def _law(white: Sequence[tuple[Array, float, Estimated]], known: Array, rank: in
         dof=math.inf if reference is None else white[reference][1],
         ratios=ratios,
         active=int(np.sum(ratios > _NEGLIGIBLE)),
-        known=_symmetric(basis.T @ known @ basis),
+        known=_symmetric(basis.T @ certain @ basis),
         others=tuple(
             (_symmetric(basis.T @ matrix @ basis), dof, kind)
             for index, (matrix, dof, kind) in enumerate(white)

@@ -105,4 +105,4 @@ def _result(
 
 def map_in_order(engine: Engine, task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """``task`` of every item, one task an item, such as a run; in the order of the items."""
-    return list(in_order(engine, task, ((item,) for item in items)))
+    return list(in_order(engine, task, ((piece,) for piece in items)))

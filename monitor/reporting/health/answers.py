@@ -78,8 +78,8 @@ def _urgency(parameter: ParameterHealth) -> tuple[float, float, float]:
 
 def reason(health: MachineHealth) -> str:
     """Return why a machine is in its state, in plain words with numbers."""
-    words = _REASONS.get(health.state, _nearest_limit)(health)
-    return _sentence(words or STATES[health.state])
+    reason = _REASONS.get(health.state, _nearest_limit)(health)
+    return _sentence(reason or STATES[health.state])
 
 
 def _out(health: MachineHealth) -> str:
@@ -215,9 +215,9 @@ def _worst(fleet: Fleet) -> str:
     if not urgent:
         return "None: no machine that was measured needs attention."
     first, *others = urgent
-    place = f" ({first.location})" if first.location else ""
+    location = f" ({first.location})" if first.location else ""
     more = f"; also {_names(others)}" if others else ""
-    return f"{first.machine}{place}: {first.state}{more}."
+    return f"{first.machine}{location}: {first.state}{more}."
 
 
 def _keep_on(fleet: Fleet) -> str:
@@ -234,8 +234,8 @@ def _fine(rows: Sequence[FleetRow]) -> str:
 
 def _unjudged(fleet: Fleet) -> str:
     parts = [
-        f"{words}: {_names(rows)}"
-        for state, words in (
+        f"{phrase}: {_names(rows)}"
+        for state, phrase in (
             ("not measured", "not measured this week"),
             ("not evaluated", "measured but not evaluated"),
             ("no change seen", "not against every tolerance"),

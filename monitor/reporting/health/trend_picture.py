@@ -102,8 +102,8 @@ def _tolerance(on: Drawing, panel: Panel, tolerance: float | None) -> None:
         if panel.up[0] <= limit <= panel.up[1]:
             y = panel.y(limit)
             on.line(panel.left, y, right, y, INK, 3.0, "14 8")
-            words = ("+" if limit > 0 else "") + tick_words(limit)
-            on.text(right + 8, y + 0.36 * LETTER, words, bold=True)
+            label = ("+" if limit > 0 else "") + tick_words(limit)
+            on.text(right + 8, y + 0.36 * LETTER, label, bold=True)
 
 
 def _drift(on: Drawing, panel: Panel, drift: Drift, last: datetime, end: datetime) -> None:

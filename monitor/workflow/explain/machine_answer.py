@@ -72,8 +72,8 @@ def _curve(effect: ChainMissing, unit: Unit) -> tuple[CurvePoint, ...]:
     at = curve.at / DEGREE.factor if curve.turns else curve.at
     rows = zip(at, curve.direction, curve.size, curve.u, strict=True)
     return tuple(
-        CurvePoint(float(place), int(direction), unit.to_display(float(size)), unit.to_display(float(u)))
-        for place, direction, size, u in rows
+        CurvePoint(float(position), int(direction), unit.to_display(float(size)), unit.to_display(float(u)))
+        for position, direction, size, u in rows
     )
 
 

@@ -28,9 +28,11 @@ def limit_forecast(
         return replace(none, why_no_forecast="no forecast: the machine file states no tolerance for it")
     if line is None:
         return replace(none, why_no_forecast="no forecast: there is no drift to extrapolate")
-    now = float(series.t[-1])
-    horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
-    ahead = forecast(line, (-limit, limit), now, [max(check, now)], reliability=reliability, horizon=horizon)
+    origin = float(series.t[-1])
+    horizon = origin + HORIZON_YEARS * DAYS_PER_YEAR
+    ahead = forecast(
+        line, (-limit, limit), origin, [max(check, origin)], reliability=reliability, horizon=horizon
+    )
     crossing, offset = ahead.crossing, series.offset
     low, high = (date(t, offset) if t < horizon else None for t in crossing.interval)
     return replace(
@@ -38,7 +40,7 @@ def limit_forecast(
         crosses_limit_at=None if crossing.at is None else date(crossing.at, offset),
         crosses_limit_interval=interval_or_none(low, high),
         in_tolerance_at_next_check=float(ahead.probability[0]),
-        recommended_interval_days=float(min(ahead.recommended_interval, horizon - now)),
+        recommended_interval_days=float(min(ahead.recommended_interval, horizon - origin)),
         recommended_by=f"{ahead.method}: {reliability:g}",
     )
 

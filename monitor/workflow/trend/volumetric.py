@@ -211,11 +211,11 @@ def _backtest(
 
 
 def _beyond_since(
-    parameters: _Extrapolated, vectors: _Vectors, limit: float, now: float, offset: timedelta
+    parameters: _Extrapolated, vectors: _Vectors, limit: float, origin: float, offset: timedelta
 ) -> str | None:
     """Since when the drifts put the error beyond its limit without a break; None where it is not beyond it now."""
     begins = max(float(drift.piece.t[0]) for drift in parameters.drifts.values())
-    times = np.linspace(min(begins, now), now, SINCE_STEPS)
+    times = np.linspace(min(begins, origin), origin, SINCE_STEPS)
     levels = np.column_stack(
         [line.level_at + line.slope * (times - line.at) for line in parameters.lines.values()]
     )
@@ -253,18 +253,18 @@ def volumetric_forecast(
         )
     try:
         lines = {name: drift.stated or _held(drift.piece) for name, drift in drifts.items()}
-        now = max(float(drift.whole.t[-1]) for drift in drifts.values())
-        levels = {name: float(predict(line, now)[0]) for name, line in lines.items()}
+        origin = max(float(drift.whole.t[-1]) for drift in drifts.values())
+        levels = {name: float(predict(line, origin)[0]) for name, line in lines.items()}
         vectors = _vectors(db, history, question.model, levels)
     except DataError as error:
         return replace(none, why=f"no forecast of the volumetric error: {error}")
     parameters = _together(drifts, {name: lines[name] for name in vectors.names})
     correlation, shrunk, _ = residual_correlation(_residuals(parameters), parameters.days)
-    horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
+    horizon = origin + HORIZON_YEARS * DAYS_PER_YEAR
     ahead = forecast_longest(
         JointLines(list(parameters.lines.values()), correlation),
         ErrorVectors(vectors.sensitivity, vectors.at_zero),
-        LengthQuestion(limit, now, [max(question.check, now)], horizon, question.reliability),
+        LengthQuestion(limit, origin, [max(question.check, origin)], horizon, question.reliability),
         rng=rng,
     )
     test, why_no_test = _backtest(parameters, vectors, rng)
@@ -272,13 +272,13 @@ def volumetric_forecast(
     return replace(
         none,
         latest_um=ahead.latest,
-        beyond_since=_beyond_since(parameters, vectors, limit, now, offset),
+        beyond_since=_beyond_since(parameters, vectors, limit, origin, offset),
         crosses_limit_at=None if ahead.crossing.at is None else date(ahead.crossing.at, offset),
         crosses_limit_interval=interval_or_none(low, high),
         predicted_um=float(ahead.predicted[0]),
         predicted_interval_um=tuple(ahead.interval[0].tolist()),
         in_tolerance_at_next_check=float(ahead.probability[0]),
-        recommended_interval_days=float(min(ahead.recommended_interval, horizon - now)),
+        recommended_interval_days=float(min(ahead.recommended_interval, horizon - origin)),
         # Parameters without a drift stay where they are; those that are no error of the chain take no part.
         held=tuple(name for name in parameters.lines if drifts[name].stated is None),
         left_out=vectors.left_out,

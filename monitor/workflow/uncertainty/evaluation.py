@@ -194,8 +194,8 @@ def _propagated(
 
 def _taken_as_known(campaign: Campaign, axes_covered: bool) -> tuple[TakenAsKnown, ...]:
     """What the method takes as known, less the linear axes where their errors are stated."""
-    known = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
-    return tuple(name for name in known if not (axes_covered and name is TakenAsKnown.LINEAR_AXES))
+    assumed = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
+    return tuple(name for name in assumed if not (axes_covered and name is TakenAsKnown.LINEAR_AXES))
 
 
 def _lack_of_fit(
