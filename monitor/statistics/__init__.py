@@ -7,7 +7,7 @@ from monitor.statistics.backtest import Backtest, backtest
 from monitor.statistics.changes import Change, History, find_changes
 from monitor.statistics.common_change import joint_change
 from monitor.statistics.components import VarianceComponents, variance_components
-from monitor.statistics.conditions import Coefficient, Cycle, Dependence, dependence
+from monitor.statistics.conditions import Coefficient, Cycle, Dependence, DependenceUnits, dependence
 from monitor.statistics.control import (
     ControlChart,
     CusumChart,
@@ -61,6 +61,7 @@ __all__ = [
     "CusumChart",
     "Cycle",
     "Dependence",
+    "DependenceUnits",
     "ErrorVectors",
     "FalseDiscoveries",
     "Forecast",

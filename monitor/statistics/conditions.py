@@ -85,6 +85,18 @@ def _cycle(fit: MixedFit, at: int, name: str, period: float, origin: float) -> C
     return Cycle(name, period, amplitude, u, peak, float(scipy.special.fdtrc(2.0, dof, f)))
 
 
+@dataclass(frozen=True)
+class DependenceUnits:
+    """The unit of the ``values`` and those of the channels, by name: a coefficient has one where both are stated."""
+
+    values: Unit
+    channels: Mapping[str, Unit]
+
+
+def _unit_of(units: DependenceUnits | None, channel: str) -> Unit | None:
+    return None if units is None else _per(units.values, units.channels.get(channel))
+
+
 def _per(unit: Unit | None, channel: Unit | None) -> Unit | None:
     """Unit of a coefficient; per kelvin where the channel is a Celsius temperature."""
     if unit is None or channel is None:
@@ -135,7 +147,7 @@ def _widened(
 
 
 def _mean_square(block: npt.NDArray[np.intp], weight: Array, columns: Array, value: Array) -> float:
-    """Mean square of what weighted block means (``block`` (d,) of each day) leave over columns (d, q); NaN without any."""
+    """Mean square of what weighted means of blocks leave over columns (d, q), ``block`` (d,) of each day; or NaN."""
     total = np.asarray(np.bincount(block, weight), dtype=np.float64)
     both = np.column_stack([np.bincount(block, weight * column) for column in (*columns.T, value)])
     rows = both / np.sqrt(total)[:, np.newaxis]
@@ -203,15 +215,14 @@ def dependence(
     drift: bool = True,
     u: npt.ArrayLike | None = None,
     days: npt.ArrayLike | None = None,
-    unit: Unit | None = None,
-    channel_units: Mapping[str, Unit] | None = None,
+    units: DependenceUnits | None = None,
     level: float = 0.95,
     independent: bool = False,
 ) -> Dependence:
     """Coefficients of ``values`` (n,) on ``channels`` (each (n,)) and on ``cycles`` (name to period).
 
     ``times`` and the periods share any unit; ``u`` and ``days`` as in ``trend``. A coefficient's unit is
-    ``unit`` per channel unit (µm/m per °C becomes µm/m/K); one that was given neither has none. Raises
+    that of the values per channel unit (µm/m per °C becomes µm/m/K); without ``units`` it has none. Raises
     ``DataError`` for a channel that never varies, terms that are exactly dependent, a cycle seen over less
     than half its period, too few runs, or non-finite values. Errors in the channels themselves are
     neglected: they pull a coefficient towards zero by the ratio of their variance to that of the channel.
@@ -224,26 +235,26 @@ def dependence(
     run_u = None if u is None else as_positive(u, "u", length=len(y))
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     origin = float(t.mean())
-    terms, design = _design(t, channels, cycles or {}, drift)
+    cycles = cycles or {}
+    terms, design = _design(t, channels, cycles, drift)
     fit = fit_with_days(y, design, run_u, index)
     if not independent:
-        waves = [period for period in (cycles or {}).values() for _ in range(2)]
+        waves = [period for period in cycles.values() for _ in range(2)]
         periods = [None] * (design.shape[1] - len(waves)) + waves
         fit = _widened(fit, design, index, t, periods)
     weight = np.ones_like(y) if run_u is None else 1.0 / run_u**2
     about = y - np.average(y, weights=weight)
     total = float((weight * about**2).sum())
-    units = channel_units or {}
     start = 2 if drift else 1
     scale = np.outer(fit.u, fit.u)
     return Dependence(
         coefficients=tuple(
-            _coefficient(fit, start + i, name, _per(unit, units.get(name)), level)
+            _coefficient(fit, start + i, name, _unit_of(units, name), level)
             for i, name in enumerate(channels)
         ),
         cycles=tuple(
             _cycle(fit, start + len(channels) + 2 * i, name, period, origin)
-            for i, (name, period) in enumerate((cycles or {}).items())
+            for i, (name, period) in enumerate(cycles.items())
         ),
         drift=_coefficient(fit, 1, "drift", None, level) if drift else None,
         terms=terms,

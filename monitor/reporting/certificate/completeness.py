@@ -66,9 +66,9 @@ def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
         missing += [
             MissingItem(clause, element, part, key_of(name, part)) for part in _gaps(getattr(record, name))
         ]
-    for field, phrase in _STATED.items():
+    for field, clause_and_item in _STATED.items():
         missing += [
-            MissingItem(*phrase, part, key_of(field, part))
+            MissingItem(*clause_and_item, part, key_of(field, part))
             for part in _gaps(getattr(record, field))
             if getattr(record, field) is not None
         ]

@@ -46,7 +46,7 @@ def counted_columns(
     sources: tuple[Source, ...],
     in_scatter: frozenset[Sharing],
 ) -> tuple[SourceColumns, ...]:
-    """What the sources that count do to the inputs; those that the scatter of the runs shows (``in_scatter``) are left out."""
+    """What the sources that count do to the inputs; those that are ``in_scatter`` of the runs are left out."""
     columns = source_columns(run, unknowns, campaign, number, sources)
     return tuple(part for part in columns if part.source.shared_by not in in_scatter)
 
