@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from monitor.methods import Unable, method_named
-from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport
+from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport, State
 from monitor.store import (
     Database,
     MachineEvent,
@@ -207,7 +207,7 @@ def _not_measured(db: Database, past: MachineWeek) -> MachineHealth:
         check = "now: no run yet"
         sentence = "not yet measured: the database holds no run of it"
     return MachineHealth(
-        past.name.machine, past.name.description, past.name.location, "not measured",
+        past.name.machine, past.name.description, past.name.location, State.NOT_MEASURED,
         changed="; ".join([sentence, *refusals_in_words(past.refused)]),
         since=past.runs[-1].local_start if past.runs else None, probability_out=None,
         next_check=check, run="", basis="", factor="", parameters=(),

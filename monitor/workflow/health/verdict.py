@@ -13,6 +13,7 @@ from monitor.records import Verdict
 from monitor.reporting.health.records import (
     ALARMS,
     Change,
+    ChangeKind,
     DataQuality,
     ParameterHealth,
     RefusedImport,
@@ -72,9 +73,9 @@ def changed_in_words(
     came in."""
     sentences = [
         change.what
-        for kind in ("change", "event step", "event")
+        for kind in (ChangeKind.CHANGE, ChangeKind.EVENT_STEP, ChangeKind.EVENT)
         for change in noted
-        if change.this_week and change.kind == kind
+        if change.this_week and change.kind is kind
     ]
     sentences += refusals_in_words(quality.refused_imports)
     sentences = sentences[:3] + ([f"and {len(sentences) - 3} more"] if len(sentences) > 3 else [])
@@ -102,10 +103,10 @@ def since_when(
     if state in ALARMS:
         # Of the volumetric error there is no value run by run: no day is better than a wrong one.
         return min(beyond, default=None)
-    if state == "model fails":
+    if state is State.MODEL_FAILS:
         return compared
-    changed = [change for change in noted if change.kind == "change"]
-    if state == "changed":
+    changed = [change for change in noted if change.kind is ChangeKind.CHANGE]
+    if state is State.CHANGED:
         return min(change.at for change in changed if change.this_week)
     return max((change.at for change in changed), default=None)
 
@@ -121,18 +122,18 @@ def state_of(
 ) -> State:
     """The most urgent state that holds; ``evaluated``: whether the last run has the results that its method gives."""
     if judged.any is not None and max(judged.single.values()) > 0.5:
-        return "out of tolerance"
+        return State.OUT_OF_TOLERANCE
     if judged.any is not None and judged.any > risk:
-        return "may be out of tolerance"
+        return State.MAY_BE_OUT_OF_TOLERANCE
     if not evaluated:
-        return "not evaluated"
-    if any(change.kind == "change" and change.this_week for change in noted):
-        return "changed"
+        return State.NOT_EVALUATED
+    if any(change.kind is ChangeKind.CHANGE and change.this_week for change in noted):
+        return State.CHANGED
     if explanation is not None and explanation.comparison.verdict is Verdict.SOMETHING_IS_MISSING:
-        return "model fails"
+        return State.MODEL_FAILS
     if quality.suspect:
-        return "suspect data"
-    return "in tolerance" if judged.every_has_one else "no change seen"
+        return State.SUSPECT_DATA
+    return State.IN_TOLERANCE if judged.every_has_one else State.NO_CHANGE_SEEN
 
 
 def next_check(
@@ -148,7 +149,7 @@ def next_check(
         for name, drift in drifts.items()
         if drift is not None and drift.good_for is not None
     }
-    if state == "not evaluated":
+    if state is State.NOT_EVALUATED:
         return "now: the last run could not be evaluated"
     if state in ALARMS:
         return "now"
