@@ -152,6 +152,15 @@ def _limits(db: Database, sums: FleetSums) -> Array:
     return np.array([stated.get(key, np.nan) for key in keys])
 
 
+def _level(sums: FleetSums, drift: CellDrift) -> Array:
+    """Where the line of each cell is on the last day, from which trend page and report forecast, too.
+
+    The mean of that day alone scatters as runs and days do, and so would the day on which the limit is reached.
+    """
+    ahead = sums.last_d - sums.epoch_d - sums.sum_t / sums.groups
+    return np.asarray(sums.origin + sums.sum_m / sums.groups + drift.slope * ahead)
+
+
 def _rank(
     sums: FleetSums, cells: CellTests, drift: CellDrift, drift_q: Array, limit: Array
 ) -> tuple[Array, Array, Array]:
@@ -160,7 +169,7 @@ def _rank(
     share = np.abs(latest) / limit
     per_year = drift.slope * DAYS_PER_YEAR
     with np.errstate(divide="ignore", invalid="ignore"):
-        years = (np.where(per_year >= 0.0, limit, -limit) - latest) / per_year
+        years = (np.where(per_year >= 0.0, limit, -limit) - _level(sums, drift)) / per_year
         # Against the other days: the latest one is taken out of their mean.
         k = sums.groups
         others = (sums.sum_m - sums.latest) / (k - 1.0)

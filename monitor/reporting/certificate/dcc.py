@@ -32,7 +32,6 @@ from monitor.reporting.numbers import decimal_of
 from monitor.reporting.texts import Texts, texts_of
 
 SCHEMA_VERSION = "3.2.1"
-_XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
 #: The schema's word for a verdict (stringConformityStatementStatusType).
 _STATUS = {

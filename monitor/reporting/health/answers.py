@@ -74,7 +74,7 @@ def concern(health: MachineHealth) -> ParameterHealth | None:
 def _urgency(parameter: ParameterHealth) -> tuple[float, float, float]:
     """A drift that reaches its limit counts before one that does not, after the probability to be out already."""
     out, drift = parameter.probability_out or 0.0, parameter.drift
-    reaches = drift is not None and drift.crosses_at is not None and drift.p_value < _DRIFT_P
+    reaches = parameter.reaches_soon and drift is not None and drift.p_value < _DRIFT_P
     used = abs(parameter.estimate) / parameter.tolerance if parameter.tolerance else 0.0
     return (out if out > 0.01 else 0.0), float(reaches), used
 

@@ -103,6 +103,15 @@ class ParameterHealth:
     changed_at: tuple[datetime, ...]
     drift: Drift | None
 
+    @property
+    def reaches_soon(self) -> bool:
+        """Whether the drift reaches the limit within as many days as it was watched for."""
+        if self.drift is None or self.drift.crosses_at is None:
+            return False
+        last = self.history.times[-1]
+        watched = last - (self.drift.since or self.history.times[0])
+        return self.drift.crosses_at <= (last + watched).date()
+
 
 @dataclass(frozen=True)
 class Change:

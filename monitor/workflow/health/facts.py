@@ -23,11 +23,12 @@ from monitor.statistics import Change as FoundChange
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
-from monitor.workflow.health.forecast import DriftForecast, stated_drift
+from monitor.workflow.health.forecast import stated_drift
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.agreement import NOT_DECIDED
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
+from monitor.workflow.history.forecast import DriftForecast
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer

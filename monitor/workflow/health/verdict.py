@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from monitor.reporting.health.records import (
 )
 from monitor.uncertainty.conformity import conformity
 from monitor.workflow.explain.explain_answer import MachineExplanation
-from monitor.workflow.health.forecast import DriftForecast
 from monitor.workflow.health.weeks import Week
+from monitor.workflow.history.calendar import local_time
+from monitor.workflow.history.forecast import DriftForecast
 from monitor.workflow.trend.volumetric import VOLUMETRIC
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
@@ -140,12 +141,11 @@ def next_check(
     state: State,
     drifts: Mapping[str, DriftForecast | None],
     limits: Mapping[str, float],
-    last: datetime,
     week: Week,
 ) -> str:
     """When to measure again, and why: the machine is likely to be in tolerance until then."""
-    good_for = {
-        name: (drift.good_for, drift.horizon)
+    good_until = {
+        name: drift.origin + drift.good_for
         for name, drift in drifts.items()
         if drift is not None and drift.good_for is not None
     }
@@ -155,16 +155,19 @@ def next_check(
         return "now"
     if not limits:
         return "no forecast: the campaign states no tolerances"
-    if not good_for:
+    if not good_until:
         return "no forecast: fewer than three days since the last change"
-    name = min(good_for, key=lambda parameter: good_for[parameter][0])
-    days, horizon = good_for[name]
-    day = (last + timedelta(days=days)).date()
-    if days >= horizon and day <= week.last:
-        return f"next week: {horizon:.0f} days of history allow no longer forecast"
+    name = min(good_until, key=good_until.__getitem__)
+    first = drifts[name]
+    assert first is not None
+    until = local_time(good_until[name], first.offset)
+    assert until is not None
+    day, whole = until.date(), first.good_for == first.span
+    if whole and day <= week.last:
+        return f"next week: {first.span:.0f} days of history allow no longer forecast"
     if day <= week.last:
         return f"now: {name} stayed in tolerance with 95 % until {day} only"
-    if days >= horizon:
+    if whole:
         return f"by {day}: in tolerance as far ahead as the history is long"
     return f"by {day}: {name} stays in tolerance with 95 % until then"
 
