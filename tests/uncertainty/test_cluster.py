@@ -31,12 +31,12 @@ NAMES = ("EC0Y", "EXX", "EYY", "EZZ")
 UNITS = ("µrad", "µm/m", "µm/m", "µm/m")
 
 
-@pytest.fixture(scope="module")
 def all_in_order(engine, task, arguments):
     """The task of every argument, one task each, in their order."""
     return list(in_order(engine, task, ((argument,) for argument in arguments)))
 
 
+@pytest.fixture(scope="module")
 def evaluation(make_run):
     """Recipe of the model, sampler, and the result on one thread of this process."""
     run = make_run("w C B X b Z Y (C1) t", poses=8)

@@ -113,7 +113,7 @@ def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path, pdf_unread) -
         limits = {
             name: abs(parameter.mean.latest) + 1.5 * abs(parameter.drift.slope_per_year)
             for name, parameter in trend(db, TrendRequest("HU40-T")).parameters.items()
-            if parameter.drift.slope_per_year is not None
+            if parameter.drift.p_value is not None and parameter.drift.p_value < 1e-4
         }
         db.execute(
             "UPDATE imported_campaign SET machine_description = json_merge_patch(machine_description, ?)",

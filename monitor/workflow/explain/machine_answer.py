@@ -133,7 +133,7 @@ def _step(step: Step, units: Mapping[str, Unit]) -> ChangedTarget | ChangedParam
 def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | ChangedParameter, ...]:
     """Targets that moved in a run, then steps between runs."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
-    units = {name: effect.unit for effect in problem.base for name in effect.parameters(problem.context)}
+    units = problem.base_units
     moved = (
         MovedTarget(
             move.target, move.run, move.sequence, um(move.size), tuple(um(part) for part in move.shift),

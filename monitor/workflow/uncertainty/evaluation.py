@@ -233,8 +233,7 @@ def _refuse_too_many(readings: int, method: str) -> None:
 
 
 def _units(fit: Fit, names: tuple[str, ...]) -> tuple[Unit, ...]:
-    context = fit.problem.context
-    units = {name: effect.unit for effect in fit.problem.base for name in effect.parameters(context)}
+    units = fit.problem.base_units
     return tuple(units[name] for name in names)
 
 
