@@ -81,7 +81,13 @@ from monitor.store.models import (
 )
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
-from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
+from monitor.store.selections import (
+    SelectionRow,
+    StoredSelection,
+    find_selection,
+    list_selections,
+    save_selection,
+)
 from monitor.store.sharing import SharedDatabase
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
 from monitor.store.turns import Holder, Patience
@@ -107,6 +113,7 @@ __all__ = [
     "QueryResult",
     "RecordedRun",
     "RunRow",
+    "SelectionRow",
     "SharedDatabase",
     "StoredAnalysis",
     "StoredCertificate",
