@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
+from enum import StrEnum
 
 import numpy as np
 
@@ -69,6 +70,23 @@ class FleetRequest:
             raise InputError(f"--top {self.top}: a number of rows, 0 for all")
 
 
+class Attention(StrEnum):
+    """Why a parameter needs attention, the most urgent first; the last is of a limit of the volumetric error."""
+
+    OUT = "out of tolerance"
+    DRIFTS_OUT = "drifts out of tolerance within a year"
+    STANDS_OUT = "the latest day stands out"
+    DRIFTS = "drifts"
+    DAYS_DIFFER = "days differ much more than runs"
+    AS_USUAL = "as usual"
+    ONE_DAY = "one day only, nothing to compare it with"
+    UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
+
+
+#: The classes by their number.
+ATTENTION = tuple(Attention)
+
+
 @dataclass(frozen=True)
 class FleetTableRow:
     """A parameter of a machine: why it needs attention, the tests of its days, its drift, its latest day."""
@@ -76,7 +94,7 @@ class FleetTableRow:
     rank: int
     machine: str
     parameter: str
-    attention: str
+    attention: Attention
     unit: str
     n: int
     days: int
@@ -193,22 +211,6 @@ def _rank(
     return kind, measure, years
 
 
-AS_USUAL = "as usual"
-#: Of a limit of the volumetric error.
-UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
-#: The classes, the most urgent first.
-ATTENTION = (
-    "out of tolerance",
-    "drifts out of tolerance within a year",
-    "the latest day stands out",
-    "drifts",
-    "days differ much more than runs",
-    AS_USUAL,
-    "one day only, nothing to compare it with",
-    UNJUDGED,
-)
-
-
 def _date(days: float) -> str | None:
     return (
         None
@@ -297,7 +299,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         values=int(sums.runs.sum()),
         false_discovery_rate=RATE,
         attention={
-            label: int((kind == number).sum()) + sum(row.attention == label for row in volumetric)
+            label: int((kind == number).sum()) + sum(row.attention is label for row in volumetric)
             for number, label in enumerate(ATTENTION)
         },
         not_identified=not_identified(db) if request.model is None else (),
@@ -328,7 +330,9 @@ def _volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
     rows = []
     for machine, limit in limits.items():
         latest = worst.get(machine)
-        attention = UNJUDGED if latest is None else ATTENTION[0] if latest >= limit else AS_USUAL
+        attention = Attention.OUT if latest is not None and latest >= limit else Attention.AS_USUAL
+        if latest is None:
+            attention = Attention.UNJUDGED
         rows.append(
             FleetTableRow(
                 rank=0, machine=machine, parameter="volumetric error", attention=attention, unit=MICROMETRE.name,
