@@ -303,10 +303,6 @@ def test_house_sql_lives_in_the_store() -> None:
     assert holding == HOLD_A_QUERY
 
 
-#: Modules that import each other in a circle, through imports inside functions.
-CIRCLES: list[list[str]] = []
-
-
 def modules_imported(package: Path) -> dict[str, set[str]]:
     """Return for every module the modules of the package that it imports, inside functions too.
 
