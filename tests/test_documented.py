@@ -62,6 +62,12 @@ def test_every_verb_and_option_is_documented_and_no_other() -> None:
     assert documented_options() == live_options()
 
 
+def test_the_first_table_has_every_verb_and_no_other() -> None:
+    text = COMMAND_LINE.read_text(encoding="utf-8").split("## Options\n")[0]
+    cells = re.findall(r"^\| (\[?`[a-z].*?) \| ", text, re.MULTILINE)
+    assert {verb for cell in cells for verb in re.findall(r"(?:^\[?|, )`([a-z]+)", cell)} == set(VERBS)
+
+
 def test_every_option_has_a_help() -> None:
     silent = {
         f"{path} {action.option_strings[0]}"

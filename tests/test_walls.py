@@ -15,6 +15,7 @@ import pytest
 import monitor
 
 PACKAGE = Path(monitor.__file__).parent
+CONTRIBUTING = Path(__file__).resolve().parents[1] / "CONTRIBUTING.md"
 
 # What every room may import. `from monitor import __version__` is for everyone: the package itself imports nothing.
 # `sources` is read, stored, propagated and printed: four rooms that may not know each other.
@@ -235,6 +236,27 @@ def test_house_a_circle_is_found(tmp_path: Path, sources: dict[str, str], circle
     assert import_circles(tmp_path / "monitor") == circles
 
 
+def drawn_rooms(text: str) -> tuple[list[set[str]], set[str]]:
+    """The rooms of a drawing, a set a floor from the top, and what lies on the ground."""
+    drawing = re.search(r"((?:^    .*\n)+)^    ground: (.*)$", text, re.MULTILINE)
+    assert drawing is not None
+    # What stands right of a wide gap explains the floor; a room is a word.
+    floors = [set(re.split(r"\s{6,}", line.strip())[0].split()) for line in drawing[1].splitlines()]
+    return floors, set(drawing[2].split(", "))
+
+
+@pytest.mark.skipif(not CONTRIBUTING.exists(), reason="the document stays in the checkout")
+def test_house_contributing_draws_the_rooms_as_they_are() -> None:
+    floors, ground = drawn_rooms(CONTRIBUTING.read_text(encoding="utf-8"))
+    assert ground == GROUND - {"__init__"}
+    assert set().union(*floors) == set(ROOMS)
+    for number, floor in enumerate(floors):
+        lower = set().union(*floors[number + 1 :])
+        # Of its own floor `cli` alone knows a neighbour: it starts the server.
+        for room in floor:
+            assert ROOMS[room] - lower <= ({"web"} if room == "cli" else set()), room
+
+
 def test_house_every_room_starts_with_what_it_is_for() -> None:
     silent = [
         str(path.relative_to(PACKAGE))
@@ -301,10 +323,6 @@ def test_house_sql_lives_in_the_store() -> None:
         )
     }
     assert holding == HOLD_A_QUERY
-
-
-#: Modules that import each other in a circle, through imports inside functions.
-CIRCLES: list[list[str]] = []
 
 
 def modules_imported(package: Path) -> dict[str, set[str]]:

@@ -37,10 +37,10 @@ def _budget(answer: UncertaintyAnswer) -> None:
             [
                 name,
                 answer.units[name],
-                *(_contribution(line.u[place]) for line in part),
+                *(_contribution(line.u[column]) for line in part),
                 output.two_digits(guf.u[name]),
             ]
-            for place, name in enumerate(answer.parameters)
+            for column, name in enumerate(answer.parameters)
         ]
         title = "budget: what each line adds to u, as a standard uncertainty (u² is the sum of their squares)"
         output.table(title if not first else "", ["parameter", "unit", *heads, "u"], rows, text_columns=2)
@@ -52,8 +52,8 @@ def _budget(answer: UncertaintyAnswer) -> None:
             else f"{line.degrees_of_freedom:.4g} degrees of freedom"
         )
         source = stated.get(line.source)
-        words = "" if source is None else f": {source_words(source, texts)}"
-        output.say(f"({number}) {line_words(line.source, texts)}{words}; {freedom}")
+        described = "" if source is None else f": {source_words(source, texts)}"
+        output.say(f"({number}) {line_words(line.source, texts)}{described}; {freedom}")
     for source in stated.values():
         if not source.counted:
             output.say(

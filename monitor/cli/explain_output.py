@@ -86,12 +86,12 @@ def _bad_row(reading: BadRow, unit: str) -> None:
     )
 
 
-def _advice(effect: MachineMissing | CurveMissing, data: str) -> None:
+def _advice(effect: MachineMissing | CurveMissing, answers_text: str) -> None:
     """Cause, remedy and rivals of an effect, and where to measure to tell them apart."""
     output.say(f"   cause: {effect.description.cause}")
     output.say(f"   remedy: {effect.description.remedy}")
     if effect.indistinguishable_from:
-        output.say(f"   these {data} do not rule out: {', '.join(effect.indistinguishable_from)}")
+        output.say(f"   these {answers_text} do not rule out: {', '.join(effect.indistinguishable_from)}")
         if effect.tell_apart_by:
             poses = "; ".join(
                 ", ".join(f"{axis[:-4]} {value:g}°" for axis, value in pose.items())

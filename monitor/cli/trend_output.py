@@ -299,7 +299,7 @@ def _next_check(answer: TrendAnswer) -> Iterator[str]:
     first = answer.parameters[name]
     yield f"check within {intervals[name]:.0f} days, for {name} ({first.forecast.recommended_by})"
     span = first.drift.span_days
-    if intervals[name] > span:
+    if intervals[name] >= span:
         yield f"  its drift was seen over {span:.0f} days only; that it goes on for longer is an assumption"
 
 

@@ -14,7 +14,6 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from monitor.effects.context import Context
-from monitor.effects.drivers import Always
 from monitor.effects.effect import ParsedEffect, parse_effect
 from monitor.machine import COMPONENTS, Chain
 from monitor.units import CONDITION_SUFFIXES
@@ -165,8 +164,3 @@ def catalogue(
         if effect.text not in excluded:
             effects.setdefault(effect.text, effect)
     return tuple(effects.values())
-
-
-def is_driven(effect: ParsedEffect) -> bool:
-    """Return whether an effect has a driver."""
-    return not isinstance(effect.driver, Always)

@@ -88,17 +88,17 @@ def machine_frame(parameters: Sequence[str], chain: Chain, unknown: Sequence[str
     return MachineFrame(tuple(names), tuple(units), np.array(rows).reshape(len(rows), len(terms)))
 
 
-def _wanted(known: Sequence[Term], lost: Sequence[Term], chain: Chain) -> list[Term]:
+def _wanted(parameters: Sequence[Term], lost: Sequence[Term], chain: Chain) -> list[Term]:
     """The location errors that could have a row: those among the parameters, and all of the work side's rotary axes."""
-    own = [term for term in known if term.stage == LOCATION]
-    symbols = {term.symbol for term in (*own, *lost)}
+    locations = [term for term in parameters if term.stage == LOCATION]
+    symbols = {term.symbol for term in (*locations, *lost)}
     fixed = [
         Term(f"E{component}0{joint.name}", index, LOCATION, number)
         for index, joint in enumerate(chain.work)
         for number, component in enumerate(COMPONENTS)
         if joint.turns and joint.main != number % 3
     ]
-    every = [*own, *(term for term in fixed if term.symbol not in symbols)]
+    every = [*locations, *(term for term in fixed if term.symbol not in symbols)]
     return [term for term in every if _places(term, chain.joints[term.joint])]
 
 

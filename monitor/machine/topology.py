@@ -183,7 +183,7 @@ def parse_topology(text: str, signs: Mapping[str, int] | None = None, gravity: V
     plain, down = plain_topology(text)
     tokens = _tokens(plain)
     names = [name for name, _ in tokens]
-    if names.count("w") != 1 or names.count("b") != 1 or names.count("t") != 1:
+    if any(names.count(end) != 1 for end in ("w", "b", "t")):
         raise TopologyError(
             f"topology '{text}' must name w (workpiece), b (bed) and t (tool) once each; {EXAMPLE}"
         )

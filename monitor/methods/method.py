@@ -173,8 +173,8 @@ def _suspected(problem: ChainProblem) -> str:
     rows = ", ".join(
         f"run {reading.run}, sequence {reading.sequence} ({reading.target})" for reading in gross
     )
-    one = "this reading" if len(gross) == 1 else "these readings"
-    return f". First look at {one}, which the others contradict: {rows}" if gross else ""
+    subject = "this reading" if len(gross) == 1 else "these readings"
+    return f". First look at {subject}, which the others contradict: {rows}" if gross else ""
 
 
 class ProblemOf(Protocol):

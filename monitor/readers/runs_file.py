@@ -39,11 +39,7 @@ def read_runs(table: CsvTable, faults: Faults, *, ambient: bool = True) -> RunsP
     ambient temperature."""
     required = (*PLAN, AMBIENT)
     refuse_missing(table, required, faults)
-    names = [AMBIENT] if AMBIENT in table.columns else []
-    names += recorded_columns(table, required, faults)
-    conditions = {
-        name: numbers(table, name, faults, may_be_empty=name != AMBIENT or not ambient) for name in names
-    }
+    conditions = _conditions(table, recorded_columns(table, required, faults), faults, ambient=ambient)
     day = wholes(table, "day", faults) if "day" in table.columns else None
     warm_up = _truths(table, faults) if "warm_up" in table.columns else None
     started = _moments(table, faults) if "started_at" in table.columns else None
@@ -59,6 +55,14 @@ def read_runs(table: CsvTable, faults: Faults, *, ambient: bool = True) -> RunsP
         if moment is not None and warm is not None and day.good[row]:
             runs.append(Run(number, moment, int(day.values[row]), warm, _recorded(conditions, row)))
     return RunsPart(tuple(runs), lines)
+
+
+def _conditions(
+    table: CsvTable, recorded: Sequence[str], faults: Faults, *, ambient: bool
+) -> dict[str, Numbers]:
+    """Return the columns of the ambient temperature and of all else that was recorded."""
+    names = [AMBIENT, *recorded] if AMBIENT in table.columns else recorded
+    return {name: numbers(table, name, faults, may_be_empty=name != AMBIENT or not ambient) for name in names}
 
 
 def _recorded(conditions: Mapping[str, Numbers], row: int) -> dict[str, float]:

@@ -21,6 +21,7 @@ from monitor.units import METRE, MICROMETRE, MICRORADIAN
 IDENTITY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,40}")
 #: A standard uncertainty of an angle beyond this is a slip of unit: 0.1 rad.
 LARGEST_URAD = 1e5
+_LENGTH_UNCERTAINTY = "length_standard_uncertainty_um"
 POINT = "[0.0, 0.0, -120.0]"
 BRANCHES: tuple[Branch, ...] = ("tool", "work")
 
@@ -44,7 +45,7 @@ FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
     "vector": ReadingFormat(("dx_um", "dy_um", "dz_um"), allows=("frame",), known=("work_point",)),
     "component": ReadingFormat(ONE_LENGTH, needs=("direction",), known=("zero",)),
     "distance": ReadingFormat(
-        ONE_LENGTH, needs=("length_mm",), allows=("length_standard_uncertainty_um",), known=("work_point", "length")
+        ONE_LENGTH, needs=("length_mm",), allows=(_LENGTH_UNCERTAINTY,), known=("work_point", "length")
     ),
     "displacement": ReadingFormat(ONE_LENGTH, needs=("direction",), known=("direction",)),
     "offset": ReadingFormat(ONE_LENGTH, needs=("direction", "along"), known=("zero", "slope")),
@@ -82,25 +83,11 @@ def _setup(table: Table) -> Setup | None:
     identity = table.text("id", required=True, example='"bar-xy"')
     if identity is not None and not IDENTITY.fullmatch(identity):
         table.fault("id", f"{quoted(identity)} cannot name a setup: write letters, digits and . _ + - only")
-    kind = table.text("reading", required=True, example='"distance"')
+    kind = _kind(table)
     instrument = table.text("instrument")
-    if kind is not None and kind not in FORMATS:
-        table.fault(
-            "reading",
-            f"{quoted(kind)} is no kind of reading; {did_you_mean(kind, FORMATS)}the kinds are {one_of(FORMATS)}",
-        )
-    if kind is None or kind not in FORMATS or identity is None:
+    if kind is None or identity is None:
         return None
     form = FORMATS[kind]
-    length_u = None
-    if "length_standard_uncertainty_um" in form.allows:
-        length_u = table.number(
-            "length_standard_uncertainty_um",
-            positive=True,
-            largest=1e3 * FARTHEST_MM,
-            unit="um",
-            example="0.3",
-        )
     setup = Setup(
         id=identity,
         reading=kind,
@@ -113,7 +100,7 @@ def _setup(table: Table) -> Setup | None:
         if "tool_direction" in (*form.needs, *form.allows)
         else None,
         length=_length(table) if "length_mm" in form.needs else None,
-        length_uncertainty=None if length_u is None else MICROMETRE.to_internal(length_u),
+        length_uncertainty=_length_uncertainty(table) if _LENGTH_UNCERTAINTY in form.allows else None,
         along=table.text("along", required=True, example='"X"') if "along" in form.needs else None,
         side=_branch(table, "side", "tool") if "side" in form.allows else "tool",
         frame=_branch(table, "frame", "work") if "frame" in form.allows else "work",
@@ -121,6 +108,18 @@ def _setup(table: Table) -> Setup | None:
     )
     table.finish()
     return None if len(table.faults) > before else setup
+
+
+def _kind(table: Table) -> str | None:
+    """Return the kind of reading; None where it is missing or none."""
+    kind = table.text("reading", required=True, example='"distance"')
+    if kind is None or kind in FORMATS:
+        return kind
+    table.fault(
+        "reading",
+        f"{quoted(kind)} is no kind of reading; {did_you_mean(kind, FORMATS)}the kinds are {one_of(FORMATS)}",
+    )
+    return None
 
 
 def _uncertainty(table: Table, form: ReadingFormat) -> float | None:
@@ -151,6 +150,14 @@ def _length(table: Table) -> float | None:
     return table.number(
         "length_mm", required=True, positive=True, largest=FARTHEST_MM, unit="mm", example="150.0"
     )
+
+
+def _length_uncertainty(table: Table) -> float | None:
+    """Return the standard uncertainty of the length in mm; None where it is not stated."""
+    value = table.number(
+        _LENGTH_UNCERTAINTY, positive=True, largest=1e3 * FARTHEST_MM, unit="um", example="0.3"
+    )
+    return None if value is None else MICROMETRE.to_internal(value)
 
 
 def _unit(table: Table, key: str, *, required: bool = True) -> Vector | None:

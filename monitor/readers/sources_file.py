@@ -129,15 +129,15 @@ def _quantity(table: Table) -> Quantity | None:
     value = table.text("quantity", required=True, example='"standard_temperature"')
     if value is None:
         return None
-    words = [quantity.value for quantity in Quantity]
-    if value in words:
+    quantities = [quantity.value for quantity in Quantity]
+    if value in quantities:
         return Quantity(value)
     if value in _ELSEWHERE:
         table.fault("quantity", f"{quoted(value)} is no quantity here: {_ELSEWHERE[value]}")
     else:
         table.fault(
             "quantity",
-            f"{quoted(value)} is not known; {did_you_mean(value, words)}the quantities are {one_of(words)}",
+            f"{quoted(value)} is not known; {did_you_mean(value, quantities)}the quantities are {one_of(quantities)}",
         )
     return None
 
@@ -146,10 +146,10 @@ def _word(table: Table, key: str, kind: type[Word], default: Word) -> Word | Non
     value = table.text(key, example=f'"{default.value}"')
     if value is None:
         return None if key in table.data else default
-    words = [word.value for word in kind]
-    if value not in words:
+    values = [word.value for word in kind]
+    if value not in values:
         table.fault(
-            key, f"{quoted(value)} is not known; {did_you_mean(value, words)}write one of {one_of(words)}"
+            key, f"{quoted(value)} is not known; {did_you_mean(value, values)}write one of {one_of(values)}"
         )
         return None
     return kind(value)

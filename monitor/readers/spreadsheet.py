@@ -125,10 +125,10 @@ def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | N
     rows = [[_cell(value) for value in row] for row in book[sheet].iter_rows(values_only=True)]
     width = max((index + 1 for index, cell in enumerate(rows[0] if rows else []) if cell), default=0)
     # A row ends with its last cell that was ever filled; what stands beside the table is a fault of its row.
-    kept = [
+    cut = [
         [*row, *[""] * (width - len(row))][:width] + [cell for cell in row[width:] if cell] for row in rows
     ]
-    text = _written(kept).rstrip("\n")
+    text = _written(cut).rstrip("\n")
     if not text:
         faults.add(file, None, None, f"the sheet '{sheet}' is empty; its first row names the columns")
         return None

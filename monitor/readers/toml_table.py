@@ -25,11 +25,11 @@ class Table:
     """
 
     def __init__(
-        self, file: str, faults: Faults, data: dict[str, Any], lines: dict[Path, int], path: Path = ()
+        self, file: str, faults: Faults, content: dict[str, Any], lines: dict[Path, int], path: Path = ()
     ) -> None:
         self.file = file
         self.faults = faults
-        self.data = data
+        self.data = content
         self.path = path
         self._lines = lines
         self._asked_for: list[str] = []
@@ -91,7 +91,7 @@ class Table:
         if not isinstance(value, list) or len(value) != count:
             self.fault(key, f"{quoted(value)} is not {count} numbers; write for example {key} = {example}")
             return None
-        parsed = [self._number(key, item, False, largest, unit, example) for item in value]
+        parsed = [self._number(key, element, False, largest, unit, example) for element in value]
         sound = tuple(number for number in parsed if number is not None)
         return sound if len(sound) == count else None
 
@@ -122,12 +122,12 @@ class Table:
         self._asked_for.append(key)
         value = self.data.get(key, [])
         inner = (*self.path, key)
-        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+        if not isinstance(value, list) or not all(isinstance(element, dict) for element in value):
             self.fault(key, f"this is not a list of tables; write [[{name_of(inner)}]] above each of them")
             return []
         return [
-            Table(self.file, self.faults, item, self._lines, (*inner, index))
-            for index, item in enumerate(value)
+            Table(self.file, self.faults, element, self._lines, (*inner, index))
+            for index, element in enumerate(value)
         ]
 
     def finish(self) -> None:
@@ -161,7 +161,7 @@ class Table:
 def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
     """Parse a file; None with the syntax error noted."""
     try:
-        data = tomllib.loads(text.replace("\r\n", "\n"))
+        content = tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
         faults.add(file, None, None, "the brackets are nested too deeply for a campaign file")
     except ValueError as error:
@@ -173,7 +173,7 @@ def parse_toml(file: str, text: str, faults: Faults) -> Table | None:
         where = f" at character {match[2]}" if match and match[2] else ""
         faults.add(file, line, None, f"this is not TOML{where}: {reason[:200]}")
     else:
-        return Table(file, faults, data, lines_of_keys(text))
+        return Table(file, faults, content, lines_of_keys(text))
     return None
 
 

@@ -75,5 +75,5 @@ def _at_place_of(value: float, expanded: float, texts: Texts) -> str:
     return texts.number(round_result(value, expanded).estimate)
 
 
-def _plain(value: float, place: float, texts: Texts) -> str:
-    return texts.number(round_to_place(value, decimal_of(place)).normalize())
+def _plain(value: float, step: float, texts: Texts) -> str:
+    return texts.number(round_to_place(value, decimal_of(step)).normalize())

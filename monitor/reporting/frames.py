@@ -34,7 +34,7 @@ def referred(description: str, frame: FrameOfReference | None, texts: Texts) -> 
 
 def sum_words(terms: Mapping[str, float], decimal_sign: str = ".") -> str:
     """A sum of parameters: ``EA0B + EA0C``, factors of levers (µm by µrad) with four digits."""
-    words = ""
+    formula = ""
     for name, factor in terms.items():
         sign = MINUS if factor < 0.0 else "+"
         size = (
@@ -42,5 +42,5 @@ def sum_words(terms: Mapping[str, float], decimal_sign: str = ".") -> str:
             if abs(factor) == 1.0
             else f"{abs(factor):.4g}".replace(".", decimal_sign) + "\N{NO-BREAK SPACE}"
         )
-        words += f" {sign} {size}{name}" if words or factor < 0.0 else f"{size}{name}"
-    return words.strip()
+        formula += f" {sign} {size}{name}" if formula or factor < 0.0 else f"{size}{name}"
+    return formula.strip()

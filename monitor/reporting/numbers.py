@@ -97,8 +97,8 @@ def written_correlation(coefficient: float, decimal_sign: str = ".") -> str:
 
 def written_factor(factor: float, decimal_sign: str = ".", standard_error: float = 0.0) -> str:
     """Write a coverage factor with two decimals, 2.45; fewer where its standard error exceeds half of the last."""
-    place = next((place for place in ("0.01", "0.1") if standard_error <= 0.5 * float(place)), "1")
-    return written(round_to_place(factor, Decimal(place)), decimal_sign)
+    step = next((step for step in ("0.01", "0.1") if standard_error <= 0.5 * float(step)), "1")
+    return written(round_to_place(factor, Decimal(step)), decimal_sign)
 
 
 def written_probability(p: float, decimal_sign: str = ".") -> str:

@@ -72,7 +72,7 @@ def _advice(advice: Advice, say: Texts) -> str:
     key, several = f"sentences.{advice.kind.value}", f"sentences.{advice.kind.value}_several"
     conditions = zip(advice.names, advice.meanings or (), strict=False)
     return say(
-        several if len(advice.names) > 1 and several in say.words else key,
+        several if len(advice.names) > 1 and several in say.sentences else key,
         names=", ".join(advice.names),
         joined=_joined(advice.names, "both", say),
         planes=_joined(advice.names, "planes", say),

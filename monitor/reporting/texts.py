@@ -29,20 +29,20 @@ class Texts:
     """The words of one ``language`` (ISO 639-1) under ``section.key``."""
 
     language: str
-    words: Mapping[str, str]
+    sentences: Mapping[str, str]
 
     def __call__(self, key: str, /, **values: object) -> str:
         """A text with its places filled in. Raises KeyError for a key or a place that nobody wrote."""
-        return self.words[key].format(**values)
+        return self.sentences[key].format(**values)
 
     def markup(self, key: str, /, **values: object) -> Markup:
         """As the call, for a page: the text's own marks stay, those of ``values`` are escaped."""
-        return Markup(self.words[key]).format(**values)
+        return Markup(self.sentences[key]).format(**values)
 
     @property
     def decimal_sign(self) -> str:
         """The sign between whole and decimal digits."""
-        return self.words["language.decimal_sign"]
+        return self.sentences["language.decimal_sign"]
 
     def day(self, day: date) -> str:
         """A day as the language writes it."""

@@ -5,9 +5,8 @@ One method, one file. Units are those of the arrays passed in; nothing here know
 
 from monitor.statistics.backtest import Backtest, backtest
 from monitor.statistics.changes import Change, History, find_changes
-from monitor.statistics.common_change import joint_change
 from monitor.statistics.components import VarianceComponents, variance_components
-from monitor.statistics.conditions import Coefficient, Cycle, Dependence, dependence
+from monitor.statistics.conditions import Coefficient, Cycle, Dependence, DependenceUnits, dependence
 from monitor.statistics.control import (
     ControlChart,
     CusumChart,
@@ -21,7 +20,6 @@ from monitor.statistics.control import (
 )
 from monitor.statistics.fdr import FalseDiscoveries, control_false_discoveries
 from monitor.statistics.forecast import Crossing, Forecast, forecast, predict
-from monitor.statistics.groups import Selection, group_by, select_runs
 from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
 from monitor.statistics.joint_backtest import JointSeries, LengthBacktest, backtest_longest
 from monitor.statistics.joint_forecast import (
@@ -61,6 +59,7 @@ __all__ = [
     "CusumChart",
     "Cycle",
     "Dependence",
+    "DependenceUnits",
     "ErrorVectors",
     "FalseDiscoveries",
     "Forecast",
@@ -78,7 +77,6 @@ __all__ = [
     "Pooling",
     "Reference",
     "Resemblance",
-    "Selection",
     "Trend",
     "VarianceComponents",
     "VectorChart",
@@ -98,10 +96,8 @@ __all__ = [
     "find_changes",
     "forecast",
     "forecast_longest",
-    "group_by",
     "homogeneity",
     "individuals_chart",
-    "joint_change",
     "known_reference",
     "kruskal_wallis",
     "levene",
@@ -118,7 +114,6 @@ __all__ = [
     "reference_period",
     "residual_correlation",
     "robust_p_value",
-    "select_runs",
     "t_squared_chart",
     "trend",
     "variance_components",

@@ -161,10 +161,10 @@ def _blocks(days: _Days, past: npt.NDArray[np.intp], weight: Array) -> Blocks:
     first = np.minimum.accumulate(time)[past - 1]
     block = block_of(time[np.newaxis], number[:, np.newaxis], first[:, np.newaxis], last[:, np.newaxis])
     most = int(number.max())
-    place = (np.arange(len(past))[:, np.newaxis] * most + block).ravel()
+    cell = (np.arange(len(past))[:, np.newaxis] * most + block).ravel()
 
     def summed(column: Array) -> Array:
-        return np.asarray(np.bincount(place, column.ravel(), len(past) * most).reshape(len(past), most))
+        return np.asarray(np.bincount(cell, column.ravel(), len(past) * most).reshape(len(past), most))
 
     total = summed(weight)
     divisor = np.where(total > 0.0, total, 1.0)
@@ -261,10 +261,15 @@ def backtest(
     ]
     predicted, spread, dof = (np.concatenate(part) for part in zip(*forecasts, strict=True))
     # Days in two groups far apart foretell nothing.
-    made = np.isfinite(spread)
-    if not made.any():
+    foretold = np.isfinite(spread)
+    if not foretold.any():
         raise DataError("the days lie in two groups far apart, which foretell nothing of the next.")
-    predicted, spread, dof, target_runs = predicted[made], spread[made], dof[made], target_runs[made]
+    predicted, spread, dof, target_runs = (
+        predicted[foretold],
+        spread[foretold],
+        dof[foretold],
+        target_runs[foretold],
+    )
     errors = y[target_runs] - predicted
     z = errors / np.maximum(spread, 1e-300)
     inside = int((np.abs(z) <= -scipy.special.stdtrit(dof, (1.0 - level) / 2.0)).sum())

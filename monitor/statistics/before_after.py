@@ -153,17 +153,17 @@ def before_after(
             f"{len(x)} run(s) before and {len(y)} after say nothing of their scatter; three are needed."
         )
     sides = [(x, days_before, np.zeros(len(x), np.intp)), (y, days_after, np.ones(len(y), np.intp))]
-    own = _joined(sides)
-    means, other_days = own, 0
-    if others is not None and own.dof_days < ENOUGH and len(np.asarray(others.values)):
+    joined = _joined(sides)
+    means, other_days = joined, 0
+    if others is not None and joined.dof_days < ENOUGH and len(np.asarray(others.values)):
         values = as_vector(others.values, "others")
         stretch = label_groups(others.stretches, len(values))[1] + 2
         every = _joined([*sides, (values, others.days, stretch)])
-        if every.dof_days > own.dof_days:
-            means, other_days = every, len(every.mean) - len(own.mean)
+        if every.dof_days > joined.dof_days:
+            means, other_days = every, len(every.mean) - len(joined.mean)
     if np.ptp(x) == 0.0 and np.ptp(y) == 0.0:
         raise DataError("no run differs from the others of its side; the difference has no uncertainty.")
-    result = _judged(own, means, other_days)
+    result = _judged(joined, means, other_days)
     return result if others is None else _beside_campaigns(result, others)
 
 
@@ -207,13 +207,13 @@ def _factor(dof: float) -> float:
     return -float(scipy.special.stdtrit(dof, (1.0 - LEVEL) / 2.0))
 
 
-def _judged(own: _Means, means: _Means, other_days: int) -> BeforeAfter:
-    """The difference of the two sides of ``own`` by the scatter of the days of ``means``."""
-    sides = [own.stretch == side for side in (0, 1)]
-    first, second = (float(own.mean[side].mean()) for side in sides)
+def _judged(of_sides: _Means, means: _Means, other_days: int) -> BeforeAfter:
+    """The difference of the two sides of ``of_sides`` by the scatter of the days of ``means``."""
+    sides = [of_sides.stretch == side for side in (0, 1)]
+    first, second = (float(of_sides.mean[side].mean()) for side in sides)
     days = np.array([float(side.sum()) for side in sides])
     # Mean of 1/n over the days of a side: what the scatter of its runs adds to the variance of a day.
-    share = np.array([float((1.0 / own.runs[side]).mean()) for side in sides])
+    share = np.array([float((1.0 / of_sides.runs[side]).mean()) for side in sides])
     of_runs = means.within / means.dof_runs if means.dof_runs else 0.0
     if means.dof_days == 0:
         # Nothing is known of the days: what the runs say, as a lower bound.

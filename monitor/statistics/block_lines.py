@@ -117,11 +117,11 @@ def blocks_of_days(weight: Array, time: Array, value: Array, beside: Array) -> B
     """One series cut into blocks: the means of its days (d,) with their weights, columns ``beside`` (d, e)."""
     days = len(time)
     index = block_of(time, int(block_count(days)), time.min(), time.max())
-    place = np.unique(index, return_inverse=True)[1]
-    total = np.asarray(np.bincount(place, weight), dtype=np.float64)
+    block = np.unique(index, return_inverse=True)[1]
+    total = np.asarray(np.bincount(block, weight), dtype=np.float64)
 
     def mean(column: Array) -> Array:
-        return np.asarray(np.bincount(place, weight * column) / total, dtype=np.float64)
+        return np.asarray(np.bincount(block, weight * column) / total, dtype=np.float64)
 
     columns = np.stack([mean(column) for column in beside.T], axis=1) if beside.shape[1] else None
     return Blocks(
@@ -143,7 +143,7 @@ def _orthonormal(root: Array, columns: list[Array]) -> tuple[Array, Array]:
     """Basis (c, b, q) of columns (c, b) times ``root`` (c, b), and what the last one has of each (c, q)."""
     basis: list[Array] = []
     shares = np.zeros((len(root), len(columns)))
-    for place, column in enumerate(columns):
+    for index, column in enumerate(columns):
         rest = root * column
         length = np.sqrt(np.einsum("cb,cb->c", rest, rest))
         # Twice: what rounding leaves of the other columns is taken off as well.
@@ -151,12 +151,12 @@ def _orthonormal(root: Array, columns: list[Array]) -> tuple[Array, Array]:
             for before, unit in enumerate(basis):
                 part = np.einsum("cb,cb->c", unit, rest)
                 rest = rest - part[:, np.newaxis] * unit
-                if place == len(columns) - 1:
+                if index == len(columns) - 1:
                     shares[:, before] += part
         left_over = np.sqrt(np.einsum("cb,cb->c", rest, rest))
         good = left_over > DEPENDENT * np.maximum(length, 1e-300)
         basis.append(np.where(good[:, np.newaxis], rest, 0.0) / np.where(good, left_over, 1.0)[:, np.newaxis])
-        shares[:, place] = np.where(good, left_over, 0.0)
+        shares[:, index] = np.where(good, left_over, 0.0)
     return np.stack(basis, axis=2), shares
 
 
@@ -188,9 +188,9 @@ def _design(blocks: Blocks, cycle: float | None) -> tuple[_Design, Array, npt.ND
     if cycle is not None and cyclic.any():
         phase = 2.0 * np.pi / cycle * away
         wide, wide_shares = _orthonormal(root, [ones, np.cos(phase), np.sin(phase), *beside, away])
-        own, beside_cycle = shares[:, -1] ** 2, wide_shares[:, -1] ** 2
+        line_share, beside_cycle = shares[:, -1] ** 2, wide_shares[:, -1] ** 2
         cyclic &= (weight > 0.0).sum(axis=1) >= wide.shape[2] + 2
-        cyclic &= (own > 0.0) & (beside_cycle * WORST_INFLATION >= own)
+        cyclic &= (line_share > 0.0) & (beside_cycle * WORST_INFLATION >= line_share)
         # Series without the cycle have two columns of nothing in its stead.
         nothing = np.zeros((*basis.shape[:2], 2))
         plain = np.concatenate([basis[:, :, :1], nothing, basis[:, :, 1:]], axis=2)
@@ -251,20 +251,20 @@ def _plans(design: _Design) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
     return first, index
 
 
-def _at(table: Array, plan: npt.NDArray[np.intp], place: npt.NDArray[np.intp], share: Array) -> Array:
-    """Values of a table (m, g, ...) for the plans (c,), between the correlations ``place`` and the next."""
-    low, high = table[plan, place], table[plan, place + 1]
+def _at(table: Array, plan: npt.NDArray[np.intp], row: npt.NDArray[np.intp], share: Array) -> Array:
+    """Values of a table (m, g, ...) for the plans (c,), between the correlations ``row`` and the next."""
+    low, high = table[plan, row], table[plan, row + 1]
     weight = share.reshape(-1, *[1] * (low.ndim - 1))
     return np.asarray(low + weight * (high - low))
 
 
 def _between(neighbours: Array, product: Array) -> tuple[npt.NDArray[np.intp], Array]:
     """Place and share of the correlation at which ``neighbours`` (c, g), which rise, have a ``product`` (c,)."""
-    place = np.clip((neighbours <= product[:, np.newaxis]).sum(axis=1) - 1, 0, len(CORRELATIONS) - 2)
-    rows = np.arange(len(place))
-    low, high = neighbours[rows, place], neighbours[rows, place + 1]
+    row = np.clip((neighbours <= product[:, np.newaxis]).sum(axis=1) - 1, 0, len(CORRELATIONS) - 2)
+    rows = np.arange(len(row))
+    low, high = neighbours[rows, row], neighbours[rows, row + 1]
     share = np.clip((product - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
-    return place, share
+    return row, share
 
 
 def _packed(blocks: Blocks) -> Blocks:
@@ -318,19 +318,17 @@ def block_lines(blocks: Blocks, *, cycle: float | None = None) -> BlockLines:
     seen_place, seen_share = _between(tables.neighbours[plan], product)
     margin = np.interp(blocks.days, MARGIN_DAYS, MARGINS) / np.sqrt(np.maximum(blocks.days, 1.0))
     margin *= np.minimum(1.0, blocks.days / FULL_MARGIN)
-    place, share = _between(tables.neighbours[plan], product + margin)
-    inside, trace, dof = (
-        _at(table, plan, place, share) for table in (tables.inside, tables.trace, tables.dof)
-    )
+    row, share = _between(tables.neighbours[plan], product + margin)
+    inside, trace, dof = (_at(table, plan, row, share) for table in (tables.inside, tables.trace, tables.dof))
     enough = (count >= FEWEST_BLOCKS) & (count > rank) & (line[:, -1] > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.where(enough, square / trace, np.nan)
-        own = line[:, -1]
-        slope = np.where(enough, along[:, -1] / own, np.nan)
+        spread = line[:, -1]
+        slope = np.where(enough, along[:, -1] / spread, np.nan)
         covariance = np.empty((c, 2, 2))
         covariance[:, 0, 0] = inside[:, 0, 0] / design.ones**2
-        covariance[:, 1, 1] = inside[:, -1, -1] / own**2
-        covariance[:, 0, 1] = covariance[:, 1, 0] = inside[:, 0, -1] / (design.ones * own)
+        covariance[:, 1, 1] = inside[:, -1, -1] / spread**2
+        covariance[:, 0, 1] = covariance[:, 1, 0] = inside[:, 0, -1] / (design.ones * spread)
         covariance *= variance[:, np.newaxis, np.newaxis]
         scatter = np.where(enough, (count - rank) / trace, np.nan)
     return BlockLines(
@@ -339,7 +337,7 @@ def block_lines(blocks: Blocks, *, cycle: float | None = None) -> BlockLines:
         covariance=covariance,
         dof=np.where(enough, np.maximum(dof, 1.0), np.nan),
         correlation=_correlation(seen_place, seen_share),
-        allowed=_correlation(place, share),
+        allowed=_correlation(row, share),
         widening=np.sqrt(inside[:, -1, -1] * scatter),
         scatter=scatter,
         blocks=count,
@@ -351,5 +349,5 @@ def _columns(lines: BlockLines) -> list[npt.NDArray[np.generic]]:
     return [getattr(lines, name) for name in BlockLines.__dataclass_fields__]
 
 
-def _correlation(place: npt.NDArray[np.intp], share: Array) -> Array:
-    return np.asarray(CORRELATIONS[place] + share * (CORRELATIONS[place + 1] - CORRELATIONS[place]))
+def _correlation(row: npt.NDArray[np.intp], share: Array) -> Array:
+    return np.asarray(CORRELATIONS[row] + share * (CORRELATIONS[row + 1] - CORRELATIONS[row]))

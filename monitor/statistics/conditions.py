@@ -85,6 +85,18 @@ def _cycle(fit: MixedFit, at: int, name: str, period: float, origin: float) -> C
     return Cycle(name, period, amplitude, u, peak, float(scipy.special.fdtrc(2.0, dof, f)))
 
 
+@dataclass(frozen=True)
+class DependenceUnits:
+    """The unit of the ``values`` and those of the channels, by name: a coefficient has one where both are stated."""
+
+    values: Unit
+    channels: Mapping[str, Unit]
+
+
+def _unit_of(units: DependenceUnits | None, channel: str) -> Unit | None:
+    return None if units is None else _per(units.values, units.channels.get(channel))
+
+
 def _per(unit: Unit | None, channel: Unit | None) -> Unit | None:
     """Unit of a coefficient; per kelvin where the channel is a Celsius temperature."""
     if unit is None or channel is None:
@@ -115,14 +127,14 @@ def _widened(
     factor, dof = np.ones(len(fit.coefficients)), fit.dof.copy()
     by_day = _mean_square(np.arange(len(times)), weight, means, residual)
     for at in range(1, design.shape[1]):
-        place = _blocks_of(times, periods[at])
-        if place is None:
+        block = _blocks_of(times, periods[at])
+        if block is None:
             continue
         # Blocks of several days scatter more than as many independent days would.
-        by_block = _mean_square(place, weight, means, residual)
+        by_block = _mean_square(block, weight, means, residual)
         swollen = max(by_block / by_day, 1.0) if by_day > 0.0 and np.isfinite(by_block) else 1.0
         beside = np.delete(means, [0, at], axis=1)
-        lines = block_lines(_cut(place, weight, means[:, at], residual, beside))
+        lines = block_lines(_cut(block, weight, means[:, at], residual, beside))
         widening, freedom = float(lines.widening[0]), float(lines.dof[0])
         if not np.isfinite(widening):
             continue
@@ -134,10 +146,10 @@ def _widened(
     return replace(fit, covariance=fit.covariance * np.outer(factor, factor), dof=dof)
 
 
-def _mean_square(place: npt.NDArray[np.intp], weight: Array, columns: Array, value: Array) -> float:
-    """Mean square of what weighted block means (place (d,) of each day) leave over columns (d, q); NaN without any."""
-    total = np.asarray(np.bincount(place, weight), dtype=np.float64)
-    both = np.column_stack([np.bincount(place, weight * column) for column in (*columns.T, value)])
+def _mean_square(block: npt.NDArray[np.intp], weight: Array, columns: Array, value: Array) -> float:
+    """Mean square of what weighted means of blocks leave over columns (d, q), ``block`` (d,) of each day; or NaN."""
+    total = np.asarray(np.bincount(block, weight), dtype=np.float64)
+    both = np.column_stack([np.bincount(block, weight * column) for column in (*columns.T, value)])
     rows = both / np.sqrt(total)[:, np.newaxis]
     solution, _, rank, _ = np.linalg.lstsq(rows[:, :-1], rows[:, -1], rcond=1e-9)
     free = len(rows) - int(rank)
@@ -155,15 +167,15 @@ def _blocks_of(times: Array, period: float | None) -> npt.NDArray[np.intp] | Non
     return np.asarray(np.unique(index, return_inverse=True)[1])
 
 
-def _cut(place: npt.NDArray[np.intp], weight: Array, along: Array, value: Array, beside: Array) -> Blocks:
+def _cut(block: npt.NDArray[np.intp], weight: Array, along: Array, value: Array, beside: Array) -> Blocks:
     """Blocks whose line goes along a column instead of time."""
-    total = np.asarray(np.bincount(place, weight), dtype=np.float64)
+    total = np.asarray(np.bincount(block, weight), dtype=np.float64)
 
     def mean(column: Array) -> Array:
-        return np.asarray(np.bincount(place, weight * column) / total)[np.newaxis]
+        return np.asarray(np.bincount(block, weight * column) / total)[np.newaxis]
 
     columns = np.stack([mean(column) for column in beside.T], axis=2) if beside.shape[1] else None
-    return Blocks(total[np.newaxis], mean(along), mean(value), np.array([float(len(place))]), columns)
+    return Blocks(total[np.newaxis], mean(along), mean(value), np.array([float(len(block))]), columns)
 
 
 def _design(
@@ -203,15 +215,14 @@ def dependence(
     drift: bool = True,
     u: npt.ArrayLike | None = None,
     days: npt.ArrayLike | None = None,
-    unit: Unit | None = None,
-    channel_units: Mapping[str, Unit] | None = None,
+    units: DependenceUnits | None = None,
     level: float = 0.95,
     independent: bool = False,
 ) -> Dependence:
     """Coefficients of ``values`` (n,) on ``channels`` (each (n,)) and on ``cycles`` (name to period).
 
     ``times`` and the periods share any unit; ``u`` and ``days`` as in ``trend``. A coefficient's unit is
-    ``unit`` per channel unit (µm/m per °C becomes µm/m/K); one that was given neither has none. Raises
+    that of the values per channel unit (µm/m per °C becomes µm/m/K); without ``units`` it has none. Raises
     ``DataError`` for a channel that never varies, terms that are exactly dependent, a cycle seen over less
     than half its period, too few runs, or non-finite values. Errors in the channels themselves are
     neglected: they pull a coefficient towards zero by the ratio of their variance to that of the channel.
@@ -224,26 +235,26 @@ def dependence(
     run_u = None if u is None else as_positive(u, "u", length=len(y))
     index = np.arange(len(y)) if days is None else label_groups(days, len(y))[1]
     origin = float(t.mean())
-    terms, design = _design(t, channels, cycles or {}, drift)
+    cycles = cycles or {}
+    terms, design = _design(t, channels, cycles, drift)
     fit = fit_with_days(y, design, run_u, index)
     if not independent:
-        waves = [period for period in (cycles or {}).values() for _ in range(2)]
+        waves = [period for period in cycles.values() for _ in range(2)]
         periods = [None] * (design.shape[1] - len(waves)) + waves
         fit = _widened(fit, design, index, t, periods)
     weight = np.ones_like(y) if run_u is None else 1.0 / run_u**2
     about = y - np.average(y, weights=weight)
     total = float((weight * about**2).sum())
-    units = channel_units or {}
     start = 2 if drift else 1
     scale = np.outer(fit.u, fit.u)
     return Dependence(
         coefficients=tuple(
-            _coefficient(fit, start + i, name, _per(unit, units.get(name)), level)
+            _coefficient(fit, start + i, name, _unit_of(units, name), level)
             for i, name in enumerate(channels)
         ),
         cycles=tuple(
             _cycle(fit, start + len(channels) + 2 * i, name, period, origin)
-            for i, (name, period) in enumerate((cycles or {}).items())
+            for i, (name, period) in enumerate(cycles.items())
         ),
         drift=_coefficient(fit, 1, "drift", None, level) if drift else None,
         terms=terms,

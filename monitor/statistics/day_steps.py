@@ -18,7 +18,7 @@ from monitor.records import Array
 def _share(means: Array) -> Array:
     """Largest share of the sum of squares of columns (d, m) that a step or a line takes (m,)."""
     d = len(means)
-    columns = np.column_stack([np.arange(d), *(np.arange(d) >= place for place in range(1, d))]).astype(
+    columns = np.column_stack([np.arange(d), *(np.arange(d) >= first for first in range(1, d))]).astype(
         np.float64
     )
     columns -= columns.mean(axis=0)

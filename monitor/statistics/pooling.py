@@ -77,11 +77,6 @@ class Pooling:
         """Degrees of freedom within the groups, n - k."""
         return self.covariance_pooled.dof
 
-    @property
-    def dof_by_group(self) -> npt.NDArray[np.int64]:
-        """Degrees of freedom n_j - 1 of each group (k,)."""
-        return self.counts - 1
-
 
 def _covariances(
     sums: GroupedSums, names: tuple[str, ...]

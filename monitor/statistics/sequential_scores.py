@@ -109,8 +109,8 @@ class VectorScores:
         a, b = self._last[pair], y[pair]
         self._first[0, pair] += a
         self._first[1, pair] += b
-        for k, (left, right) in enumerate(((a, a), (b, b), (b, a))):
-            self._second[k, pair] += left[:, :, None] * right[:, None, :]
+        for k, (first, second) in enumerate(((a, a), (b, b), (b, a))):
+            self._second[k, pair] += first[:, :, None] * second[:, None, :]
         self.count[pair] += 1.0
         whole = np.isfinite(y).all(axis=1)
         self._last[whole] = y[whole]
@@ -120,8 +120,8 @@ class VectorScores:
         n, p = self.count[rows], y.shape[1]
         aa, bb, ba = self._second[:, rows]
         mean = (self._first[1, rows] - rho * self._first[0, rows]) / n[:, None]
-        left, right = rho[:, :, None], rho[:, None, :]
-        scatter = bb - right * ba - left * ba.transpose(0, 2, 1) + left * right * aa
+        first, second = rho[:, :, None], rho[:, None, :]
+        scatter = bb - second * ba - first * ba.transpose(0, 2, 1) + first * second * aa
         scatter -= n[:, None, None] * mean[:, :, None] * mean[:, None, :]
         scale = np.sqrt(np.maximum(np.einsum("mii->mi", scatter), 1e-300))
         scatter /= scale[:, :, None] * scale[:, None, :]
@@ -152,16 +152,16 @@ def shrunk_correlation(raw: Array, count: Array) -> Array:
     usable = np.isfinite(raw)
     if not usable.any():
         return np.zeros_like(raw)
-    own = 1.0 / np.where(usable, count, np.inf)
+    sampling = 1.0 / np.where(usable, count, np.inf)
     mean = float(raw[usable].mean())
-    between = max(float(np.mean((raw[usable] - mean) ** 2 - own[usable])), 0.0)
+    between = max(float(np.mean((raw[usable] - mean) ** 2 - sampling[usable])), 0.0)
     rows = usable.any(axis=1)
     of_machines = np.nanmean(raw[rows], axis=1)
     several = len(of_machines) > 1
-    of_mean = float(of_machines.var(ddof=1) / len(of_machines) if several else own[usable].max())
-    share = np.where(usable, between / np.maximum(between + own, 1e-300), 0.0)
+    of_mean = float(of_machines.var(ddof=1) / len(of_machines) if several else sampling[usable].max())
+    share = np.where(usable, between / np.maximum(between + sampling, 1e-300), 0.0)
     centre = mean + share * np.where(usable, raw - mean, 0.0)
-    unknown = np.where(usable, share * own, between) + (1.0 - share) ** 2 * of_mean
+    unknown = np.where(usable, share * sampling, between) + (1.0 - share) ** 2 * of_mean
     return np.asarray(np.clip(centre + MARGIN * np.sqrt(unknown), 0.0, LARGEST))
 
 
@@ -203,6 +203,6 @@ class TailShape:
             certain = self._FAR * total + 2.0 * np.sqrt(total * self._FAR * (1.0 - self._FAR))
             middle = self._EDGES[np.searchsorted(below, self._MIDDLE * total)] + 0.005
             far = self._EDGES[min(np.searchsorted(below, min(certain, total)), len(self._EDGES) - 1)] + 0.005
-            place = min(int(np.searchsorted(self._ratio, far / middle)), len(self._FREEDOM) - 1)
-            self.freedom, self.scale = float(self._FREEDOM[place]), float(middle / self._middle[place])
+            row = min(int(np.searchsorted(self._ratio, far / middle)), len(self._FREEDOM) - 1)
+            self.freedom, self.scale = float(self._FREEDOM[row]), float(middle / self._middle[row])
         return normal

@@ -124,10 +124,10 @@ def _line_of_days(days: _Days, cycle: float | None) -> BlockLines:
 def _independent(fit: MixedFit, at: float) -> BlockLines:
     """The same where days are taken as independent: what the fit itself says."""
     pick = np.ix_([0, -1], [0, -1])
-    one, none = np.ones(1), np.zeros(1)
+    unity, none = np.ones(1), np.zeros(1)
     return BlockLines(
         at=np.array([at]), slope=fit.coefficients[-1:], covariance=fit.covariance[pick][np.newaxis], dof=fit.dof[-1:],
-        correlation=none, allowed=none, widening=one, scatter=one, blocks=np.zeros(1, dtype=np.int64),
+        correlation=none, allowed=none, widening=unity, scatter=unity, blocks=np.zeros(1, dtype=np.int64),
         cyclic=np.zeros(1, dtype=np.bool_),
     )  # fmt: skip
 

@@ -129,8 +129,8 @@ class _Vectors:
 
     def scores(self, values: Array, correlation: Array) -> Array:
         """Return the scores of the machines in ``rows`` and add their values, both (m, p) of the whole fleet."""
-        place = np.ix_(self.rows, self.columns)
-        return self._scores.add(values[place], correlation[place])
+        cells = np.ix_(self.rows, self.columns)
+        return self._scores.add(values[cells], correlation[cells])
 
     def add(self, scores: Array, stake: float) -> tuple[Array, npt.NDArray[np.int64]]:
         """Return the worth (r,) of the machines' stakes and the values since each probable change."""

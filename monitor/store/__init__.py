@@ -11,7 +11,6 @@ from monitor.store.analyses import (
     check_analysis,
     latest_documents,
     latest_maps,
-    list_analyses,
     load_analysis,
     save_analysis,
     stored_analyses,
@@ -47,8 +46,6 @@ from monitor.store.history import MachineHistory, latest_tolerances, machine_his
 from monitor.store.identifications import (
     identification_by_number,
     identification_numbers,
-    list_identifications,
-    list_parameters,
     load_identification,
     save_identification,
 )
@@ -84,7 +81,13 @@ from monitor.store.models import (
 )
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
-from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
+from monitor.store.selections import (
+    SelectionRow,
+    StoredSelection,
+    find_selection,
+    list_selections,
+    save_selection,
+)
 from monitor.store.sharing import SharedDatabase
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
 from monitor.store.turns import Holder, Patience
@@ -110,6 +113,7 @@ __all__ = [
     "QueryResult",
     "RecordedRun",
     "RunRow",
+    "SelectionRow",
     "SharedDatabase",
     "StoredAnalysis",
     "StoredCertificate",
@@ -155,15 +159,12 @@ __all__ = [
     "latest_documents",
     "latest_maps",
     "latest_tolerances",
-    "list_analyses",
     "list_backups",
     "list_campaigns",
     "list_certificates",
     "list_events",
-    "list_identifications",
     "list_machines",
     "list_models",
-    "list_parameters",
     "list_runs",
     "list_selections",
     "list_withdrawn",

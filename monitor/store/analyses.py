@@ -18,7 +18,7 @@ from monitor.store.catalogue import campaign_number, check_machine
 from monitor.store.connection import Database, utc_now
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 @dataclass(frozen=True)
@@ -188,15 +188,6 @@ def _stored(row: tuple[Any, ...]) -> StoredAnalysis:
         document=json.loads(document),
         software_version=software,
         computed_at=computed_at,
-    )
-
-
-def list_analyses(db: Database, kind: str | None = None) -> pd.DataFrame:
-    """All results without their documents, the latest first: from the view ``v_analyses``."""
-    return db.frame(
-        "SELECT * EXCLUDE (document) FROM v_analyses WHERE $kind IS NULL OR kind = $kind "
-        "ORDER BY analysis_id DESC",
-        {"kind": kind},
     )
 
 

@@ -99,9 +99,9 @@ def chain_faults(db: Database) -> tuple[str, ...]:
             )
             faults.append(f"audit entry {entry} was altered: {how}")
         elif follows != previous and entry == before + 1:
-            place = f"entry {entry_of[follows]}" if follows in entry_of else "one that is gone"
+            position = f"entry {entry_of[follows]}" if follows in entry_of else "one that is gone"
             faults.append(
-                f"audit entry {entry} does not follow the one before it: it was written behind {place}"
+                f"audit entry {entry} does not follow the one before it: it was written behind {position}"
             )
         previous, before = entry_sha256, entry
     return tuple(faults)

@@ -159,9 +159,11 @@ def _manifest(path: Path) -> Path:
 
 def _read_manifest(path: Path) -> Backup:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        tables = {name: (int(rows), str(checksum)) for name, (rows, checksum) in data.pop("tables").items()}
-        return Backup(**data, tables=tables)
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        tables = {
+            name: (int(rows), str(checksum)) for name, (rows, checksum) in manifest.pop("tables").items()
+        }
+        return Backup(**manifest, tables=tables)
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as fault:
         raise StoreError(f"{path} is not a manifest of a backup: {fault}") from fault
 

@@ -46,13 +46,13 @@ def export_tables(
         raise InputError(f"{folder} is not an empty folder; name a new one")
     if machine is not None:
         check_machine(db, machine)
-    chosen = _chosen(db, tables, machine)
+    relations = _chosen(db, tables, machine)
     partial = folder.with_name(folder.name + ".partial")
     try:
         _remove(partial)
         partial.mkdir(parents=True, mode=0o700)
         (partial / _MARK).touch()
-        written = [_copy(db, name, partial, form, machine) for name in chosen]
+        written = [_copy(db, name, partial, form, machine) for name in relations]
         written.append(_columns(db, partial))
         if tables is None and machine is None:
             written += _source_files(db, partial)
@@ -90,13 +90,13 @@ def _chosen(db: Database, tables: Sequence[str] | None, machine: str | None) -> 
     names = _names(db)
     if tables is None and machine is not None:
         return [name for name in names if name.startswith("v_") and _has_machine(db, name)]
-    chosen = [name if name in names else f"v_{name}" for name in (names if tables is None else tables)]
-    for asked, name in zip(tables or names, chosen, strict=True):
+    relations = [name if name in names else f"v_{name}" for name in (names if tables is None else tables)]
+    for asked, name in zip(tables or names, relations, strict=True):
         if name not in names:
             raise NotFoundError(
                 f"there is no table {asked!r}; {did_you_mean(asked, names)}there are {', '.join(names)}"
             )
-    return chosen
+    return relations
 
 
 def _has_machine(db: Database, name: str) -> bool:

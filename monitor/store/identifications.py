@@ -25,7 +25,7 @@ from monitor.store.results import (
 from monitor.units import Unit
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 def save_identification(db: Database, identification: StoredIdentification) -> int:
@@ -128,26 +128,6 @@ def identification_by_number(db: Database, number: int) -> StoredIdentification:
     )
 
 
-def list_identifications(db: Database, campaign: str | None = None) -> pd.DataFrame:
-    """All identifications, or those of a campaign: the view ``v_identifications``."""
-    return db.frame(
-        "SELECT * FROM v_identifications WHERE $campaign IS NULL OR campaign = $campaign ORDER BY ALL",
-        {"campaign": campaign},
-    )
-
-
-def list_parameters(
-    db: Database, *, machine: str | None = None, campaign: str | None = None, parameter: str | None = None
-) -> pd.DataFrame:
-    """Parameters of runs in display units, in the order of time: the view ``v_parameters``."""
-    return db.frame(
-        "SELECT * FROM v_parameters WHERE ($machine IS NULL OR machine = $machine) "
-        "AND ($campaign IS NULL OR campaign = $campaign) AND ($parameter IS NULL OR parameter = $parameter) "
-        "ORDER BY started_at, campaign, run, model, model_version, parameter",
-        {"machine": machine, "campaign": campaign, "parameter": parameter},
-    )
-
-
 def identification_numbers(db: Database, software_version: str) -> list[int]:
     """Return the numbers of the identifications that a version made of campaigns that count."""
     return [
@@ -203,8 +183,8 @@ def _insert_values(db: Database, number: int, identification: StoredIdentificati
 def _insert_frames(db: Database, number: int, identification: StoredIdentification) -> None:
     if identification.refers_to:
         names = np.array(list(identification.refers_to), dtype=object)
-        words = np.array(list(identification.refers_to.values()), dtype=object)
-        incoming = {"parameter": names, "refers_to": words}
+        references = np.array(list(identification.refers_to.values()), dtype=object)
+        incoming = {"parameter": names, "refers_to": references}
         db.insert("INSERT INTO parameter_frame SELECT ?, * FROM incoming", incoming, [number])
 
 

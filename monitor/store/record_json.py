@@ -36,7 +36,7 @@ def machine_json(machine: Machine) -> str:
     for settings in axes.values():
         if settings["gear_ratio"] is None:
             del settings["gear_ratio"]
-    data: dict[str, Any] = {
+    document: dict[str, Any] = {
         "id": machine.id,
         "topology": machine.topology,
         "manufacturer": machine.manufacturer,
@@ -47,25 +47,25 @@ def machine_json(machine: Machine) -> str:
         "tolerances": dict(machine.tolerances),
     }
     if machine.chain:
-        data["chain"] = [asdict(axis) for axis in machine.chain]
+        document["chain"] = [asdict(axis) for axis in machine.chain]
     if machine.gravity is not None:
-        data["gravity"] = machine.gravity
-    return _text(data)
+        document["gravity"] = machine.gravity
+    return _text(document)
 
 
 def machine_record(text: str) -> Machine:
     """The machine of ``machine_json``."""
-    data = json.loads(text)
-    gravity = _tuple(data.pop("gravity", None))
+    document = json.loads(text)
+    gravity = _tuple(document.pop("gravity", None))
     axes = {
         name: AxisSettings(**{**settings, "stroke": _tuple(settings["stroke"])})
-        for name, settings in data.pop("axes").items()
+        for name, settings in document.pop("axes").items()
     }
     chain = tuple(
         ChainAxis(**{**axis, "direction": _tuple(axis["direction"]), "offset": _tuple(axis["offset"])})
-        for axis in data.pop("chain", ())
+        for axis in document.pop("chain", ())
     )
-    return Machine(**data, axes=axes, chain=chain, gravity=gravity)
+    return Machine(**document, axes=axes, chain=chain, gravity=gravity)
 
 
 def probe_json(probe: Probe) -> str:
@@ -75,8 +75,8 @@ def probe_json(probe: Probe) -> str:
 
 def probe_record(text: str) -> Probe:
     """The probe of ``probe_json``."""
-    data = json.loads(text)
-    return Probe(**{**data, "tip": _tuple(data["tip"])})
+    document = json.loads(text)
+    return Probe(**{**document, "tip": _tuple(document["tip"])})
 
 
 def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
@@ -84,19 +84,19 @@ def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
 
     The stated ``sources`` of uncertainty stand beside it, where there are any.
     """
-    data = asdict(artefact)
+    document = asdict(artefact)
     # Left out where there is none, so that the text of an artefact written before this key existed stays the same.
     if artefact.self_calibration is None:
-        del data["self_calibration"]
+        del document["self_calibration"]
     if not artefact.reflectors:
-        del data["reflectors"]
+        del document["reflectors"]
     if artefact.l_shape is None:
-        del data["l_shape"]
+        del document["l_shape"]
     if sources:
-        data["sources"] = [to_document(source) for source in sources]
+        document["sources"] = [to_document(source) for source in sources]
     if not artefact.setups:
-        del data["setups"]
-    return _text(data)
+        del document["setups"]
+    return _text(document)
 
 
 def sources_record(text: str) -> tuple[Source, ...]:
@@ -106,46 +106,47 @@ def sources_record(text: str) -> tuple[Source, ...]:
 
 def artefact_record(text: str) -> Artefact:
     """The artefact of ``artefact_json``."""
-    data = json.loads(text)
-    balls = tuple(Ball(**{**ball, "nominal": _tuple(ball["nominal"])}) for ball in data["balls"])
-    bar = data["scale_bar"]
+    document = json.loads(text)
+    balls = tuple(Ball(**{**ball, "nominal": _tuple(ball["nominal"])}) for ball in document["balls"])
+    bar = document["scale_bar"]
     return Artefact(
-        data["id"],
+        document["id"],
         balls,
         None if bar is None else ScaleBar(**{**bar, "balls": _tuple(bar["balls"])}),
-        tuple(Reflector(**reflector) for reflector in data.get("reflectors", ())),
-        l_shape=_l_shape(data.get("l_shape")),
-        self_calibration=_self_calibration(data.get("self_calibration")),
-        setups=tuple(map(_setup, data.get("setups", ()))),
+        tuple(Reflector(**reflector) for reflector in document.get("reflectors", ())),
+        l_shape=_l_shape(document.get("l_shape")),
+        self_calibration=_self_calibration(document.get("self_calibration")),
+        setups=tuple(map(_setup, document.get("setups", ()))),
     )
 
 
-def _setup(data: dict[str, Any]) -> Setup:
+def _setup(document: dict[str, Any]) -> Setup:
     vectors = ("tool_point", "work_point", "direction", "tool_direction", "known")
-    return Setup(**{**data, **{name: _tuple(data[name]) for name in vectors}})
+    return Setup(**{**document, **{name: _tuple(document[name]) for name in vectors}})
 
 
-def _self_calibration(data: dict[str, Any] | None) -> SelfCalibration | None:
-    if data is None:
+def _self_calibration(document: dict[str, Any] | None) -> SelfCalibration | None:
+    if document is None:
         return None
-    nodes = {axis: tuple(places) for axis, places in data["nodes"].items()}
-    return SelfCalibration(nodes, KnownError(**data["length"]), tuple(data["conditions"]))
+    nodes = {axis: tuple(places) for axis, places in document["nodes"].items()}
+    return SelfCalibration(nodes, KnownError(**document["length"]), tuple(document["conditions"]))
 
 
-def _l_shape(data: dict[str, Any] | None) -> LShape | None:
-    if data is None:
+def _l_shape(document: dict[str, Any] | None) -> LShape | None:
+    if document is None:
         return None
     modules = tuple(
-        Module(module["id"], _tuple(module["centre"]), _tuple(module["tilt"])) for module in data["modules"]
+        Module(module["id"], _tuple(module["centre"]), _tuple(module["tilt"]))
+        for module in document["modules"]
     )
     placements = tuple(
-        Placement(placement["plane"], _tuple(placement["corner"])) for placement in data["placements"]
+        Placement(placement["plane"], _tuple(placement["corner"])) for placement in document["placements"]
     )
-    return LShape(**{**data, "modules": modules, "placements": placements})
+    return LShape(**{**document, "modules": modules, "placements": placements})
 
 
-def _text(data: dict[str, Any]) -> str:
-    return json.dumps(data, ensure_ascii=False, allow_nan=False)
+def _text(document: dict[str, Any]) -> str:
+    return json.dumps(document, ensure_ascii=False, allow_nan=False)
 
 
 def _tuple(values: list[Any] | None) -> Any:

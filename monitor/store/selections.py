@@ -7,18 +7,15 @@ runs meet a condition is decided by who stores it; here they are kept with the w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
-from typing import TYPE_CHECKING
 
 from monitor import __version__
+from monitor.documents import IN_UTC
 from monitor.exceptions import InputError, NotFoundError, did_you_mean
 from monitor.store import audit
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -31,6 +28,20 @@ class StoredSelection:
     condition: str
     runs: tuple[int, ...]
     made_at: datetime
+
+
+@dataclass(frozen=True)
+class SelectionRow:
+    """A selection as the view ``v_selections`` has it."""
+
+    selection: str
+    campaign: str
+    machine: str
+    condition: str
+    runs: tuple[int, ...]
+    run_count: int
+    made_at: datetime = field(metadata=IN_UTC)
+    selection_id: int
 
 
 def save_selection(db: Database, campaign: str, name: str, condition: str, runs: Sequence[int]) -> int:
@@ -90,9 +101,10 @@ def find_selection(db: Database, name: str, campaign: str | None = None) -> Stor
     return StoredSelection(number, selection, owner, condition, tuple(runs), made_at)
 
 
-def list_selections(db: Database, campaign: str | None = None) -> pd.DataFrame:
-    """The selections of all campaigns or of one: the view ``v_selections``."""
-    return db.frame(
+def list_selections(db: Database, campaign: str | None = None) -> tuple[SelectionRow, ...]:
+    """The selections of all campaigns or of one."""
+    return db.records(
+        SelectionRow,
         "SELECT * FROM v_selections WHERE $campaign IS NULL OR campaign = $campaign ORDER BY campaign, selection",
         {"campaign": campaign},
     )

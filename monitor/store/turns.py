@@ -170,18 +170,18 @@ def _last_writer(file: int) -> Holder:
 def _activity(pid: int) -> str:
     """Return what a process does, as `monitor import`, or its program; empty where the system does not say."""
     try:
-        words = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")[:-1]
+        arguments = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")[:-1]
     except OSError:
         return ""
     starts = [
-        place
-        for place, word in enumerate(words[:4])
+        index
+        for index, word in enumerate(arguments[:4])
         if Path(word).name == "monitor" or word == "monitor.cli" or word.endswith("monitor/cli/__main__.py")
     ]
     if not starts:
-        return Path(words[0]).name if words else ""
+        return Path(arguments[0]).name if arguments else ""
     # Only the verb is named: file names of others are none of the reader's business.
-    following = words[starts[-1] + 1 :]
+    following = arguments[starts[-1] + 1 :]
     while following and following[0].startswith("-"):
         following = following[1 if "=" in following[0] else 2 :]
     return f"monitor {following[0]}" if following else "monitor"

@@ -50,18 +50,18 @@ def sheets(db: Database, names: Sequence[str] | None, machine: str | None) -> tu
             "SELECT view_name FROM duckdb_views() WHERE NOT internal AND starts_with(view_name, 'v_') ORDER BY ALL"
         )
     ]
-    made = []
+    sheets = []
     for name in SHEETS if names is None else names:
         view = name if name in views else f"v_{name}"
         if name in SHEETS:
-            made.append(SHEETS[name](db, machine))
+            sheets.append(SHEETS[name](db, machine))
         elif view in views:
-            made.append(_view(db, view, machine))
+            sheets.append(_view(db, view, machine))
         else:
             every = [*SHEETS, *views]
             hint = did_you_mean(name, every)
             raise NotFoundError(f"there is no table {name!r}; {hint}there are {', '.join(every)}")
-    return tuple(made)
+    return tuple(sheets)
 
 
 def _view(db: Database, view: str, machine: str | None, name: str | None = None) -> Sheet:
@@ -140,21 +140,21 @@ def _changes(db: Database, machine: str | None) -> Sheet:
         f"FROM v_events {_WHERE}",
         {"machine": machine},
     )
-    found: list[tuple[Any, ...]] = []
+    rows: list[tuple[Any, ...]] = []
     for owner, text in db.rows(
         "SELECT machine, arg_max(document, analysis_id) FROM v_analyses "
         "WHERE kind = 'trend' AND ($machine IS NULL OR machine = $machine) GROUP BY machine ORDER BY machine",
         {"machine": machine},
     ):
         for parameter, followed in json.loads(text)["parameters"].items():
-            found += [
+            rows += [
                 (owner, change["at"], change["kind"], parameter, change["size"], change["u"], change["unit"],
                  change["p_value"], "found by trend")
                 for kind in ("changes", "drifts")
                 for change in followed.get(kind, ())
             ]  # fmt: skip
     columns = ("machine", "at / UTC", "kind", "parameter", "size", "u", "unit of size and u", "p", "what")
-    ordered = sorted([*events, *found], key=lambda row: (row[0], str(row[1])))
+    ordered = sorted([*events, *rows], key=lambda row: (row[0], str(row[1])))
     return Sheet("changes", columns, tuple(ordered), ("",) * len(columns))
 
 

@@ -9,7 +9,6 @@ from monitor.uncertainty.adaptive import (
 )
 from monitor.uncertainty.covariance import (
     Inputs,
-    covariance_of_day,
     joined,
     overall,
     pooled_by_day,
@@ -27,7 +26,6 @@ from monitor.uncertainty.coverage import (
 )
 from monitor.uncertainty.degrees_of_freedom import effective_dof
 from monitor.uncertainty.framework import FrameworkResult, gum_framework
-from monitor.uncertainty.intervals import coverage_interval
 from monitor.uncertainty.marginals import (
     Arcsine,
     Empirical,
@@ -90,8 +88,6 @@ __all__ = [
     "adaptive_monte_carlo",
     "block_generator",
     "correlated_rectangle_factor",
-    "covariance_of_day",
-    "coverage_interval",
     "effective_dof",
     "ellipsoid_factor",
     "gum_framework",

@@ -95,9 +95,9 @@ def conformity(
 
 def _below(values: Array, freedoms: Array) -> Array:
     """Probabilities (m,) that Student's t, or a normal number, is below ``values`` (m,)."""
-    known = np.isinf(freedoms)
-    student = scipy.special.stdtr(np.where(known, 1.0, freedoms), values)
-    return np.asarray(np.where(known, scipy.special.ndtr(values), student))
+    infinite = np.isinf(freedoms)
+    student = scipy.special.stdtr(np.where(infinite, 1.0, freedoms), values)
+    return np.asarray(np.where(infinite, scipy.special.ndtr(values), student))
 
 
 def _box(correlation: Array, a: Array, b: Array, dof: float, rng: np.random.Generator) -> list[float]:

@@ -115,26 +115,6 @@ def overall(
     return _inputs(values, centred.T @ centred / dof, dof, names, units, source, mean_of)
 
 
-def covariance_of_day(
-    values: Array,
-    days: npt.ArrayLike,
-    day: int,
-    names: Sequence[str],
-    units: Sequence[str],
-    *,
-    source: str = "repeated runs",
-    mean_of: int = 1,
-) -> Inputs:
-    """Inputs from the runs of one ``day``; ``days`` (runs,) says on which day each run was."""
-    labels = _checked_days(values, days)
-    of_day = labels == day
-    if not np.any(of_day):
-        raise DataError(f"no run on day {day}; there are days {', '.join(map(str, np.unique(labels)))}")
-    if np.sum(of_day) < 2:
-        raise DataError(f"day {day} has a single run; a covariance of a day needs at least two")
-    return overall(np.asarray(values)[of_day], names, units, source=source, mean_of=mean_of)
-
-
 def pooled_by_day(
     values: Array,
     days: npt.ArrayLike,

@@ -43,14 +43,14 @@ class EllipsoidLaw:
 
     ``rank`` r of the whole. The largest estimated part (degrees of freedom ``dof``) has the variances ``ratios`` (b,)
     in the b coordinates of the rest, falling, ``active`` of them not zero, and is all there is in the r - b others.
-    ``known`` (b, b) and ``others``, each (matrix (b, b), its degrees of freedom, what they are of), are the rest.
+    ``certain`` (b, b) and ``others``, each (matrix (b, b), its degrees of freedom, what they are of), are the rest.
     """
 
     rank: int
     dof: float
     ratios: Array
     active: int
-    known: Array
+    certain: Array
     others: tuple[tuple[Array, float, Estimated], ...]
 
     @property
@@ -77,7 +77,7 @@ class EllipsoidLaw:
             plugged[: self.active] = self.dof * stein_eigenvalues(self.ratios[: self.active], self.left_dof)
         world = _World(
             np.broadcast_to(plugged, (count, len(plugged))),
-            np.broadcast_to(self.known, (count, *self.known.shape)),
+            np.broadcast_to(self.certain, (count, *self.certain.shape)),
             [_Other.of(matrix, dof, kind, count) for matrix, dof, kind in self.others],
         )
         observed = self._observed(*self._drawn(rng, world))
@@ -91,11 +91,11 @@ class EllipsoidLaw:
         """Draw what is estimated in a world: the largest part (n, a + beyond, a + beyond), the rest (n, b, b)."""
         count, a = len(world.largest), self.active
         others = [other.redrawn(rng) for other in world.others]
-        rest = world.known + sum((other.covariance for other in others), np.zeros_like(world.known))
+        rest = world.certain + sum((other.covariance for other in others), np.zeros_like(world.certain))
         wishart = wishart_roots(rng, count, a + self.beyond, self.left_dof + self.beyond)
         scale = np.concatenate([np.sqrt(world.largest[:, :a]), np.ones((count, self.beyond))], axis=1)
         root = scale[:, :, None] * wishart / math.sqrt(self.dof)
-        return root @ np.swapaxes(root, 1, 2), rest, _World(world.largest, world.known, others)
+        return root @ np.swapaxes(root, 1, 2), rest, _World(world.largest, world.certain, others)
 
     def _quantile(self, rng: np.random.Generator, world: _World, p: float) -> float:
         """Return the p-quantile of the distance of the truth in the metric of what is drawn."""
@@ -122,7 +122,7 @@ class EllipsoidLaw:
         a, b = self.active, len(self.ratios)
         count = len(world.largest)
         others = [other.redrawn(rng) for other in world.others]
-        covariance = world.known + sum((other.covariance for other in others), np.zeros_like(world.known))
+        covariance = world.certain + sum((other.covariance for other in others), np.zeros_like(world.certain))
         scale = np.sqrt(world.largest)
         root = scale[:, :a, None] * wishart_roots(rng, count, a, self.left_dof) / math.sqrt(self.dof)
         covariance[:, :a, :a] += root @ np.swapaxes(root, 1, 2)
@@ -139,13 +139,13 @@ class EllipsoidLaw:
     def _observed(self, part: Array, rest: Array, drawn: _World) -> _World:
         """Return what an observer of a drawn world takes for true, where its rest is the unit matrix."""
         count, a, b = len(rest), self.active, len(self.ratios)
-        seen = np.zeros((count, b, b))
-        seen[:, :a, :a] = part[:, :a, :a]
+        estimated = np.zeros((count, b, b))
+        estimated[:, :a, :a] = part[:, :a, :a]
         if self.beyond:
             across = part[:, :a, a]
-            seen[:, :a, :a] -= across[:, :, None] * across[:, None, :] / part[:, a, a][:, None, None]
+            estimated[:, :a, :a] -= across[:, :, None] * across[:, None, :] / part[:, a, a][:, None, None]
         whitener = np.linalg.inv(np.linalg.cholesky(rest))
-        values, vectors = np.linalg.eigh(whitener @ seen @ np.swapaxes(whitener, 1, 2))
+        values, vectors = np.linalg.eigh(whitener @ estimated @ np.swapaxes(whitener, 1, 2))
         turn = np.swapaxes(vectors[:, :, ::-1], 1, 2) @ whitener
         largest = np.zeros((count, b))
         if a:
@@ -153,7 +153,7 @@ class EllipsoidLaw:
             largest[:, :a] = self.dof * stein_eigenvalues(ratios, self.left_dof)
         return _World(
             largest,
-            turn @ drawn.known @ np.swapaxes(turn, 1, 2),
+            turn @ drawn.certain @ np.swapaxes(turn, 1, 2),
             [replace(other, root=turn @ other.root) for other in drawn.others],
         )
 
@@ -188,10 +188,10 @@ class _Other:
 
 @dataclass(frozen=True)
 class _World:
-    """What is taken for true in n trials: ``largest`` (n, b), ``known`` (n, b, b) and the other estimated parts."""
+    """What is taken for true in n trials: ``largest`` (n, b), ``certain`` (n, b, b) and the other estimated parts."""
 
     largest: Array
-    known: Array
+    certain: Array
     others: list[_Other]
 
 
@@ -216,10 +216,10 @@ class SizeLaw:
         squares /= squares.sum(axis=1, keepdims=True)
         # Truth 1 and an estimate of it; that estimate as truth, and an estimate of it in turn.
         once, twice = (1.0 + (size - 1.0) * self.shares for size in (second, first * second))
-        seen = 1.0 + (first - 1.0) * self.shares
+        estimated = 1.0 + (first - 1.0) * self.shares
         k_first, k_second = (
             radial_quantile(np.sqrt(np.sum(squares * true / estimate, axis=1)), rank, p)
-            for true, estimate in ((1.0, once), (seen, twice))
+            for true, estimate in ((1.0, once), (estimated, twice))
         )
         return k_first * k_first / k_second
 
@@ -236,23 +236,31 @@ def ellipsoid_law(parts: Sequence[BudgetLine], p: float) -> EllipsoidLaw | SizeL
     rank = len(whitener)
     if rank == 0:
         return ellipsoid_factor(1, p)
+    white = _whitened(parts, whitener)
+    if not white:
+        return ellipsoid_factor(rank, p)
+    if any(kind is Estimated.MATRIX and dof < _rank(matrix) + 1.0 for matrix, dof, kind in white):
+        return math.inf
+    certain = _symmetric(np.eye(rank) - np.sum([matrix for matrix, _, _ in white], axis=0))
+    if len(white) > 1:
+        return _law(white, certain, rank)
+    ((matrix, dof, kind),) = white
+    if float(np.abs(np.linalg.eigvalsh(certain)).max()) < _NEGLIGIBLE:
+        of_one = ellipsoid_factor if kind is Estimated.MATRIX else ellipsoid_factor_of_size
+        return of_one(rank, p, dof)
+    if kind is Estimated.SCALE:
+        return SizeLaw(np.clip(np.linalg.eigvalsh(matrix), 0.0, 1.0), dof)
+    return _law(white, certain, rank)
+
+
+def _whitened(parts: Sequence[BudgetLine], whitener: Array) -> list[tuple[Array, float, Estimated]]:
+    """Return matrix (r, r) in units of the sum, degrees of freedom and kind of every estimated part that counts."""
     white = [
         (_symmetric(whitener @ part.covariance @ whitener.T), part.dof, part.estimated)
         for part in parts
         if part.dof is not None and not part.known
     ]
-    white = [entry for entry in white if np.trace(entry[0]) > _NEGLIGIBLE]
-    if not white:
-        return ellipsoid_factor(rank, p)
-    if any(kind is Estimated.MATRIX and dof < _rank(matrix) + 1.0 for matrix, dof, kind in white):
-        return math.inf
-    known = _symmetric(np.eye(rank) - np.sum([matrix for matrix, _, _ in white], axis=0))
-    if len(white) == 1 and float(np.abs(np.linalg.eigvalsh(known)).max()) < _NEGLIGIBLE:
-        of_one = ellipsoid_factor if white[0][2] is Estimated.MATRIX else ellipsoid_factor_of_size
-        return of_one(rank, p, white[0][1])
-    if len(white) == 1 and white[0][2] is Estimated.SCALE:
-        return SizeLaw(np.clip(np.linalg.eigvalsh(white[0][0]), 0.0, 1.0), white[0][1])
-    return _law(white, known, rank)
+    return [entry for entry in white if np.trace(entry[0]) > _NEGLIGIBLE]
 
 
 def ellipsoid_factor_of_size(outputs: int, p: float, dof: float) -> float:
@@ -260,7 +268,7 @@ def ellipsoid_factor_of_size(outputs: int, p: float, dof: float) -> float:
     return math.sqrt(outputs * float(scipy.special.fdtri(outputs, dof, p)))
 
 
-def _law(white: Sequence[tuple[Array, float, Estimated]], known: Array, rank: int) -> EllipsoidLaw:
+def _law(white: Sequence[tuple[Array, float, Estimated]], certain: Array, rank: int) -> EllipsoidLaw:
     matrices = [index for index, (_, _, kind) in enumerate(white) if kind is Estimated.MATRIX]
     reference = max(matrices, key=lambda index: float(np.trace(white[index][0])), default=None)
     rest = np.eye(rank) if reference is None else np.eye(rank) - white[reference][0]
@@ -275,7 +283,7 @@ def _law(white: Sequence[tuple[Array, float, Estimated]], known: Array, rank: in
         dof=math.inf if reference is None else white[reference][1],
         ratios=ratios,
         active=int(np.sum(ratios > _NEGLIGIBLE)),
-        known=_symmetric(basis.T @ known @ basis),
+        certain=_symmetric(basis.T @ certain @ basis),
         others=tuple(
             (_symmetric(basis.T @ matrix @ basis), dof, kind)
             for index, (matrix, dof, kind) in enumerate(white)

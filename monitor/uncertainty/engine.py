@@ -101,8 +101,3 @@ def _result(
         f"{MOST_DEATHS} workers died one after the other with the same task in hand: it needs more memory than they "
         "have, or something ends them; nothing was kept"
     )
-
-
-def map_in_order(engine: Engine, task: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """``task`` of every item, one task an item, such as a run; in the order of the items."""
-    return list(in_order(engine, task, ((item,) for item in items)))

@@ -445,17 +445,17 @@ def _reading(w, index, x, row, factor):  # type: ignore[no-untyped-def]
 @_jit
 def _lanes(theta, x, gradient, w, g, steps, entries, walk, probings, distances, targets_at):  # type: ignore[no-untyped-def]
     """Gradient of LANES trials, theta (p + held) rows of lanes, x N rows, gradient as theta."""
-    item, begin, end, moves, sine, cosine = walk
+    segment_of, begin, end, moves, sine, cosine = walk
     start, target, row, weight, scale = probings
     between, length_row, length_weight = distances
     kind = steps[0]
     axis = steps[1]
     gradient[:] = 0.0
     plain = False
-    for s in range(len(item)):
-        plain |= item[s] < 0 and kind[begin[s]] != TURN_SET
-        if item[s] >= 0:
-            segment = g[item[s]]
+    for s in range(len(segment_of)):
+        plain |= segment_of[s] < 0 and kind[begin[s]] != TURN_SET
+        if segment_of[s] >= 0:
+            segment = g[segment_of[s]]
             _begin(w)
             for i in range(_C * L, _F * L):
                 w[i] = 0.0
@@ -469,9 +469,9 @@ def _lanes(theta, x, gradient, w, g, steps, entries, walk, probings, distances, 
         for i in range(_C * L, _Q * L):
             w[i] = 0.0
         _begin(w)
-        for s in range(len(item)):
-            if item[s] >= 0:
-                segment = g[item[s]]
+        for s in range(len(segment_of)):
+            if segment_of[s] >= 0:
+                segment = g[segment_of[s]]
                 _enter(w, segment)
                 _enter_axes(w, segment, moves[s])
             elif kind[begin[s]] == TURN_SET:
@@ -493,18 +493,18 @@ def _lanes(theta, x, gradient, w, g, steps, entries, walk, probings, distances, 
         if plain:
             # Steps of this class alone need the frame they stand in: walk again.
             _begin(w)
-        for s in range(len(item)):
-            if item[s] >= 0:
-                segment = g[item[s]]
+        for s in range(len(segment_of)):
+            if segment_of[s] >= 0:
+                segment = g[segment_of[s]]
                 if plain:
                     _enter(w, segment)
                 _leave(w, segment)
                 _leave_axes(w, segment, moves[s])
             elif plain:
                 _step(begin[s], c, start[c], True, theta, x, gradient, w, steps, entries)
-    for s in range(len(item)):
-        if item[s] >= 0:
-            segment = g[item[s]]
+    for s in range(len(segment_of)):
+        if segment_of[s] >= 0:
+            segment = g[segment_of[s]]
             for i in range((_Q - _F) * L):
                 w[_F * L + i] = segment[_SEG_F * L + i]
             _begin(w)
@@ -565,10 +565,10 @@ def gradient_of(program: Program, unknowns: Array, inputs: Array) -> Array:
         np.ascontiguousarray(inputs),
         out,
         program.held,
-        int(np.max(program.item, initial=-1)) + 1,
+        int(np.max(program.segment_of, initial=-1)) + 1,
         (program.kind, program.axis, program.sign, program.reading, program.first, program.amount),
         (program.unknown, program.along, program.value, program.row, program.scale),
-        (program.item, program.begin, program.end, program.moves, np.sin(angles), np.cos(angles)),
+        (program.segment_of, program.begin, program.end, program.moves, np.sin(angles), np.cos(angles)),
         (program.start, program.target, program.row, program.weight, program.scale),
         (program.between, program.length_row, program.length_weight),
         program.targets_at,

@@ -39,7 +39,7 @@ class Program:
 
     ``kind``, ``axis`` (0 x, 1 y, 2 z), ``sign`` (K,) and ``first`` (K + 1,): a step's entries are
     ``first[k]:first[k + 1]``; for a reading ``reading[k]`` is the place of its axis. ``amount`` (C, K) holds
-    set angles and shifts. ``item``, ``begin``, ``end``, ``moves`` are the walk in segments (``_segments``).
+    set angles and shifts. ``segment_of``, ``begin``, ``end``, ``moves`` are the walk in segments (``_segments``).
     An entry adds ``value[c, e]`` times unknown ``unknown[e]``, times the reading of axis ``along[e]`` unless
     that is -1. ``start`` (C + 1,), ``target``, ``row`` (n, 3) of inputs (-1 for an axis that is not there)
     and ``weight`` (n, 3) describe the probings; ``between`` (D, 2), ``length_row``, ``length_weight`` (D,)
@@ -56,7 +56,7 @@ class Program:
     unknown: Ints
     along: Ints
     value: Array
-    item: Ints
+    segment_of: Ints
     begin: Ints
     end: Ints
     moves: npt.NDArray[np.bool_]
@@ -230,7 +230,7 @@ def _assemble(run: TouchedRun, steps: list[_Step]) -> Program:
     scale = np.zeros(AXES)
     scale[: len(run.linear)] = run.signs
     first = np.concatenate([[0], np.cumsum([len(step.entries) for step in steps])])
-    item, begin, end, moves = _segments(steps, amounts, values, first)
+    segment_of, begin, end, moves = _segments(steps, amounts, values, first)
     return Program(
         kind=np.array([step.kind for step in steps]),
         axis=np.array([step.axis for step in steps]),
@@ -241,7 +241,7 @@ def _assemble(run: TouchedRun, steps: list[_Step]) -> Program:
         unknown=np.array([number for number, _, _ in entries], dtype=np.int64),
         along=np.array([along for _, along, _ in entries], dtype=np.int64),
         value=np.ascontiguousarray(values[sample]),
-        item=item,
+        segment_of=segment_of,
         begin=begin,
         end=end,
         moves=moves,
@@ -283,7 +283,7 @@ def _segments(
 ) -> tuple[Ints, Ints, Ints, npt.NDArray[np.bool_]]:
     """The walk as items: segments of steps that are the same for all probings, and single steps between.
 
-    ``item`` is a segment's number or -1, ``begin`` and ``end`` its steps, ``moves`` (items, 3) whether a reading
+    ``segment_of`` is a segment's number or -1, ``begin`` and ``end`` its steps, ``moves`` (items, 3) whether a reading
     acts in it.
     """
     items: list[tuple[int, int, int]] = []
@@ -302,5 +302,5 @@ def _segments(
     for index, (_, begin, end) in enumerate(items):
         for step in steps[begin:end]:
             moves[index, sorted(step.axes)] = True
-    item, begin_of, end_of = (np.array(column, dtype=np.int64) for column in zip(*items, strict=True))
-    return item, begin_of, end_of, moves
+    segment_of, begin_of, end_of = (np.array(column, dtype=np.int64) for column in zip(*items, strict=True))
+    return segment_of, begin_of, end_of, moves

@@ -99,11 +99,11 @@ def rectangle_law(parts: Sequence[BudgetLine]) -> RectangleLaw:
         if part.dof is not None and not part.known
     ]
     estimated = [entry for entry in estimated if float(np.diag(entry[0]).max(initial=0.0)) > _NEGLIGIBLE]
-    known = shared(total) - np.sum([np.zeros_like(scale), *(matrix for matrix, _, _ in estimated)], axis=0)
+    certain = shared(total) - np.sum([np.zeros_like(scale), *(matrix for matrix, _, _ in estimated)], axis=0)
     laws = [(_root(matrix), dof, kind) for matrix, dof, kind in estimated]
-    if float(np.diag(known).max(initial=0.0)) > _NEGLIGIBLE:
-        np.einsum("ii->i", known)[:] = np.maximum(np.diag(known), 0.0)
-        laws.append((_root(known), math.inf, Estimated.SCALE))
+    if float(np.diag(certain).max(initial=0.0)) > _NEGLIGIBLE:
+        np.einsum("ii->i", certain)[:] = np.maximum(np.diag(certain), 0.0)
+        laws.append((_root(certain), math.inf, Estimated.SCALE))
     return RectangleLaw(tuple(laws))
 
 

@@ -1,4 +1,4 @@
-"""Risks of a decision about a tolerance where it is known how such parameters scatter (JCGM 106:2012, 7 and 9.5).
+"""Risks of a decision about a tolerance where it is known how such parameters scatter (JCGM 106:2012, 9.5).
 
 The specific risks of one result are its probabilities of conformity (``conformity``). The global ones are of the rule:
 how often it accepts what is out of tolerance, and rejects what is in, over parameters that scatter as the process does.
@@ -39,11 +39,6 @@ class Process:
             raise DataError(
                 f"a process needs a finite mean and a positive spread, not {self.mean}, {self.spread}"
             )
-
-    def posterior(self, estimate: float, u: float) -> tuple[float, float]:
-        """Return estimate and standard uncertainty of one parameter with what the process tells before (7.2.2)."""
-        weight = self.spread**2 / (self.spread**2 + u**2)
-        return self.mean + weight * (estimate - self.mean), math.sqrt(weight) * u
 
     def risks(
         self, u: float, limits: tuple[float, float], acceptance: tuple[float, float] | None

@@ -93,8 +93,8 @@ def _ball_form(scene: Scene, source: Source) -> Shared:
     if not balls.any():
         raise InputError(f"source '{source.name}': no ball is touched in this campaign; leave it out")
     if problem.touch_normals is None:
-        told = np.eye(3)[None].repeat(scene.rows, axis=0)
-        return scene.observed(told), scene.alike(scene.targets, scene.poses)
+        turned = np.eye(3)[None].repeat(scene.rows, axis=0)
+        return scene.observed(turned), scene.alike(scene.targets, scene.poses)
     along = np.round(problem.touch_normals / _SAME_DIRECTION)
     return balls[:, None, None].astype(np.float64), scene.alike(scene.targets, along)
 
@@ -104,8 +104,8 @@ def _probe_lobing(scene: Scene, source: Source) -> Shared:
     _needs_touches(scene, source)
     normals = scene.run.problem.touch_normals
     if normals is None:
-        told = np.eye(3)[None].repeat(scene.rows, axis=0)
-        return scene.observed(told), scene.alike(scene.targets, scene.poses)
+        turned = np.eye(3)[None].repeat(scene.rows, axis=0)
+        return scene.observed(turned), scene.alike(scene.targets, scene.poses)
     in_tool = np.einsum("nij,ni->nj", scene.by_tip, normals)
     return np.ones((scene.rows, 1, 1)), scene.alike(np.round(in_tool / _SAME_DIRECTION))
 

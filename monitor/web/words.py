@@ -9,7 +9,7 @@ from datetime import datetime
 
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
-from monitor.workflow.fleet import ATTENTION, FleetTableRow
+from monitor.workflow.fleet import ATTENTION, Attention, FleetTableRow
 
 
 @dataclass(frozen=True)
@@ -102,11 +102,11 @@ def how_far(row: FleetTableRow) -> str:
         if row.years_to_limit is not None:
             return f"{reach}; reached in {_span(row.years_to_limit)} at this rate"
         return reach
-    if row.attention == ATTENTION[2] and row.mean is not None and row.latest is not None:
+    if row.attention is Attention.STANDS_OUT and row.mean is not None and row.latest is not None:
         return f"{latest}, where the days are at {number(row.mean)}{unit} on average"
-    if row.attention == ATTENTION[3] and row.slope_per_year is not None:
+    if row.attention is Attention.DRIFTS and row.slope_per_year is not None:
         return f"{latest}, moving by {number(row.slope_per_year)}{unit} a year"
-    if row.attention == ATTENTION[4] and row.sd_pooled:
+    if row.attention is Attention.DAYS_DIFFER and row.sd_pooled:
         days, runs = number(row.between_days, 2), number(row.sd_pooled, 2)
         return f"{latest}; days scatter by {days}{unit}, runs by {runs}{unit}"
     return latest
@@ -114,7 +114,7 @@ def how_far(row: FleetTableRow) -> str:
 
 def since(row: FleetTableRow) -> str:
     """Say since when: the latest day where it alone stands out, else the last event, else the first run."""
-    if row.attention == ATTENTION[2]:
+    if row.attention is Attention.STANDS_OUT:
         return day(row.latest_at)
     return "the first run" if row.since is None else f"{day(row.since)}, the last event"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
+from enum import StrEnum
 
 import numpy as np
 
@@ -69,6 +70,23 @@ class FleetRequest:
             raise InputError(f"--top {self.top}: a number of rows, 0 for all")
 
 
+class Attention(StrEnum):
+    """Why a parameter needs attention, the most urgent first; the last is of a limit of the volumetric error."""
+
+    OUT = "out of tolerance"
+    DRIFTS_OUT = "drifts out of tolerance within a year"
+    STANDS_OUT = "the latest day stands out"
+    DRIFTS = "drifts"
+    DAYS_DIFFER = "days differ much more than runs"
+    AS_USUAL = "as usual"
+    ONE_DAY = "one day only, nothing to compare it with"
+    UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
+
+
+#: The classes by their number.
+ATTENTION = tuple(Attention)
+
+
 @dataclass(frozen=True)
 class FleetTableRow:
     """A parameter of a machine: why it needs attention, the tests of its days, its drift, its latest day."""
@@ -76,7 +94,7 @@ class FleetTableRow:
     rank: int
     machine: str
     parameter: str
-    attention: str
+    attention: Attention
     unit: str
     n: int
     days: int
@@ -152,6 +170,15 @@ def _limits(db: Database, sums: FleetSums) -> Array:
     return np.array([stated.get(key, np.nan) for key in keys])
 
 
+def _level(sums: FleetSums, drift: CellDrift) -> Array:
+    """Where the line of each cell is on the last day, from which trend page and report forecast, too.
+
+    The mean of that day alone scatters as runs and days do, and so would the day on which the limit is reached.
+    """
+    ahead = sums.last_d - sums.epoch_d - sums.sum_t / sums.groups
+    return np.asarray(sums.origin + sums.sum_m / sums.groups + drift.slope * ahead)
+
+
 def _rank(
     sums: FleetSums, cells: CellTests, drift: CellDrift, drift_q: Array, limit: Array
 ) -> tuple[Array, Array, Array]:
@@ -160,7 +187,7 @@ def _rank(
     share = np.abs(latest) / limit
     per_year = drift.slope * DAYS_PER_YEAR
     with np.errstate(divide="ignore", invalid="ignore"):
-        years = (np.where(per_year >= 0.0, limit, -limit) - latest) / per_year
+        years = (np.where(per_year >= 0.0, limit, -limit) - _level(sums, drift)) / per_year
         # Against the other days: the latest one is taken out of their mean.
         k = sums.groups
         others = (sums.sum_m - sums.latest) / (k - 1.0)
@@ -182,22 +209,6 @@ def _rank(
         mask = np.asarray(holds, dtype=np.bool_)
         kind[mask], measure[mask] = number, np.nan_to_num(size)[mask]
     return kind, measure, years
-
-
-AS_USUAL = "as usual"
-#: Of a limit of the volumetric error.
-UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
-#: The classes, the most urgent first.
-ATTENTION = (
-    "out of tolerance",
-    "drifts out of tolerance within a year",
-    "the latest day stands out",
-    "drifts",
-    "days differ much more than runs",
-    AS_USUAL,
-    "one day only, nothing to compare it with",
-    UNJUDGED,
-)
 
 
 def _date(days: float) -> str | None:
@@ -288,7 +299,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
         values=int(sums.runs.sum()),
         false_discovery_rate=RATE,
         attention={
-            label: int((kind == number).sum()) + sum(row.attention == label for row in volumetric)
+            label: int((kind == number).sum()) + sum(row.attention is label for row in volumetric)
             for number, label in enumerate(ATTENTION)
         },
         not_identified=not_identified(db) if request.model is None else (),
@@ -319,7 +330,9 @@ def _volumetric_rows(db: Database, machines: set[str]) -> list[FleetTableRow]:
     rows = []
     for machine, limit in limits.items():
         latest = worst.get(machine)
-        attention = UNJUDGED if latest is None else ATTENTION[0] if latest >= limit else AS_USUAL
+        attention = Attention.OUT if latest is not None and latest >= limit else Attention.AS_USUAL
+        if latest is None:
+            attention = Attention.UNJUDGED
         rows.append(
             FleetTableRow(
                 rank=0, machine=machine, parameter="volumetric error", attention=attention, unit=MICROMETRE.name,

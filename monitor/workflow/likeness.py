@@ -80,18 +80,24 @@ class LikeRequest:
             raise InputError(
                 f"--months {self.months}: 1 or more, and at most {MOST_CAMPAIGNS} campaigns together"
             )
-        if self.peak_um is not None and (not math.isfinite(self.peak_um) or self.peak_um <= 0):
-            raise InputError(f"--peak {self.peak_um}: the peak must be a number of µm above 0")
-        if self.peak_um is not None and self.effect is None:
-            raise InputError(f"--peak {self.peak_um:g} needs --effect, the effect that has it")
+        self._check_peak()
         if self.seed < 0:
             raise InputError(f"--seed {self.seed}: a seed is a whole number from 0 on")
-        for machine in [drift.machine for drift in self.drifts] + [step.machine for step in self.events]:
+        changes: tuple[Drift | Step, ...] = (*self.drifts, *self.events)
+        for machine in (change.machine for change in changes):
             if machine is not None and machine not in self.machines:
                 raise InputError(
                     f"there is no machine '{machine}' among those asked for; "
                     f"{did_you_mean(machine, self.machines)}there are {', '.join(self.machines)}"
                 )
+
+    def _check_peak(self) -> None:
+        if self.peak_um is None:
+            return
+        if not math.isfinite(self.peak_um) or self.peak_um <= 0:
+            raise InputError(f"--peak {self.peak_um}: the peak must be a number of µm above 0")
+        if self.effect is None:
+            raise InputError(f"--peak {self.peak_um:g} needs --effect, the effect that has it")
 
 
 @dataclass(frozen=True)

@@ -36,16 +36,16 @@ def test_there_are_english_and_german() -> None:
 
 @pytest.mark.parametrize("language", languages())
 def test_every_language_has_the_same_keys_with_the_same_places(language: str) -> None:
-    words = texts_of(language).words
-    assert set(words) == set(ENGLISH.words)
+    words = texts_of(language).sentences
+    assert set(words) == set(ENGLISH.sentences)
     assert {key: places(text) for key, text in words.items()} == {
-        key: places(text) for key, text in ENGLISH.words.items()
+        key: places(text) for key, text in ENGLISH.sentences.items()
     }
     assert not [key for key, text in words.items() if not text.strip()]
 
 
 def test_german_is_german() -> None:
-    same = {key for key, text in texts_of("de").words.items() if text == ENGLISH.words[key]}
+    same = {key for key, text in texts_of("de").sentences.items() if text == ENGLISH.sentences[key]}
     # Words and signs that both languages have.
     signs = {"page.guard_band", "page.consumers_risk", "page.producers_risk", "record.with_uncertainty"}
     assert same == {"page.software", "page.symbol", "page.parameter", "page.map_expanded"} | signs
@@ -67,7 +67,7 @@ def test_no_template_holds_text(template: str) -> None:
 def test_keys_that_a_template_names_are_there() -> None:
     named = re.findall(r'texts(?:\.markup)?\("([a-z_.]+)"', report_text("certificate.html"))
     assert len(named) > 30
-    assert set(named) <= set(ENGLISH.words)
+    assert set(named) <= set(ENGLISH.sentences)
 
 
 def test_days_and_numbers_follow_the_language() -> None:
@@ -157,4 +157,4 @@ def test_a_sentence_that_is_all_there_is_stays_as_it_is() -> None:
 @pytest.mark.parametrize("kind", [*AdviceKind, *ReasonKind])
 def test_every_kind_of_reason_has_a_sentence(kind: AdviceKind | ReasonKind) -> None:
     without_text = {AdviceKind.OWN_WORDS, ReasonKind.NOT_SEPARATED}
-    assert (f"sentences.{kind.value}" in ENGLISH.words) == (kind not in without_text)
+    assert (f"sentences.{kind.value}" in ENGLISH.sentences) == (kind not in without_text)

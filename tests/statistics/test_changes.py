@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.statistics import find_changes, joint_change
+from monitor.statistics import find_changes
 from monitor.statistics.day_evidence import shows_wide_days
 from monitor.statistics.scan import Scanner
 
@@ -246,22 +246,6 @@ def test_known_events_split_the_history_and_are_no_findings():
     assert abs(found[0].size - 8.0) < 4 * found[0].u
 
 
-def test_joint_change_sees_what_no_parameter_shows_alone_at_its_rate(rate_agrees):
-    rng = np.random.default_rng(9)
-    t = np.arange(24)
-    alarms = sum(
-        joint_change(rng.normal(size=(24, 4)), t, rng=rng, trials=199).p_value <= 0.05 for _ in range(200)
-    )
-    assert rate_agrees(alarms, 200, 0.05)
-    values = rng.normal(size=(24, 1)) + 0.1 * rng.normal(size=(24, 2))
-    values[14:, 0] += 0.5
-    values *= [1.0, 1e-6]
-    found = joint_change(values, t, rng=rng)
-    assert found.index == 14
-    assert found.p_value < 0.002
-    assert find_changes({"a": values[:, 0], "b": values[:, 1]}, t, rng=rng).changes == ()
-
-
 def test_refusals_say_what_is_needed():
     rng = np.random.default_rng(0)
     with pytest.raises(DataError, match="times falls at index 3"):
@@ -272,5 +256,3 @@ def test_refusals_say_what_is_needed():
         find_changes({"a": np.arange(6.0)}, np.arange(6.0), u={"b": np.ones(6)}, rng=rng)
     with pytest.raises(DataError, match="values holds no parameter"):
         find_changes({}, np.arange(6.0), rng=rng)
-    with pytest.raises(DataError, match="8 runs for 4 parameters; more than 8"):
-        joint_change(rng.normal(size=(8, 4)), np.arange(8.0), rng=rng)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import DataError
-from monitor.statistics import dependence
+from monitor.statistics import DependenceUnits, dependence
 from monitor.units import DEGREE_CELSIUS, METRE, MICROMETRE, Unit
 
 
@@ -42,8 +42,7 @@ def test_coefficient_has_the_unit_of_value_per_channel():
         y,
         np.arange(40.0),
         {"x_axis_degC": temperature},
-        unit=per_metre,
-        channel_units={"x_axis_degC": DEGREE_CELSIUS},
+        units=DependenceUnits(per_metre, {"x_axis_degC": DEGREE_CELSIUS}),
     )
     assert result.coefficients[0].unit == Unit("µm/m/K", 1e-6)
     assert abs(result.coefficients[0].value - 11.5) < 4 * result.coefficients[0].u

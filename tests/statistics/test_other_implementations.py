@@ -10,7 +10,7 @@ import pytest
 import statsmodels.api as sm
 from scipy import optimize, signal
 
-from monitor.statistics import dependence, mewma_limit, warm_up
+from monitor.statistics import DependenceUnits, dependence, mewma_limit, warm_up
 from monitor.statistics.run_length import cusum_run_length, ewma_run_length
 from monitor.units import DEGREE_CELSIUS, METRE, MICROMETRE
 
@@ -46,8 +46,7 @@ def test_coefficients_of_independent_runs_are_those_of_statsmodels_ols():
         y,
         t,
         channels,
-        unit=MICROMETRE.per(METRE),
-        channel_units=dict.fromkeys(channels, DEGREE_CELSIUS),
+        units=DependenceUnits(MICROMETRE.per(METRE), dict.fromkeys(channels, DEGREE_CELSIUS)),
         independent=True,
     )
     theirs = sm.OLS(y, design(t, channels)).fit()

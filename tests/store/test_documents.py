@@ -12,7 +12,6 @@ from monitor.records import Campaign
 from monitor.store import (
     Database,
     import_campaign,
-    list_analyses,
     list_events,
     load_analysis,
     record_event,
@@ -41,7 +40,8 @@ def test_latest_of_its_kind_is_given_and_the_earlier_stays(db: Database, campaig
     assert load_analysis(db, "uncertainty").number == 3
     assert load_analysis(db, "uncertainty", method="mcm").number == 2
     assert load_analysis(db, "comparison", machine=campaign.machine.id, model="samba").number == 4
-    assert list(list_analyses(db, "uncertainty")["analysis_id"]) == [3, 2, 1]
+    numbers = db.rows("SELECT analysis_id FROM v_analyses WHERE kind = 'uncertainty' ORDER BY ALL")
+    assert numbers == [(1,), (2,), (3,)]
 
 
 def test_document_that_is_not_json(db: Database) -> None:

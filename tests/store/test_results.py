@@ -15,13 +15,19 @@ from monitor.store import (
     StoredIdentification,
     identification_by_number,
     import_campaign,
-    list_identifications,
-    list_parameters,
     load_identification,
     save_identification,
 )
 
 Make = Callable[..., StoredIdentification]
+
+
+def superseded(db: Database) -> list[bool]:
+    """Whether each identification was replaced by a later one, in the order of their numbers."""
+    return [
+        bool(replaced)
+        for (replaced,) in db.rows("SELECT superseded FROM v_identifications ORDER BY identification_id")
+    ]
 
 
 @pytest.fixture
@@ -56,7 +62,9 @@ def test_parameters_are_seen_in_their_display_unit(
     db: Database, kept: Campaign, make_identification: Make
 ) -> None:
     save_identification(db, make_identification(kept))
-    table = list_parameters(db, campaign=kept.name).set_index(["run", "parameter"])
+    table = db.frame("SELECT * FROM v_parameters WHERE campaign = ?", [kept.name]).set_index(
+        ["run", "parameter"]
+    )
     assert table.loc[(2, "EX0C"), "unit"] == "µm"
     assert table.loc[(2, "EX0C"), "value"] == pytest.approx(0.2, rel=1e-15)
     assert table.loc[(1, "EA0B"), "unit"] == "µrad"
@@ -91,10 +99,10 @@ def test_later_identification_supersedes_and_the_earlier_stays(
     first, second = make_identification(kept), make_identification(kept, shift=1.0)
     save_identification(db, first)
     save_identification(db, second)
-    assert list(list_identifications(db, kept.name)["superseded"]) == [True, False]
+    assert superseded(db) == [True, False]
     _assert_same(load_identification(db, kept.name), second)
     _assert_same(identification_by_number(db, 1), first)
-    assert set(list_parameters(db)["identification_id"]) == {2}
+    assert set(db.rows("SELECT identification_id FROM v_parameters")) == {(2,)}
 
 
 def test_identification_of_one_run_replaces_that_run_in_the_views_only(
@@ -114,7 +122,7 @@ def test_versions_of_a_model_stand_side_by_side(
 ) -> None:
     save_identification(db, make_identification(kept, version=1))
     save_identification(db, make_identification(kept, version=2))
-    assert list(list_identifications(db)["superseded"]) == [False, False]
+    assert superseded(db) == [False, False]
     assert load_identification(db, kept.name, "samba", 1).model_version == 1
     assert load_identification(db, kept.name, "samba").model_version == 2
 

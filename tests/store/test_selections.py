@@ -31,7 +31,7 @@ def test_comes_back_as_it_was_stored(db: Database, campaign: Campaign) -> None:
     found = find_selection(db, 'it\'s "warm"')
     assert (found.number, found.campaign, found.condition) == (number, campaign.name, "warm_up == 1")
     assert found.runs == tuple(sorted(runs))
-    assert list_selections(db)["run_count"].tolist() == [len(runs)]
+    assert [row.run_count for row in list_selections(db)] == [len(runs)]
 
 
 def test_the_latest_of_a_name_counts_and_the_earlier_stays(db: Database, campaign: Campaign) -> None:

@@ -22,13 +22,18 @@ from monitor.uncertainty import (
     uncorrelated,
 )
 from monitor.uncertainty.cluster import cluster
-from monitor.uncertainty.engine import MOST_DEATHS, WorkerLostError, in_order, map_in_order
+from monitor.uncertainty.engine import MOST_DEATHS, WorkerLostError, in_order
 from monitor.uncertainty.processes import processes
 from monitor.uncertainty.spread import NumberedBlocks, spread
 
 TRIALS = 80_000
 NAMES = ("EC0Y", "EXX", "EYY", "EZZ")
 UNITS = ("µrad", "µm/m", "µm/m", "µm/m")
+
+
+def all_in_order(engine, task, arguments):
+    """The task of every argument, one task each, in their order."""
+    return list(in_order(engine, task, ((argument,) for argument in arguments)))
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +118,7 @@ def test_jcgm102_7_2_same_bits_on_a_dask_cluster_of_which_one_worker_is_killed_i
         with spread(engine, recipe, sampler) as (model, blocks):
             called, killed = _killing(model, lambda: next(iter(pids.values())), at=25)
             found = _evaluate(called, blocks)
-        runs = map_in_order(engine, _called, _two_runs(recipe, sampler))
+        runs = all_in_order(engine, _called, _two_runs(recipe, sampler))
     assert len(killed) == 1
     assert _same(found, alone)
     assert all(
@@ -123,7 +128,7 @@ def test_jcgm102_7_2_same_bits_on_a_dask_cluster_of_which_one_worker_is_killed_i
 
 def test_runs_on_processes_come_back_in_their_order():
     with processes(2) as engine:
-        assert map_in_order(engine, abs, range(-20, 0)) == list(range(20, 0, -1))
+        assert all_in_order(engine, abs, range(-20, 0)) == list(range(20, 0, -1))
 
 
 # What a process does that is killed while it writes: half of an answer stays in its connection.
@@ -142,7 +147,7 @@ def test_a_worker_killed_in_the_middle_of_its_answer_is_noticed():
         with pytest.raises(RefusedResultError, match="5 workers died one after the other"):
             list(in_order(engine, exec, [(KILLED_WHILE_ANSWERING,)]))
         assert engine.process_ids != before
-        assert map_in_order(engine, abs, [-1, -2, -3]) == [1, 2, 3]
+        assert all_in_order(engine, abs, [-1, -2, -3]) == [1, 2, 3]
 
 
 def test_what_a_task_raises_is_not_taken_for_a_lost_worker():
@@ -191,7 +196,7 @@ def test_a_task_that_kills_every_worker_is_refused():
 
 def test_the_error_of_a_task_arrives_as_it_was_raised():
     with processes(1) as engine, pytest.raises(ValueError, match="invalid literal for int"):
-        map_in_order(engine, int, ["1", "one"])
+        all_in_order(engine, int, ["1", "one"])
 
 
 def test_blocks_are_refused_out_of_order(evaluation):

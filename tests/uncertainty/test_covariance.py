@@ -8,7 +8,6 @@ import pytest
 from monitor.exceptions import DataError
 from monitor.uncertainty import (
     Inputs,
-    covariance_of_day,
     effective_dof,
     joined,
     nearest_correlation,
@@ -44,7 +43,6 @@ def test_pooled_by_day_weights_days_by_their_degrees_of_freedom():
     assert pooled.covariance == pytest.approx((2 * first + 1 * second) / 3)
     assert pooled.dof["repeated runs"] == 3
     assert pooled.estimate == pytest.approx(VALUES.mean(axis=0))
-    assert covariance_of_day(VALUES, DAYS, 1, NAMES, UNITS).covariance == pytest.approx(first)
     assert overall(VALUES, NAMES, UNITS).covariance == pytest.approx(np.cov(VALUES, rowvar=False))
 
 
@@ -129,10 +127,6 @@ def test_higham_2002_example_of_the_nearest_correlation_matrix():
 def test_refusals_of_inputs():
     with pytest.raises(DataError, match=r"at least two runs, but there is 1"):
         overall(VALUES[:1], NAMES, UNITS)
-    with pytest.raises(DataError, match=r"no run on day 9; there are days 1, 2, 3"):
-        covariance_of_day(VALUES, DAYS, 9, NAMES, UNITS)
-    with pytest.raises(DataError, match=r"day 3 has a single run"):
-        covariance_of_day(VALUES, DAYS, 3, NAMES, UNITS)
     with pytest.raises(DataError, match=r"every day has a single run"):
         pooled_by_day(VALUES, np.arange(6), NAMES, UNITS)
     with pytest.raises(DataError, match=r"run row 2 has no finite b"):

@@ -12,12 +12,22 @@ from monitor.uncertainty import (
     Normal,
     Rectangular,
     StudentT,
-    coverage_interval,
     independent,
     monte_carlo,
 )
 
 ROOT3 = np.sqrt(3.0)
+
+
+def coverage_interval(values, p=0.95, form="symmetric"):
+    """The interval that holds a part p of the values: (1 - p)/2 on either side (7.7.2), or the shortest (7.7.4)."""
+    ordered = np.sort(values.ravel())
+    inside = int(p * len(ordered) + 0.5)
+    if form == "symmetric":
+        low = int((len(ordered) - inside) / 2 + 0.5) - 1
+    else:
+        low = int(np.argmin(ordered[inside:] - ordered[:-inside]))
+    return float(ordered[low]), float(ordered[low + inside])
 
 
 def run(marginals, function, trials=500_000, correlation=None, seed=7, p=0.95):

@@ -50,12 +50,6 @@ def test_nothing_accepted_is_no_risk_of_the_consumer() -> None:
     assert risks.producer == pytest.approx(0.682689, abs=1e-6)
 
 
-def test_jcgm106_7_2_2_the_posterior_weighs_by_variances() -> None:
-    mean, u = Process(1.0, 2.0).posterior(3.0, 1.0)
-    assert mean == pytest.approx(1.0 + 0.8 * 2.0)
-    assert 1.0 / u**2 == pytest.approx(1.0 / 4.0 + 1.0)
-
-
 def test_a_process_without_spread_is_refused() -> None:
     with pytest.raises(DataError, match="a process needs a finite mean and a positive spread, not 0"):
         Process(0.0, 0.0)

@@ -27,13 +27,13 @@ from monitor.reporting.health.records import STATES, Change, MachineHealth
 from monitor.reporting.health.render import health_html, health_pdf
 from monitor.reporting.health.words import in_words
 from monitor.store import Database, import_campaign, machine_history, record_event
-from monitor.workflow.health.forecast import drift_forecast
 from monitor.workflow.health.report import stored_health
 from monitor.workflow.health.request import ReportOptions
 from monitor.workflow.health.weeks import week_before, week_named
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.changes import FALSE_ALARM, search_changes
 from monitor.workflow.history.drift import PieceDrift
+from monitor.workflow.history.forecast import drift_forecast
 from monitor.workflow.history.past import machine_past
 from monitor.workflow.history.series import Series
 from monitor.workflow.keeping import VerifyRequest, verify
@@ -330,10 +330,10 @@ def test_changes_are_rarely_found_where_there_are_none() -> None:
     assert alarms <= 9
 
 
-def test_a_drift_is_forecast_no_further_than_the_history_is_long() -> None:
+def test_a_drift_is_trusted_no_longer_than_the_history_is_long() -> None:
     values = 0.1 * np.arange(60.0) + np.random.default_rng(1).normal(scale=0.2, size=60)
     drift = PieceDrift(series_of("EXX", values, 0.2), -np.inf)
-    near, far = (drift_forecast(drift, 59.0, limit) for limit in (8.0, 80.0))
+    near, far = (drift_forecast(drift, limit) for limit in (8.0, 80.0))
     assert near is not None
     assert far is not None
     assert near.line.slope == pytest.approx(0.1, rel=0.05)
@@ -341,10 +341,11 @@ def test_a_drift_is_forecast_no_further_than_the_history_is_long() -> None:
     assert near.ahead.crossing.at == pytest.approx(80.0, abs=2.0)
     assert near.good_for is not None
     assert 5.0 < near.good_for < 22.0
+    # The day has an interval, which says how far it may be trusted; an interval of calibration has none.
     assert far.ahead is not None
-    assert far.ahead.crossing.at is None
+    assert far.ahead.crossing.at == pytest.approx(800.0, rel=0.05)
     assert far.good_for == 59.0
-    assert drift_forecast(PieceDrift(drift.whole, 58.0), 59.0, 8.0) is None
+    assert drift_forecast(PieceDrift(drift.whole, 58.0), 8.0) is None
 
 
 def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_page(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+DAY_S = 86400.0
 MADE = datetime.fromisoformat("2026-04-06T06:00:00+00:00")
 
 # A half year of weekly campaigns that lead to the example `cold-cold`.
@@ -107,12 +109,22 @@ def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path, pdf_unread) -
             "INSERT INTO identified_run SELECT DISTINCT identification_id, run, 1e-3, 1, 1, 1.0, []::DOUBLE[], '[]' "
             "FROM parameter_value ANTI JOIN identified_run USING (identification_id, run)"
         )
+        # Limits that the drifts reach in one and a half years: further ahead than the history is long.
+        limits = {
+            name: abs(parameter.mean.latest) + 1.5 * abs(parameter.drift.slope_per_year)
+            for name, parameter in trend(db, TrendRequest("HU40-T")).parameters.items()
+            if parameter.drift.p_value is not None and parameter.drift.p_value < 1e-4
+        }
+        db.execute(
+            "UPDATE imported_campaign SET machine_description = json_merge_patch(machine_description, ?)",
+            [json.dumps({"tolerances": limits})],
+        )
         page = trend(db, TrendRequest("HU40-T"))
         ((last,),) = db.rows("SELECT max(started_at_local) FROM v_runs")
         week = f"{last.isocalendar().year}-W{last.isocalendar().week:02d}"
         health = reported(db, week, tmp_path, pdf_unread)
     stated = {parameter.name: parameter for parameter in health.parameters}
-    compared = 0
+    compared = dated = 0
     for name, parameter in page.parameters.items():
         drift, of_report = parameter.drift, stated[name].drift
         assert [change.at[:19] for change in parameter.changes if change.at] == [
@@ -125,8 +137,25 @@ def test_a_drift_of_months_is_one_line(path: Path, tmp_path: Path, pdf_unread) -
         assert (of_report.per_year, of_report.u_per_year) == (drift.slope_per_year, drift.u_slope)
         assert of_report.between == drift.slope_interval
         assert of_report.p_value == drift.p_value
+        # The day at the limit and the ends of its interval, which is beyond the history that both read.
+        ahead = parameter.forecast
+        dates = (ahead.crosses_limit_at, *(ahead.crosses_limit_interval or (None, None)))
+        assert [None if at is None else at[:10] for at in dates] == [
+            None if at is None else f"{at}" for at in (of_report.crosses_at, *of_report.crosses_between)
+        ]
+        dated += ahead.crosses_limit_at is not None
         compared += 1
     assert compared > 3
+    assert dated > 1
+    # Both recommend the same next check: the first parameter that may be out of tolerance then.
+    intervals = {
+        name: parameter.forecast.recommended_interval_days
+        for name, parameter in page.parameters.items()
+        if parameter.forecast.recommended_interval_days is not None
+    }
+    soonest = min(intervals, key=intervals.__getitem__)
+    ends = last + timedelta(days=intervals[soonest])
+    assert f"{ends.date()}" in health.next_check
 
 
 def test_fleet_and_page_fit_the_same_line_where_days_are_alike(tmp_path: Path) -> None:
@@ -148,6 +177,15 @@ def test_fleet_and_page_fit_the_same_line_where_days_are_alike(tmp_path: Path) -
         assert row.u_slope == pytest.approx(drift.u_slope, rel=1e-3)
         assert row.drift_p == pytest.approx(drift.p_value, rel=1e-2)
         assert row.latest == pytest.approx(parameter.mean.latest, rel=1e-12)
+    # The same day at the limit: ± 20 µm, from the line of the days on, not from the scatter of the last of them.
+    row, ahead = table["EX0B"], page.parameters["EX0B"].forecast
+    assert ahead.crosses_limit_at is not None
+    assert row.latest_at is not None
+    assert row.years_to_limit is not None
+    crossing, latest = (datetime.fromisoformat(at) for at in (ahead.crosses_limit_at, row.latest_at))
+    assert crossing.timestamp() / DAY_S == pytest.approx(
+        latest.timestamp() / DAY_S + row.years_to_limit * 365.25, abs=1.0
+    )
 
 
 def test_a_report_of_an_earlier_week_knows_what_was_known_then(

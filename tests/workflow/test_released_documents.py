@@ -12,10 +12,11 @@ from pathlib import Path
 import pypdf
 import pytest
 
+import monitor
 from monitor.documents import to_document
 from monitor.exceptions import StoreError
 from monitor.refusal import AdviceKind, Refusal
-from monitor.reporting.covariance_source import covariance_sentence
+from monitor.reporting.covariance_source import CovarianceKind, covariance_sentence
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.refused import RefusedParameters, refusal_of, refusal_sentence, why_refused
 from monitor.reporting.texts import texts_of
@@ -27,13 +28,14 @@ from monitor.workflow.certificate.stored import restored_record
 from monitor.workflow.health.machine import MachineName, read_week
 from monitor.workflow.health.request import ReportOptions
 from monitor.workflow.health.weeks import week_named
+from monitor.workflow.uncertainty import sentences_0_1_0
 from monitor.workflow.uncertainty.evaluation import evaluate
-from monitor.workflow.uncertainty.released import covariance_source_of
-from monitor.workflow.uncertainty.released_refusals import reason_of, with_reason
 from monitor.workflow.uncertainty.request import UncertaintyRequest
+from monitor.workflow.uncertainty.sentences_0_1_0 import covariance_source_of, reason_of, with_reason
 from monitor.workflow.uncertainty.stating import answer_of
 from monitor.workflow.uncertainty.stored import restored
 
+PACKAGE = Path(monitor.__file__).parent
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
@@ -159,6 +161,32 @@ def test_a_record_without_reasons_is_made_again_byte_for_byte_and_in_german(
     assert printed(file) == text
     db.execute("UPDATE certificate SET record = ?, pdf = ?", [json.dumps(document), pdf])
     assert remake(db, RemakeRequest("R-2")).identical
+
+
+def test_what_is_stored_now_has_kinds_and_no_sentence_is_read(db: Database, monkeypatch) -> None:
+    """five-days has a covariance of repeated runs; cold-cold, which never turned its spindle, two refusals."""
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("a sentence was read")
+
+    monkeypatch.setattr(sentences_0_1_0, "reason_of", refuse)
+    monkeypatch.setattr("monitor.workflow.uncertainty.stored.covariance_source_of", refuse)
+    for campaign, run in (("five-days", 20), ("cold-cold", 3)):
+        answer = answer_of(evaluate(db, UncertaintyRequest(campaign, run, method="guf")))
+        document = json.loads(json.dumps(to_document(answer)))
+        assert document["input_covariance_source"]["kind"] in {kind.value for kind in CovarianceKind}
+        assert all(refused["reason"]["kind"] for refused in document["refused"])
+        assert to_document(restored(document)) == document
+    assert document["refused"]
+
+
+def test_sentences_are_read_in_one_file_alone() -> None:
+    readers = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob("*.py")
+        if "sentences_0_1_0 import" in path.read_text(encoding="utf-8")
+    }
+    assert readers == {"workflow/uncertainty/stored.py", "workflow/certificate/stored.py"}
 
 
 def printed(file: Path) -> str:

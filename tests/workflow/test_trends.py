@@ -430,8 +430,8 @@ def test_a_parameter_that_never_varies_has_no_drift_and_no_part_in_the_vector(
     assert main(["--db", str(tmp_path / "still.duckdb"), "trend", "S", "--parameter", "EX0C"]) == 0
     said = capsys.readouterr().out
     assert "together" not in said
-    # The recommended interval is far beyond the 29 weeks that were seen.
-    assert int(re.findall(r"check within (\d+) days, for EX0C", said)[0]) > 203
+    # No longer than the 29 weeks that were seen.
+    assert int(re.findall(r"check within (\d+) days, for EX0C", said)[0]) == 203
     assert "its drift was seen over 203 days only" in said
 
 

@@ -13,6 +13,7 @@ from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
 from monitor.exceptions import InputError
 from monitor.workflow.certificate.answer import (
+    CertificateChecks,
     CertificateFileAnswer,
     CertificatesAnswer,
     CertificateShowAnswer,
@@ -211,10 +212,7 @@ def _verify(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0 if answer.ok else 1
-    for name, passed in dataclasses.asdict(answer.checks).items():
-        if name == "expected" and passed is None:
-            continue
-        output.say(f"{name:<10} {'not signed' if passed is None else 'good' if passed else 'FAILED'}")
+    _say_checks(answer.checks)
     if answer.signer is not None:
         output.say(f"signed by {answer.signer}{'' if options.trust else ' (not checked against --trust)'}")
         output.say(f"           its certificate has the SHA-256 {answer.signer_sha256}")
@@ -227,6 +225,14 @@ def _verify(options: Namespace) -> int:
     )
     output.say(f"{name} is {verdict if answer.ok else 'NOT confirmed'}")
     return 0 if answer.ok else 1
+
+
+def _say_checks(checks: CertificateChecks) -> None:
+    """Say what was checked; that nothing was expected of the anchor is no check."""
+    for name, passed in dataclasses.asdict(checks).items():
+        if name == "expected" and passed is None:
+            continue
+        output.say(f"{name:<10} {'not signed' if passed is None else 'good' if passed else 'FAILED'}")
 
 
 def _template(options: Namespace) -> int:

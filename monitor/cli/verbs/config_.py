@@ -34,10 +34,10 @@ def options(parser: ArgumentParser) -> None:
         "file", nargs="?", type=Path, metavar="FILE", help="default: the one that holds here"
     )
     checked.set_defaults(run=_check)
-    begun = verbs.add_parser("init", **described("a file with every key, to begin with", EXAMPLE))
-    begun.add_argument("--out", type=Path, default=Path(NAME), metavar="FILE", help=f"default: {NAME}")
-    begun.set_defaults(run=_init)
-    for verb in (shown, checked, begun):
+    init = verbs.add_parser("init", **described("a file with every key, to begin with", EXAMPLE))
+    init.add_argument("--out", type=Path, default=Path(NAME), metavar="FILE", help=f"default: {NAME}")
+    init.set_defaults(run=_init)
+    for verb in (shown, checked, init):
         common(verb, database=False)
 
 

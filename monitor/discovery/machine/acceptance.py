@@ -135,12 +135,12 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
     ) -> list[ChainCandidate]:
         """The effects of other errors that explain more beside all than a candidate does: of two effects the larger one
         is named first, and its shape may be the cause of the other, not the other way round."""
-        own = self._explained(others, candidate)
+        explained = self._explained(others, candidate)
         return [
             other
             for index, other in enumerate(others)
             if error_of(other) != error_of(candidate)
-            and self._explained([*except_for(others, index), candidate], other) >= own
+            and self._explained([*except_for(others, index), candidate], other) >= explained
         ]
 
     def _explained(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> float:

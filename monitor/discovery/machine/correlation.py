@@ -178,11 +178,11 @@ class _Likelihood:
         """The sum of products of neighbours, less what the fit alone makes of white noise, in standard deviations."""
         numbers = self.rows.numbers
         parts = self.readings.reshape(*self.rows.weighted.shape, numbers, -1)
-        residual, own = parts[..., 0], parts[..., 1:]
-        number = self.share * (int(self.rows.weighted.sum()) * numbers - float(np.sum(own**2)))
+        residual, effect_columns = parts[..., 0], parts[..., 1:]
+        number = self.share * (int(self.rows.weighted.sum()) * numbers - float(np.sum(effect_columns**2)))
         variance = max(float(np.sum(residual**2)) / max(number, 1.0), 1e-300)
         product = float(np.sum(residual[:, 1:] * residual[:, :-1])) / variance
-        expected = -self.share * float(np.sum(own[:, 1:] * own[:, :-1]))
+        expected = -self.share * float(np.sum(effect_columns[:, 1:] * effect_columns[:, :-1]))
         return (product - expected) / float(np.sqrt(max(number, 1.0)))
 
     def criterion(self, correlation: Correlation) -> float:
@@ -191,10 +191,10 @@ class _Likelihood:
         runs, touches = self.rows.weighted.shape
         white = (triangle @ self.readings).reshape(runs, touches * self.rows.numbers, -1)
         white = np.concatenate([white, self.rest], axis=1)
-        residual, own = white[..., 0], white[..., 1:]
-        values, vectors = np.linalg.eigh(np.swapaxes(own, 1, 2) @ own)
+        residual, effect_columns = white[..., 0], white[..., 1:]
+        values, vectors = np.linalg.eigh(np.swapaxes(effect_columns, 1, 2) @ effect_columns)
         able = values > 1e-9
-        onto = np.einsum("rij,ri->rj", vectors, np.einsum("rnp,rn->rp", own, residual))
+        onto = np.einsum("rij,ri->rj", vectors, np.einsum("rnp,rn->rp", effect_columns, residual))
         squares = float(
             np.sum(residual**2) - np.sum(np.where(able, onto**2 / np.where(able, values, 1.0), 0.0))
         )

@@ -246,10 +246,7 @@ def _search(
         current = first if suspects.same_as(initial) else fit(with_effects(problem, single), out, first)
         current = current.with_correlation(noise.correlation)
         able = [variant for variant in variants if variant.family not in unfitted]
-        if beside_curves is not None:
-            scene, result = search_beside_curves(current, able, rate)
-        else:
-            scene, result = search_chain(scene_of(current, able), drivers, rate)
+        scene, result = _scan(current, able, drivers, rate, beside_curves)
         refined = refine_all(scene, result.candidates)
         under, unable = fit_those_possible(
             current.problem, [finding.candidate.effect for finding in refined], out, current
@@ -282,6 +279,19 @@ def _search(
         suspects = more
         noise = _Noise(noise.correlation)
     return _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted)), settled=False)
+
+
+def _scan(
+    under: Fit,
+    able: Sequence[ChainVariant],
+    drivers: Sequence[str],
+    rate: float,
+    beside_curves: Suspects | None,
+) -> tuple[ChainScene, ChainScan]:
+    """Search effects under a fit: beside the curves of joints, or those of the whole catalogue."""
+    if beside_curves is not None:
+        return search_beside_curves(under, able, rate)
+    return search_chain(scene_of(under, able), drivers, rate)
 
 
 class _Noise:

@@ -125,8 +125,8 @@ class Fit:
         rows = replace(rows, turned=turned_into_readings(self.problem, self.by_error))
         last = self.solution.last
         residual = deviations(last.residual, rows, cells.astype(np.int64) - 1)
-        own = last.local if len(residual) > 1 else np.concatenate([last.local, last.common], axis=2)
-        return estimate(residual, eliminate(own).basis, rows)
+        unknowns = last.local if len(residual) > 1 else np.concatenate([last.local, last.common], axis=2)
+        return estimate(residual, eliminate(unknowns).basis, rows)
 
     def with_correlation(self, correlation: Correlation | None) -> Fit:
         """The fit with the noise of neighbours correlated as said."""

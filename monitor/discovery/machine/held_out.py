@@ -70,8 +70,10 @@ class LeftOutBlocks:
         self._rows = [np.flatnonzero(parts == part) for part in range(int(parts.max()) + 1)]
         self._own = [basis[rows] for rows in self._rows]
         self._inverse = [
-            np.linalg.pinv(np.eye(basis.shape[1]) - own.T @ own, rcond=1e-10, hermitian=True)
-            for own in self._own
+            np.linalg.pinv(
+                np.eye(basis.shape[1]) - basis_of_fold.T @ basis_of_fold, rcond=1e-10, hermitian=True
+            )
+            for basis_of_fold in self._own
         ]
 
     def sum_of_squares(self, residual: Array, columns: Array) -> float:
@@ -81,15 +83,15 @@ class LeftOutBlocks:
         columns = columns / np.where(scale == 0, 1.0, scale)
         gram, onto = columns.T @ columns, columns.T @ residual
         total = 0.0
-        for rows, own, inverse in zip(self._rows, self._own, self._inverse, strict=True):
+        for rows, basis_of_fold, inverse in zip(self._rows, self._own, self._inverse, strict=True):
             part, left_out = columns[rows], residual[rows]
-            mixed, alone = -own.T @ part, -own.T @ left_out
+            mixed, alone = -basis_of_fold.T @ part, -basis_of_fold.T @ left_out
             reaction = inverse @ mixed
             normal = gram - part.T @ part - mixed.T @ reaction
             sizes = np.linalg.pinv(normal, rcond=1e-10, hermitian=True) @ (
                 onto - part.T @ left_out - reaction.T @ alone
             )
-            error = left_out - part @ sizes - own @ (inverse @ alone - reaction @ sizes)
+            error = left_out - part @ sizes - basis_of_fold @ (inverse @ alone - reaction @ sizes)
             total += float(error @ error)
         return total
 
@@ -150,8 +152,8 @@ def pose_folds(fit: Fit) -> tuple[PoseFold, ...]:
         present = np.zeros((len(fold), most), dtype=bool)
         for run, members in enumerate(inside):
             taken[run, : len(members)], present[run, : len(members)] = members, True
-        own = np.where(present[..., None], np.take_along_axis(basis, taken[..., None], axis=1), 0.0)
-        remaining = np.eye(most) * present[:, None, :] - own @ np.swapaxes(own, 1, 2)
+        basis_rows = np.where(present[..., None], np.take_along_axis(basis, taken[..., None], axis=1), 0.0)
+        remaining = np.eye(most) * present[:, None, :] - basis_rows @ np.swapaxes(basis_rows, 1, 2)
         values, vectors = np.linalg.eigh(remaining)
         # What only the rows left out determine (a ball touched once) nothing predicts.
         inverse = np.where(values > PREDICTED, 1.0 / np.where(values > PREDICTED, values, 1.0), 0.0)
@@ -175,9 +177,9 @@ def held_out_by_poses(residual: Array, columns: Array, folds: Sequence[PoseFold]
     grams, ontos, parts = [], [], []
     runs = np.arange(len(residual))[:, None]
     for fold in folds:
-        left_out, own = remainder[runs, fold.rows], shared[runs, fold.rows]
-        reaction = (fold.predicted @ own).reshape(left_out.size, -1)
-        grams.append(np.eye(own.shape[2]) - own.reshape(left_out.size, -1).T @ reaction)
+        left_out, shared_rows = remainder[runs, fold.rows], shared[runs, fold.rows]
+        reaction = (fold.predicted @ shared_rows).reshape(left_out.size, -1)
+        grams.append(np.eye(shared_rows.shape[2]) - shared_rows.reshape(left_out.size, -1).T @ reaction)
         ontos.append(reaction.T @ left_out.reshape(-1))
         parts.append(((fold.predicted @ left_out[..., None]).reshape(-1), reaction))
     inverses = np.linalg.pinv(np.array(grams), rcond=PREDICTED, hermitian=True)

@@ -104,9 +104,9 @@ class _Blocks:
         """Sum of squares of blocks that took no part; ``square`` is that of the residual without any column."""
         gram, onto = self.grams.sum(axis=0), self.ontos.sum(axis=0)
         total = square
-        for own, of_block in zip(self.grams, self.ontos, strict=True):
-            sizes = scipy.linalg.solve(gram - own, onto - of_block, assume_a="sym")
-            total += float(sizes @ own @ sizes - 2.0 * sizes @ of_block)
+        for gram_of_block, of_block in zip(self.grams, self.ontos, strict=True):
+            sizes = scipy.linalg.solve(gram - gram_of_block, onto - of_block, assume_a="sym")
+            total += float(sizes @ gram_of_block @ sizes - 2.0 * sizes @ of_block)
         return total
 
 
@@ -194,7 +194,11 @@ def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tup
     if all(joint.clusters(lines[joint.index]) == 0 for joint in joints):
         return ()
     pursuit = Pursuit(fit, always, pose)
-    texts = [f"{joint.term}:{harmonics_text(own)}" for joint in joints if (own := lines[joint.index])]
+    texts = [
+        f"{joint.term}:{harmonics_text(lines_of_joint)}"
+        for joint in joints
+        if (lines_of_joint := lines[joint.index])
+    ]
     pursuit.take(pursuit.new(pursuit.columns(texts)))
     _add_low_lines(pursuit, joints, lines, rate)
     curves = {
@@ -309,7 +313,7 @@ def _add_low_lines(
     remaining = {key: slice(2 * number, 2 * number + 2) for number, key in enumerate(keys)}
     while remaining:
         new = {key: orthonormal(rest[:, part]) for key, part in remaining.items()}
-        p_values = {key: pursuit.p_value(own) for key, own in new.items()}
+        p_values = {key: pursuit.p_value(columns_of_key) for key, columns_of_key in new.items()}
         best = min(p_values, key=lambda key: p_values[key])
         if p_values[best] * len(keys) > rate or pursuit.held_out(new[best]) >= pursuit.held_out():
             break
@@ -339,8 +343,10 @@ def _with_tables(
             if other is not joint and lines[other.index]
         ]
         pursuit = Pursuit(fit, np.concatenate([always, columns_of(fit, others)], axis=1), whole.pose)
-        own = pursuit.new(pursuit.columns([f"{joint.term}:{harmonics_text({*lines[joint.index], *LOW})}"]))
-        best = pursuit.held_out(own)
+        refined = pursuit.new(
+            pursuit.columns([f"{joint.term}:{harmonics_text({*lines[joint.index], *LOW})}"])
+        )
+        best = pursuit.held_out(refined)
         reading = fit.problem.context.chain.joints[joint.index].sign * joint.position / DEGREE.factor
         for count in counts:
             nodes = np.round(np.linspace(np.floor(reading.min()), np.ceil(reading.max()), count), 2)

@@ -191,12 +191,12 @@ def _at_least(
     beside = scene.remainders.beside(except_for(selected, index))
     total = float(beside.residual @ beside.residual)
     best = 0.0
-    for place, candidate in enumerate(scene_of(scene.fit, variants).candidates):
+    for number, candidate in enumerate(scene_of(scene.fit, variants).candidates):
         columns = orthonormal(without(beside.basis, candidate.columns))
         rest = max(total - float(np.sum((columns.T @ beside.residual) ** 2)), 1e-300)
-        best = rest if place == 0 else min(best, rest)
+        best = rest if number == 0 else min(best, rest)
         if beside.degrees_of_freedom * np.log(rest / best) > LIMIT:
-            return values[place]
+            return values[number]
     return None
 
 

@@ -57,7 +57,7 @@ def search_beside_curves(
         for index, candidate in enumerate(selected)
     ]
     findings = [Finding(each, min(1.0, each.p_value * len(pool)), (each,)) for each in evidence]
-    return scene, ScanResult(tuple(sorted(findings, key=lambda one: -one.evidence.score)), ())
+    return scene, ScanResult(tuple(sorted(findings, key=lambda finding: -finding.evidence.score)), ())
 
 
 def _beside(fit: Fit, selected: Sequence[ChainCandidate]) -> Pursuit:

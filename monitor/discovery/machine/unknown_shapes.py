@@ -55,9 +55,9 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     selected = result.candidates
     if not selected and not _lacks_something(scene):
         return scene, result
-    for symbol in dict.fromkeys(error_of(candidate) for candidate in selected if _is_of_shape(candidate)):
-        mine = [shape for shape in selected if error_of(shape) == symbol and _is_of_shape(shape)]
-        others = [shape for shape in selected if not any(shape is other for other in mine)]
+    for symbol in dict.fromkeys(map(error_of, filter(_is_of_shape, selected))):
+        mine = [shape for shape in filter(_is_of_shape, selected) if error_of(shape) == symbol]
+        others = [shape for shape in selected if not _is_among(shape, mine)]
         free = _free(scene, symbol, mine, others)
         if free is not None:
             selected = [*others, free]
@@ -67,10 +67,15 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
         if alone is not None:
             selected, scene = [alone], _with_candidate(scene, alone)
     if len(selected) == len(result.findings) and all(
-        any(shape is other for other in result.candidates) for shape in selected
+        _is_among(shape, result.candidates) for shape in selected
     ):
         return scene, result
     return scene, ScanResult(findings_of(scene, selected), result.remaining)
+
+
+def _is_among(candidate: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
+    """Whether a candidate is the same object as one of the others: their columns are arrays, which do not compare."""
+    return any(candidate is other for other in others)
 
 
 def _lacks_something(scene: ChainScene) -> bool:

@@ -103,11 +103,11 @@ class Likeness:
         slopes[~weighed] = 0.0
         inverse = np.linalg.pinv(slopes)
         for _ in range(STEPS):
-            left = np.where(weighed, self._left(probings, local, common, effects) - wanted, 0.0)
-            moved = np.einsum("nkd,nd->nk", inverse, left)
+            remaining = np.where(weighed, self._left(probings, local, common, effects) - wanted, 0.0)
+            moved = np.einsum("nkd,nd->nk", inverse, remaining)
             probings = _moved(probings, dict(zip(self.columns, -moved.T, strict=True)))
-        left = np.where(weighed, self._left(probings, local, common, effects) - wanted, 0.0)
-        worst = float(np.max(np.abs(left) / np.where(weighed, self.problem.sigma, 1.0), initial=0.0))
+        remaining = np.where(weighed, self._left(probings, local, common, effects) - wanted, 0.0)
+        worst = float(np.max(np.abs(remaining) / np.where(weighed, self.problem.sigma, 1.0), initial=0.0))
         if worst > CLOSE_ENOUGH:
             raise DataError(
                 f"no readings of the plan of {self.campaign.name} show these errors: {worst:.2g} standard "
@@ -204,15 +204,15 @@ def _kept_numbers(problem: ChainProblem, channels: Mapping[str, Array]) -> dict[
         and len(values) == len(problem.context)
     }
     arrays[NOMINAL] = problem.context.nominal
-    kept = {}
+    selected = {}
     for name, numbers in channels.items():
         largest = int(np.argmax(np.abs(numbers)))
         for field, array in arrays.items():
             for index, column in enumerate(array.T):
                 factor = float(column[largest] / numbers[largest]) if numbers[largest] else 0.0
                 if factor and np.allclose(column, factor * numbers, rtol=1e-12, atol=0.0):
-                    kept[name] = (field, index, factor)
-    return kept
+                    selected[name] = (field, index, factor)
+    return selected
 
 
 def _moved(probings: Probings, moves: dict[str, Array]) -> Probings:

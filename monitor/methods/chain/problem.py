@@ -25,6 +25,7 @@ from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.records import Array
+from monitor.units import Unit
 
 # A wrong sign of an axis fits the readings perfectly with a gain of -2 and mirrored targets. A turn of 0.1 rad or
 # a gain of 100 mm/m is no error of a machine but another machine; real ones stay below a hundredth of that.
@@ -260,6 +261,11 @@ class ChainProblem(ABC):
     def base_names(self) -> tuple[str, ...]:
         """Names of the base effects' coefficients."""
         return tuple(name for effect in self.base for name in effect.parameters(self.context))
+
+    @cached_property
+    def base_units(self) -> dict[str, Unit]:
+        """The display units of the base effects' coefficients, by name."""
+        return {name: effect.unit for effect in self.base for name in effect.parameters(self.context)}
 
     @cached_property
     def added_names(self) -> tuple[str, ...]:

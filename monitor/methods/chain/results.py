@@ -91,7 +91,7 @@ def identification(
         method=campaign.method,
         model=model.name,
         parameters=problem.base_names,
-        units=tuple(effect.unit for effect in problem.base for _ in effect.parameters(problem.context)),
+        units=tuple(problem.base_units[name] for name in problem.base_names),
         runs=tuple(runs),
         added=shared.names,
         added_units=shared.units,

@@ -73,8 +73,7 @@ class Candidates:
     @property
     def units(self) -> dict[str, Unit]:
         """The display unit of every parameter."""
-        context = self.problem.context
-        return {name: effect.unit for effect in self.problem.base for name in effect.parameters(context)}
+        return self.problem.base_units
 
     def expected(self, angles: Sequence[float]) -> Expected:
         """What a plan of these angles promises."""

@@ -273,15 +273,15 @@ class InstrumentProblem(ChainProblem):
 
     def taken(self, rows: npt.NDArray[np.int64], run: npt.NDArray[np.int64]) -> Self:
         """The problem of chosen rows, with repetitions, that belong to the runs ``run``."""
-        chosen = super().taken(rows, run)
-        index = np.searchsorted(chosen.runs, run)
+        problem = super().taken(rows, run)
+        index = np.searchsorted(problem.runs, run)
         parts = []
         for part in self.parts:
             where = np.full(len(self.context), -1)
             where[part.at] = np.arange(len(part.at))
             at = np.flatnonzero(where[rows] >= 0)
             parts.append(replace(part, rows=part.rows.taken(where[rows[at]], index[at]), at=at))
-        return replace(chosen, parts=tuple(parts))
+        return replace(problem, parts=tuple(parts))
 
     def contradiction(self, solution: Solution) -> str | None:
         """Directions that are off by more than any mount's errors."""

@@ -15,11 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.machine import Chain
-from monitor.records import Array, Setup, Vector
+from monitor.records import Array, Setup
 
 #: mm at which an angle is a length.
 LEVER = 1000.0
-ORIGIN: Vector = (0.0, 0.0, 0.0)
 #: An unknown turn of a frame, about X, Y and Z, and its shift.
 TURN, SHIFT = ("frame a", "frame b", "frame c"), ("frame x", "frame y", "frame z")
 

@@ -56,11 +56,11 @@ def read(folder: Path) -> CurveCampaign:
     faults = Faults((TOML, DATA))
     content = read_bytes(folder, TOML, LARGEST_TOML, faults)
     toml = None if content is None else decode(TOML, content, faults)
-    source, data = read_table(folder, DATA, faults)
+    source, data_file = read_table(folder, DATA, faults)
     head_file = None if content is None else SourceFile(TOML, content)
     files = tuple(file for file in (head_file, source) if file is not None)
     top = None if toml is None else parse_toml(TOML, toml, faults)
-    table = None if data is None else parse_csv(DATA, data, faults)
+    table = None if data_file is None else parse_csv(DATA, data_file, faults)
     head = _Head() if top is None else _head(top)
     columns = CurveColumns()
     if table is not None and head.settings is not None and top is not None:

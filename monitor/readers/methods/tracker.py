@@ -45,8 +45,8 @@ def check(plan: Plan) -> Iterable[Fault]:
 
 def _lost_beam(plan: Plan) -> Iterable[Fault]:
     """A fault for every row 0, 0, 0: what trackers write whose beam was lost, never the place of a reflector."""
-    seen = np.column_stack([plan.probings.channels[name] for name in COLUMNS])
-    for row in np.flatnonzero(np.all(seen == 0.0, axis=1)):
+    readings = np.column_stack([plan.probings.channels[name] for name in COLUMNS])
+    for row in np.flatnonzero(np.all(readings == 0.0, axis=1)):
         target = quoted(str(plan.probings.target[row]))
         yield Fault(
             plan.file,

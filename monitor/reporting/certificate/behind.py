@@ -99,8 +99,8 @@ def _columns(
 ) -> PrintedTable:
     numbers = [aligned(column, texts.decimal_sign) for column in columns]
     rows = tuple(
-        (name, unit, tuple(column[place] for column in numbers))
-        for place, (name, unit) in enumerate(zip(result.names, result.units, strict=True))
+        (name, unit, tuple(column[position] for column in numbers))
+        for position, (name, unit) in enumerate(zip(result.names, result.units, strict=True))
     )
     return PrintedTable(heads, rows)
 
@@ -123,15 +123,15 @@ def _lines(budget: Budget, texts: Texts) -> tuple[Markup, ...]:
     stated = {source.name: source for source in budget.sources}
     printed = []
     for number, line in enumerate(budget.lines, start=1):
-        words = [line_words(line.source, texts)]
+        phrases = [line_words(line.source, texts)]
         if line.source in stated:
-            words.append(source_words(stated[line.source], texts))
+            phrases.append(source_words(stated[line.source], texts))
         if line.degrees_of_freedom is None:
-            words.append(texts("budget.known"))
+            phrases.append(texts("budget.known"))
         else:
             dof = texts.number(round_to_place(line.degrees_of_freedom, decimal_of(0.1)).normalize())
-            words.append(texts("budget.freedom", dof=dof))
-        printed.append(Markup("<strong>({})</strong> {}").format(number, "; ".join(words)))
+            phrases.append(texts("budget.freedom", dof=dof))
+        printed.append(Markup("<strong>({})</strong> {}").format(number, "; ".join(phrases)))
     printed += [
         texts.markup("budget.not_added", name=source.name, words=source_words(source, texts))
         for source in budget.sources
@@ -158,7 +158,7 @@ def _days(result: ResultSet, days: DayToDay, expanded: dict[str, float], texts: 
     last = aligned(larger, texts.decimal_sign)
     plain = [Number(text, 0.0) for text in interval]
     rows = tuple(
-        (name, unit, (*numbers[:3], plain[place], numbers[4], last[place]))
-        for place, (name, unit, numbers) in enumerate(table.rows)
+        (name, unit, (*numbers[:3], plain[row], numbers[4], last[row]))
+        for row, (name, unit, numbers) in enumerate(table.rows)
     )
     return PrintedTable(table.heads, rows)

@@ -51,8 +51,8 @@ class IncompleteCertificateError(InputError):
         self.missing = missing
         count = len(missing)
         lines = [f"the certificate is refused: {count} item{'s are' if count != 1 else ' is'} missing"]
-        lines += [f"  {item}" for item in missing]
-        if any(item.key for item in missing):
+        lines += [f"  {gap}" for gap in missing]
+        if any(gap.key for gap in missing):
             lines.append(
                 "these keys are in the laboratory's file; `monitor certificate template` writes one with all of them"
             )
@@ -62,13 +62,13 @@ class IncompleteCertificateError(InputError):
 def missing_items(record: CertificateRecord) -> tuple[MissingItem, ...]:
     """Every item that is None, empty or says nothing, and every such part of an item, in the order of the record."""
     missing: list[MissingItem] = []
-    for name, (clause, item) in ITEMS.items():
+    for name, (clause, element) in ITEMS.items():
         missing += [
-            MissingItem(clause, item, part, key_of(name, part)) for part in _gaps(getattr(record, name))
+            MissingItem(clause, element, part, key_of(name, part)) for part in _gaps(getattr(record, name))
         ]
-    for field, words in _STATED.items():
+    for field, clause_and_item in _STATED.items():
         missing += [
-            MissingItem(*words, part, key_of(field, part))
+            MissingItem(*clause_and_item, part, key_of(field, part))
             for part in _gaps(getattr(record, field))
             if getattr(record, field) is not None
         ]

@@ -32,7 +32,6 @@ from monitor.reporting.numbers import decimal_of
 from monitor.reporting.texts import Texts, texts_of
 
 SCHEMA_VERSION = "3.2.1"
-_XSI = "http://www.w3.org/2001/XMLSchema-instance"
 
 #: The schema's word for a verdict (stringConformityStatementStatusType).
 _STATUS = {
@@ -104,10 +103,10 @@ def _administrative(parent: ET.Element, record: CertificateRecord, texts: Texts)
     add(core, "issueDate", str(record.issued_on))
     if record.replaces is not None:
         _replaced(core, record.replaces, texts)
-    item = add(add(parent, "items"), "item")
-    say(item, "name", str(record.item.description), language)
-    say(item, "description", str(record.item.condition), language)
-    identification = add(add(item, "identifications"), "identification")
+    item_element = add(add(parent, "items"), "item")
+    say(item_element, "name", str(record.item.description), language)
+    say(item_element, "description", str(record.item.condition), language)
+    identification = add(add(item_element, "identifications"), "identification")
     add(identification, "issuer", "other")
     add(identification, "value", record.item.identification)
     _contact(add(add(parent, "calibrationLaboratory"), "contact"), record.laboratory, language)
@@ -185,7 +184,7 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
         ("accreditation", record.accreditation),
         ("amendment", amendment(record.replaces, texts)),
     ]
-    statements += [("accepted", words) for words in accepted_statements(record.accepted or (), texts)]
+    statements += [("accepted", accepted) for accepted in accepted_statements(record.accepted or (), texts)]
     named = [(texts(f"dcc.{key}"), value) for key, value in statements]
     named[3:3] = [
         (texts("dcc.standard", name=statement.name), answer(statement.certificate, texts))

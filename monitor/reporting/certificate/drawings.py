@@ -13,7 +13,7 @@ import numpy as np
 from monitor.records import Array
 from monitor.reporting.certificate.results import ResidualSummary, ResultSet
 from monitor.reporting.palette import BLUE, FAINT, INK, MID, PALE
-from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, nice_ticks, tick_words
+from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, nice_ticks, shortened, tick_words
 from monitor.reporting.texts import Texts
 
 #: A figure alone on its page, below a heading and above its caption: an A4 page has 259 mm between its margins.
@@ -115,7 +115,7 @@ def _draw_panel(
                 f"M{x(limit):.1f} {y - _BRACKET:.1f}v{2 * _BRACKET:g}"
                 for limit in (-limits[index], limits[index])
             ]
-        on.text(label, y + 0.36 * LETTER, _fitted(result.names[index], label), anchor="end")
+        on.text(label, y + 0.36 * LETTER, shortened(result.names[index], label), anchor="end")
     on.path("".join(bands), stroke=FAINT, width=11.0)
     on.line(x(0.0), top, x(0.0), bottom, MID, 2.0, "8 5")
     on.path("".join(bars), stroke=BLUE, width=4.6)
@@ -128,12 +128,6 @@ def _draw_panel(
         on.line(x(value), bottom, x(value), bottom + 8.0, MID, 2.0)
         on.text(x(value), bottom + 12.0 + LETTER, tick_words(value, sign), anchor="middle")
     on.text((left_edge + right_edge) / 2, bottom + 17.0 + 2.0 * LETTER, panel.unit, anchor="middle")
-
-
-def _fitted(name: str, room: float) -> str:
-    """A name no wider than its room; the table of results has the whole of it, in the same order."""
-    most = int(room / (WIDE * LETTER))
-    return name if len(name) <= most else name[: most - 1] + "…"
 
 
 def residual_drawing(

@@ -43,33 +43,53 @@ def residual_bars(
     if not groups:
         raise DataError("groups is empty; a grouping such as 'target' with its labels and RMS is needed")
     bars = {kind: (list(labels), _rms(kind, labels, rms)) for kind, (labels, rms) in groups.items()}
-    total = sum(len(labels) for labels, _ in bars.values())
-    counts = [max(len(labels), 3, _LEAST_SHARE * total) for labels, _ in bars.values()]
     say = texts_of()
     limit = math.inf if level_um is None else 2.0 * level_um
-    panels_mm = [0.88 * width_mm * share / sum(counts) for share in counts]
-    printed = [_labelled(labels, room) for (labels, _), room in zip(bars.values(), panels_mm, strict=True)]
+    shares, printed = _layout([labels for labels, _ in bars.values()], width_mm)
     lines = max(name.count("\n") for names in printed for name in names)
     with style():
         figure = new_figure(width_mm, height_mm + 3.4 * lines, title)
-        panels = figure.subplots(1, len(bars), squeeze=False, sharey=True, width_ratios=counts)[0]
+        panels = figure.subplots(1, len(bars), squeeze=False, sharey=True, width_ratios=shares)[0]
         for axes, names, (kind, (labels, rms)) in zip(panels, printed, bars.items(), strict=True):
             _bars(axes, rms, rms > limit)
-            shown = [index for index, name in enumerate(names) if name]
-            axes.set_xticks(shown, [names[index] for index in shown])
+            _name_bars(axes, names)
             axes.set_xlabel(say("figures.by", kind=kind), labelpad=2)
-            axes.grid(axis="y", color=PALE, linewidth=0.4)
             axes.margins(x=0.02 if len(labels) > 8 else 0.08)
-            if level_um is not None:
-                reference_line(axes, level_um)
         if level_um is not None:
             hatched = any(bool(np.any(rms > limit)) for _, rms in bars.values())
-            dashed = say("figures.dashed", name=level_name, level=f"{level_um:.2g}")
-            caption(figure, dashed + (say("figures.hatched") if hatched else ""))
+            _draw_level(figure, panels, level_um, level_name, hatched=hatched)
         panels[0].set_ylabel(say("figures.residual_axis"))
         top = max(float(np.nanmax(rms)) for _, rms in bars.values())
         panels[0].set_ylim(0.0, 1.18 * max(top, level_um or 0.0) or 1.0)
     return figure
+
+
+def _layout(labels_of_panels: Sequence[list[str]], width_mm: float) -> tuple[list[float], list[list[str]]]:
+    """Return the shares of the width that the panels have, and what stands under the bars of each."""
+    total = sum(map(len, labels_of_panels))
+    shares = [max(len(labels), 3, _LEAST_SHARE * total) for labels in labels_of_panels]
+    panels_mm = [0.88 * width_mm * share / sum(shares) for share in shares]
+    return shares, [
+        _labelled(labels, panel_mm) for labels, panel_mm in zip(labels_of_panels, panels_mm, strict=True)
+    ]
+
+
+def _name_bars(axes: Axes, names: Sequence[str]) -> None:
+    """Write the names that have room under their bars, and draw the grid behind them."""
+    shown = [index for index, name in enumerate(names) if name]
+    axes.set_xticks(shown, [names[index] for index in shown])
+    axes.grid(axis="y", color=PALE, linewidth=0.4)
+
+
+def _draw_level(
+    figure: Figure, panels: Sequence[Axes], level_um: float, level_name: str, *, hatched: bool
+) -> None:
+    """Draw the level in every panel, and say below what is dashed, and what is ``hatched`` where a bar is."""
+    for axes in panels:
+        reference_line(axes, level_um)
+    say = texts_of()
+    dashed = say("figures.dashed", name=level_name, level=f"{level_um:.2g}")
+    caption(figure, dashed + (say("figures.hatched") if hatched else ""))
 
 
 def _rms(kind: str, labels: Sequence[str], rms: npt.ArrayLike) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from monitor.reporting.health.records import (
     ALARMS,
     STATES,
+    ChangeKind,
     Drift,
     Fleet,
     FleetRow,
@@ -19,9 +20,9 @@ from monitor.reporting.health.words import day, in_words, percent, plain
 from monitor.reporting.plain_names import plain_name
 
 #: States in which a machine wants something done; in the others nothing is wrong, or nothing is known.
-URGENT: tuple[State, ...] = tuple(list(STATES)[: list(STATES).index("suspect data") + 1])
+URGENT: tuple[State, ...] = tuple(list(STATES)[: list(STATES).index(State.SUSPECT_DATA) + 1])
 #: States in which nothing is wrong.
-FINE: tuple[State, ...] = ("in tolerance", "no change seen")
+FINE: tuple[State, ...] = (State.IN_TOLERANCE, State.NO_CHANGE_SEEN)
 #: Names of machines in a sentence; of more, their number.
 _NAMED = 6
 #: A drift is spoken of below this probability of seeing it where there is none.
@@ -60,8 +61,10 @@ def _quiet(fleet: Fleet) -> str:
 def concern(health: MachineHealth) -> ParameterHealth | None:
     """Return the parameter that makes a machine's state, or is nearest to make it; None without parameters."""
     parameters = health.parameters
-    if health.state == "changed":
-        noted = [change.at for change in health.changes if change.kind == "change" and change.this_week]
+    if health.state is State.CHANGED:
+        noted = [
+            change.at for change in health.changes if change.kind is ChangeKind.CHANGE and change.this_week
+        ]
         changed = [parameter for parameter in parameters if any(at in parameter.changed_at for at in noted)]
         if changed:
             return changed[0]
@@ -71,15 +74,15 @@ def concern(health: MachineHealth) -> ParameterHealth | None:
 def _urgency(parameter: ParameterHealth) -> tuple[float, float, float]:
     """A drift that reaches its limit counts before one that does not, after the probability to be out already."""
     out, drift = parameter.probability_out or 0.0, parameter.drift
-    reaches = drift is not None and drift.crosses_at is not None and drift.p_value < _DRIFT_P
+    reaches = parameter.reaches_soon and drift is not None and drift.p_value < _DRIFT_P
     used = abs(parameter.estimate) / parameter.tolerance if parameter.tolerance else 0.0
     return (out if out > 0.01 else 0.0), float(reaches), used
 
 
 def reason(health: MachineHealth) -> str:
     """Return why a machine is in its state, in plain words with numbers."""
-    words = _REASONS.get(health.state, _nearest_limit)(health)
-    return _sentence(words or STATES[health.state])
+    reason = _REASONS.get(health.state, _nearest_limit)(health)
+    return _sentence(reason or STATES[health.state])
 
 
 def _out(health: MachineHealth) -> str:
@@ -111,7 +114,9 @@ def _unexplained(health: MachineHealth) -> str:
 
 
 def _changed(health: MachineHealth) -> str:
-    what = "; ".join(change.what for change in health.changes if change.this_week and change.kind == "change")
+    what = "; ".join(
+        change.what for change in health.changes if change.this_week and change.kind is ChangeKind.CHANGE
+    )
     parameter = concern(health)
     name = f" ({plain_name(parameter.name)})" if parameter is not None and parameter.name in what else ""
     return f"{what}{name}"
@@ -132,12 +137,12 @@ def _nearest_limit(health: MachineHealth) -> str:
 
 #: What says why a machine is in a state; of the others, what drifts.
 _REASONS: Mapping[State, Callable[[MachineHealth], str]] = {
-    "out of tolerance": _out,
-    "may be out of tolerance": _out,
-    "not evaluated": _not_evaluated,
-    "model fails": _unexplained,
-    "changed": _changed,
-    "suspect data": _suspect,
+    State.OUT_OF_TOLERANCE: _out,
+    State.MAY_BE_OUT_OF_TOLERANCE: _out,
+    State.NOT_EVALUATED: _not_evaluated,
+    State.MODEL_FAILS: _unexplained,
+    State.CHANGED: _changed,
+    State.SUSPECT_DATA: _suspect,
 }
 
 
@@ -172,13 +177,13 @@ def _since(health: MachineHealth) -> str:
         return "Not known: this is not stated run by run."
     if health.state in ALARMS:
         return f"Since {day(health.since)}: every run since then lies beyond the tolerance."
-    if health.state == "model fails":
+    if health.state is State.MODEL_FAILS:
         return f"Since {day(health.since)} at the latest, the first run that was compared."
     span = next(
         (
             change.after
             for change in health.changes
-            if change.this_week and change.kind == "change" and change.at == health.since
+            if change.this_week and change.kind is ChangeKind.CHANGE and change.at == health.since
         ),
         None,
     )
@@ -192,14 +197,14 @@ def to_do(health: MachineHealth) -> str:
     parameter = concern(health)
     name = "its errors" if parameter is None else f"{plain_name(parameter.name)} ({parameter.name})"
     action = {
-        "out of tolerance": f"adjust or compensate {name} and measure again",
-        "may be out of tolerance": f"measure again with more runs: {name} is too near its limit to be judged",
-        "not evaluated": "mend what its page names and measure again",
-        "changed": "find out what was done or happened then, record it as an event, and measure again",
-        "suspect data": "look at the points that its page names and measure again",
-        "not measured": "measure it",
+        State.OUT_OF_TOLERANCE: f"adjust or compensate {name} and measure again",
+        State.MAY_BE_OUT_OF_TOLERANCE: f"measure again with more runs: {name} is too near its limit to be judged",
+        State.NOT_EVALUATED: "mend what its page names and measure again",
+        State.CHANGED: "find out what was done or happened then, record it as an event, and measure again",
+        State.SUSPECT_DATA: "look at the points that its page names and measure again",
+        State.NOT_MEASURED: "measure it",
     }.get(health.state, "measure again as planned")
-    if health.state == "model fails" and health.model is not None:
+    if health.state is State.MODEL_FAILS and health.model is not None:
         missing = health.model.missing
         action = (
             f"{missing[0].remedy.rstrip('.')}; then measure again"
@@ -215,9 +220,9 @@ def _worst(fleet: Fleet) -> str:
     if not urgent:
         return "None: no machine that was measured needs attention."
     first, *others = urgent
-    place = f" ({first.location})" if first.location else ""
+    location = f" ({first.location})" if first.location else ""
     more = f"; also {_names(others)}" if others else ""
-    return f"{first.machine}{place}: {first.state}{more}."
+    return f"{first.machine}{location}: {first.state}{more}."
 
 
 def _keep_on(fleet: Fleet) -> str:
@@ -234,11 +239,11 @@ def _fine(rows: Sequence[FleetRow]) -> str:
 
 def _unjudged(fleet: Fleet) -> str:
     parts = [
-        f"{words}: {_names(rows)}"
-        for state, words in (
-            ("not measured", "not measured this week"),
-            ("not evaluated", "measured but not evaluated"),
-            ("no change seen", "not against every tolerance"),
+        f"{phrase}: {_names(rows)}"
+        for state, phrase in (
+            (State.NOT_MEASURED, "not measured this week"),
+            (State.NOT_EVALUATED, "measured but not evaluated"),
+            (State.NO_CHANGE_SEEN, "not against every tolerance"),
         )
         if (rows := [row for row in fleet.rows if row.state == state])
     ]

@@ -19,6 +19,7 @@ from monitor.reporting.health.records import (
     FleetRow,
     MachineHealth,
     ParameterHealth,
+    State,
     VolumetricMap,
     fleet_row,
 )
@@ -30,27 +31,27 @@ from monitor.reporting.svg.sparkline import sparkline
 
 #: Signs before a state: they tell the states apart without colour.
 SIGNS = {
-    "out of tolerance": "■",
-    "may be out of tolerance": "▲",
-    "not evaluated": "?",
-    "changed": "◆",
-    "model fails": "◇",
-    "suspect data": "○",
-    "not measured": "–",
-    "in tolerance": "✓",
-    "no change seen": "✓",
+    State.OUT_OF_TOLERANCE: "■",
+    State.MAY_BE_OUT_OF_TOLERANCE: "▲",
+    State.NOT_EVALUATED: "?",
+    State.CHANGED: "◆",
+    State.MODEL_FAILS: "◇",
+    State.SUSPECT_DATA: "○",
+    State.NOT_MEASURED: "–",
+    State.IN_TOLERANCE: "✓",
+    State.NO_CHANGE_SEEN: "✓",
 }
 #: How a state looks, beside its sign and its word: bad, doubtful, unknown or good.
 LOOKS = {
-    "out of tolerance": "bad",
-    "may be out of tolerance": "doubtful",
-    "not evaluated": "doubtful",
-    "changed": "doubtful",
-    "model fails": "doubtful",
-    "suspect data": "doubtful",
-    "not measured": "unknown",
-    "in tolerance": "good",
-    "no change seen": "good",
+    State.OUT_OF_TOLERANCE: "bad",
+    State.MAY_BE_OUT_OF_TOLERANCE: "doubtful",
+    State.NOT_EVALUATED: "doubtful",
+    State.CHANGED: "doubtful",
+    State.MODEL_FAILS: "doubtful",
+    State.SUSPECT_DATA: "doubtful",
+    State.NOT_MEASURED: "unknown",
+    State.IN_TOLERANCE: "good",
+    State.NO_CHANGE_SEEN: "good",
 }
 #: Blind spots named on the page; the rest are counted (all stand in the JSON).
 _BLIND_SHOWN = 4
@@ -150,7 +151,7 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         "cards": [_card(health) for health in fleet.attention if health.state in URGENT],
         "imports": [printed_refusal(refusal) for refusal in fleet.refused_imports],
         "alarms": sum(row.state in ALARMS for row in fleet.rows),
-        "measured": sum(row.state != "not measured" for row in fleet.rows),
+        "measured": sum(row.state is not State.NOT_MEASURED for row in fleet.rows),
     }
 
 
@@ -160,7 +161,7 @@ def _card(health: MachineHealth) -> Card:
 
 def _card_picture(health: MachineHealth) -> Markup:
     """What shows the state: the residual against what drives it where the model fails, else a parameter's history."""
-    if health.state == "model fails" and health.model is not None and health.model.against is not None:
+    if health.state is State.MODEL_FAILS and health.model is not None and health.model.against is not None:
         return Markup(against_driver(health.model.against))
     parameter = concern(health)
     if parameter is None or not parameter.history.times:

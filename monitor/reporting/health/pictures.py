@@ -13,7 +13,7 @@ from monitor.reporting.health.comparison import ErrorStep, ModelHealth, Residual
 from monitor.reporting.health.records import VolumetricMap
 from monitor.reporting.palette import BLUE, INK, MID, ORANGE, PALE
 from monitor.reporting.svg.map_slices import map_drawing
-from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, arrow_head
+from monitor.reporting.svg.plot import LETTER, SCALE, Drawing, Panel, arrow_head, shortened
 
 #: The whole text width of the page, and the two parts that stand side by side.
 WIDTH_MM, LEFT_MM, RIGHT_MM = 176.0, 104.0, 66.0
@@ -188,7 +188,7 @@ def error_steps(model: ModelHealth) -> str:
     panel = Panel(6.0, 40.0, RIGHT_MM * SCALE - 190.0, row * len(steps), (0.0, 1.04 * most), (0.0, 1.0))
     for index, step in enumerate(steps):
         top = panel.top + index * row
-        on.text(panel.left, top + 26, _fitting(step.what, RIGHT_MM * SCALE - 12.0), bold=not step.proposed)
+        on.text(panel.left, top + 26, shortened(step.what, RIGHT_MM * SCALE - 12.0), bold=not step.proposed)
         y = top + 36
         end = panel.x(step.rms_um)
         on.path(
@@ -217,11 +217,6 @@ def error_steps(model: ModelHealth) -> str:
 def _shown(steps: tuple[ErrorStep, ...]) -> tuple[ErrorStep, ...]:
     """The first and the last ones, as many as a page has room for."""
     return steps if len(steps) <= 8 else (steps[0], *steps[-7:])
-
-
-def _fitting(text: str, width: float) -> str:
-    most = int(width / (WIDE * LETTER))
-    return text if len(text) <= most else text[: most - 1] + "…"
 
 
 def _thousands(value: float) -> str:

@@ -8,39 +8,51 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from datetime import date, datetime
-from typing import Literal
+from enum import StrEnum
 
 from monitor.documents import OMITTED
 from monitor.records import AuditAnchor
 from monitor.reporting.health.comparison import ModelHealth
 from monitor.reporting.svg.map_slices import Slice
 
-State = Literal[
-    "out of tolerance",
-    "may be out of tolerance",
-    "not evaluated",
-    "changed",
-    "model fails",
-    "suspect data",
-    "not measured",
-    "in tolerance",
-    "no change seen",
-]
+
+class State(StrEnum):
+    """What the fleet table says of a machine in one word or two, the most urgent first."""
+
+    OUT_OF_TOLERANCE = "out of tolerance"
+    MAY_BE_OUT_OF_TOLERANCE = "may be out of tolerance"
+    NOT_EVALUATED = "not evaluated"
+    CHANGED = "changed"
+    MODEL_FAILS = "model fails"
+    SUSPECT_DATA = "suspect data"
+    NOT_MEASURED = "not measured"
+    IN_TOLERANCE = "in tolerance"
+    NO_CHANGE_SEEN = "no change seen"
+
+
+class ChangeKind(StrEnum):
+    """How a change is known: found by the statistics, a step at a recorded event, or the event itself."""
+
+    CHANGE = "change"
+    EVENT_STEP = "event step"
+    EVENT = "event"
+
+
 #: The states by urgency, the most urgent first, and what each means.
 STATES: dict[State, str] = {
-    "out of tolerance": "a parameter or the volumetric error is more likely beyond its tolerance than within it",
-    "may be out of tolerance": "the probability that a parameter or the volumetric error is beyond its tolerance "
+    State.OUT_OF_TOLERANCE: "a parameter or the volumetric error is more likely beyond its tolerance than within it",
+    State.MAY_BE_OUT_OF_TOLERANCE: "the probability that a parameter or the volumetric error is beyond its tolerance "
     "exceeds the stated limit",
-    "not evaluated": "measured, but its last run could not be evaluated: nothing is known of its tolerances",
-    "changed": "a parameter or an artefact changed this week",
-    "model fails": "the model does not explain the measurements: an effect is missing",
-    "suspect data": "bad points were found and left out; nothing else",
-    "not measured": "no run this week",
-    "in tolerance": "every parameter is within its tolerance and nothing changed",
-    "no change seen": "nothing changed; not every parameter has a tolerance to be judged by",
+    State.NOT_EVALUATED: "measured, but its last run could not be evaluated: nothing is known of its tolerances",
+    State.CHANGED: "a parameter or an artefact changed this week",
+    State.MODEL_FAILS: "the model does not explain the measurements: an effect is missing",
+    State.SUSPECT_DATA: "bad points were found and left out; nothing else",
+    State.NOT_MEASURED: "no run this week",
+    State.IN_TOLERANCE: "every parameter is within its tolerance and nothing changed",
+    State.NO_CHANGE_SEEN: "nothing changed; not every parameter has a tolerance to be judged by",
 }
 #: The states that `--fail-on-alarm` answers with exit status 1.
-ALARMS: tuple[State, ...] = ("out of tolerance", "may be out of tolerance", "not evaluated")
+ALARMS: tuple[State, ...] = (State.OUT_OF_TOLERANCE, State.MAY_BE_OUT_OF_TOLERANCE, State.NOT_EVALUATED)
 
 
 @dataclass(frozen=True)
@@ -92,6 +104,15 @@ class ParameterHealth:
     changed_at: tuple[datetime, ...]
     drift: Drift | None
 
+    @property
+    def reaches_soon(self) -> bool:
+        """Whether the drift reaches the limit within as many days as it was watched for."""
+        if self.drift is None or self.drift.crosses_at is None:
+            return False
+        last = self.history.times[-1]
+        watched = last - (self.drift.since or self.history.times[0])
+        return self.drift.crosses_at <= (last + watched).date()
+
 
 @dataclass(frozen=True)
 class Change:
@@ -101,7 +122,7 @@ class Change:
     does not make the state of the machine.
     """
 
-    kind: Literal["change", "event step", "event"]
+    kind: ChangeKind
     after: datetime | None
     at: datetime
     what: str

@@ -28,14 +28,15 @@ def trend_picture(machine: str, parameter: ParameterHealth) -> str:
     """Return the history of a parameter of a machine as SVG; no words stand inside the panel.
 
     The line of the drift is drawn over the runs that it was found from, and dashed ahead to the day on which the
-    tolerance is reached, at most as far ahead as the history is long.
+    tolerance is reached, where that is no further ahead than the drift was watched for.
     """
     history, drift = parameter.history, parameter.drift
     half = np.nan_to_num(np.array(history.u) * parameter.expanded / parameter.u, posinf=0.0)
     first, last = history.times[0], _end(parameter)
     margin = max((last - first) * 0.03, timedelta(hours=12))
-    reaches = drift is not None and drift.crosses_at is not None
-    low, high = value_range(np.array(history.values), half, parameter.tolerance, always=reaches)
+    low, high = value_range(
+        np.array(history.values), half, parameter.tolerance, always=parameter.reaches_soon
+    )
     on = Drawing(WIDTH_MM, HEIGHT_MM, f"{machine}: {plain_name(parameter.name)} over dates")
     panel = Panel(
         _LEFT, _TOP, WIDTH_MM * SCALE - _LEFT - _RIGHT, HEIGHT_MM * SCALE - _TOP - _BOTTOM,
@@ -72,7 +73,7 @@ def _end(parameter: ParameterHealth) -> datetime:
         return last
     limit = last + (last - first) * _AHEAD
     crossing = parameter.drift.crosses_at
-    if crossing is None or crossing <= last.date():
+    if crossing is None or crossing <= last.date() or not parameter.reaches_soon:
         return last + (last - first) * 0.15
     return min(limit, datetime.combine(crossing, datetime.min.time()) + timedelta(days=1))
 
@@ -102,8 +103,8 @@ def _tolerance(on: Drawing, panel: Panel, tolerance: float | None) -> None:
         if panel.up[0] <= limit <= panel.up[1]:
             y = panel.y(limit)
             on.line(panel.left, y, right, y, INK, 3.0, "14 8")
-            words = ("+" if limit > 0 else "") + tick_words(limit)
-            on.text(right + 8, y + 0.36 * LETTER, words, bold=True)
+            label = ("+" if limit > 0 else "") + tick_words(limit)
+            on.text(right + 8, y + 0.36 * LETTER, label, bold=True)
 
 
 def _drift(on: Drawing, panel: Panel, drift: Drift, last: datetime, end: datetime) -> None:

@@ -125,6 +125,12 @@ def nice_ticks(low: float, high: float, most: int) -> list[float]:
     return [index * step for index in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
+def shortened(text: str, room: float) -> str:
+    """Return a text no wider than its room; what is cut off is marked."""
+    most = int(room / (WIDE * LETTER))
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
 def tick_words(value: float, sign: str = ".") -> str:
     """Write a number along an axis, with the decimal ``sign`` of a language."""
     return f"{value:.6g}".replace("-", "\N{MINUS SIGN}").replace(".", sign) if abs(value) > 1e-12 else "0"

@@ -16,7 +16,7 @@ from monitor.web.desk import Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
 from monitor.web.words import URGENCIES, Urgency, how_far, since
-from monitor.workflow.fleet import ATTENTION, FleetAnswer, FleetTableRow
+from monitor.workflow.fleet import ATTENTION, Attention, FleetAnswer, FleetTableRow
 from monitor.workflow.history.values import ValuesAnswer
 from monitor.workflow.query import TableAnswer
 
@@ -44,7 +44,7 @@ def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> l
     rows: dict[str, list[FleetTableRow]] = {}
     for row in table:
         rows.setdefault(row.machine, []).append(row)
-    usual = ATTENTION.index("as usual")
+    usual = ATTENTION.index(Attention.AS_USUAL)
     return [
         MachineRow(
             machine=machine,

@@ -156,7 +156,7 @@ def _save(
 def _method_name(name: str, texts: Texts) -> str:
     """The name of a method as people read it, in the certificate's language where that has one, and as campaigns write
     it."""
-    title = texts.words.get(f"methods.{name}", method_named(name).title)
+    title = texts.sentences.get(f"methods.{name}", method_named(name).title)
     return f"{title} ({name})"
 
 

@@ -11,7 +11,7 @@ from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.refused import RefusedParameters, refusal_of
-from monitor.workflow.uncertainty.released_refusals import with_reason
+from monitor.workflow.uncertainty.sentences_0_1_0 import with_reason
 
 
 def restored_record(document: Mapping[str, Any]) -> CertificateRecord:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from datetime import UTC
+from pathlib import Path
 
 import numpy as np
 
@@ -27,10 +28,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
     be read.
     """
     file = request.file
-    try:
-        content = read_bounded(file, LARGEST_DOCUMENT)
-    except OSError as error:
-        raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
+    content = _content(file)
     sha256 = hashlib.sha256(content).hexdigest()
     number = find_certificate(db, sha256)
     chain = verify_audit(db)
@@ -42,6 +40,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         signature = check_signature(content, request.trusted, at)
     if stored is not None:
         signature = _as_stated(signature, stored)
+    signer = signature.signer
     checks = CertificateChecks(
         hash=stored is not None,
         chain=chain.ok,
@@ -49,21 +48,25 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         database=stored is not None and stored.state == "issued" and stored.campaign_withdrawn is None,
         expected=None if request.expected is None else request.expected.strip().lower() == sha256,
     )
-    other = (
-        ()
-        if checks.expected is not False
-        else (f"the file has the hash {sha256}, not the one noted elsewhere",)
-    )
-    invalid = _unknown(db, file.name, content) if stored is None else _no_longer(stored)
+    faults = [_unknown(db, file.name, content) if stored is None else _no_longer(stored)]
+    if checks.expected is False:
+        faults.append(f"the file has the hash {sha256}, not the one noted elsewhere")
     return VerificationAnswer(
         number=number,
         ok=checks.passed,
         state=None if stored is None else stored.state,
         checks=checks,
-        signer=None if signature.signer is None else signature.signer.name,
-        signer_sha256=None if signature.signer is None else signature.signer.sha256,
-        faults=(*([] if invalid is None else [invalid]), *other, *signature.faults, *chain.faults),
+        signer=None if signer is None else signer.name,
+        signer_sha256=None if signer is None else signer.sha256,
+        faults=(*filter(None, faults), *signature.faults, *chain.faults),
     )
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return read_bounded(file, LARGEST_DOCUMENT)
+    except OSError as error:
+        raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
 
 
 def _as_stated(signature: SignatureFinding, stored: StoredCertificate) -> SignatureFinding:

@@ -72,8 +72,8 @@ def _curve(effect: ChainMissing, unit: Unit) -> tuple[CurvePoint, ...]:
     at = curve.at / DEGREE.factor if curve.turns else curve.at
     rows = zip(at, curve.direction, curve.size, curve.u, strict=True)
     return tuple(
-        CurvePoint(float(place), int(direction), unit.to_display(float(size)), unit.to_display(float(u)))
-        for place, direction, size, u in rows
+        CurvePoint(float(position), int(direction), unit.to_display(float(size)), unit.to_display(float(u)))
+        for position, direction, size, u in rows
     )
 
 
@@ -133,7 +133,7 @@ def _step(step: Step, units: Mapping[str, Unit]) -> ChangedTarget | ChangedParam
 def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | ChangedParameter, ...]:
     """Targets that moved in a run, then steps between runs."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
-    units = {name: effect.unit for effect in problem.base for name in effect.parameters(problem.context)}
+    units = problem.base_units
     moved = (
         MovedTarget(
             move.target, move.run, move.sequence, um(move.size), tuple(um(part) for part in move.shift),

@@ -48,11 +48,11 @@ def ties_of(effect: ChainMissing, rivals: Sequence[str]) -> tuple[Tie, ...]:
 
 
 def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...], tuple[str, ...]]:
-    own, other = _driver(effect.effect), _driver(rival)
-    if own not in OF_POSES or other not in OF_POSES:
-        if own != other:
-            return TieBreak.DRIVERS, tuple(name for name in (own, other) if name not in OF_POSES), ()
-        return TieBreak.INDEXATIONS, (own,), tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
+    driver, other = _driver(effect.effect), _driver(rival)
+    if driver not in OF_POSES or other not in OF_POSES:
+        if driver != other:
+            return TieBreak.DRIVERS, tuple(name for name in (driver, other) if name not in OF_POSES), ()
+        return TieBreak.INDEXATIONS, (driver,), tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
     if {effect.effect, rival} in [set(pair) for pair in effect.separation.together]:
         return TieBreak.NOTHING, (), ()
     return (TieBreak.POSES if effect.separation.poses else TieBreak.PLAN), (), ()

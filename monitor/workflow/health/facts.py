@@ -10,6 +10,7 @@ import numpy as np
 
 from monitor.reporting.health.records import (
     Change,
+    ChangeKind,
     ConditionRange,
     DataQuality,
     History,
@@ -22,11 +23,12 @@ from monitor.statistics import Change as FoundChange
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
-from monitor.workflow.health.forecast import DriftForecast, stated_drift
+from monitor.workflow.health.forecast import stated_drift
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.agreement import NOT_DECIDED
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
+from monitor.workflow.history.forecast import DriftForecast
 from monitor.workflow.history.past import ParameterPast
 from monitor.workflow.history.series import Series
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
@@ -109,16 +111,18 @@ def changes_noted(
             at = moment_of(change.at, parameter.series)
             after = moment_of(change.interval[0], parameter.series)
             sentence = _change_in_words(change, parameter.series.unit)
-            noted.append(Change("change", after, at, sentence, change.p_value, week.holds(at)))
+            noted.append(Change(ChangeKind.CHANGE, after, at, sentence, change.p_value, week.holds(at)))
     for step in steps:
         at = step.event.at.replace(tzinfo=None)
-        noted.append(Change("event step", None, at, _step_in_words(step), step.p_value, week.holds(at)))
+        noted.append(
+            Change(ChangeKind.EVENT_STEP, None, at, _step_in_words(step), step.p_value, week.holds(at))
+        )
     starts = {run.run: run.local_start for run in runs}
     for move in () if explanation is None else explanation.changes:
         if not isinstance(move, ChangedParameter) and move.run in starts:
             sentence = f"ball {move.target} moved by {move.size:.1f} {move.unit} (run {move.run})"
             at = starts[move.run]
-            noted.append(Change("change", None, at, sentence, move.p_value, week.holds(at)))
+            noted.append(Change(ChangeKind.CHANGE, None, at, sentence, move.p_value, week.holds(at)))
     noted += [event_noted(event, week) for event in events]
     return sorted(noted, key=lambda change: change.at, reverse=True)
 
@@ -126,7 +130,7 @@ def changes_noted(
 def event_noted(event: MachineEvent, week: Week) -> Change:
     """An event as the page states it."""
     at = event.at.replace(tzinfo=None)
-    return Change("event", None, at, f"{event.kind}: {event.description}", None, week.holds(at))
+    return Change(ChangeKind.EVENT, None, at, f"{event.kind}: {event.description}", None, week.holds(at))
 
 
 def _step_in_words(step: EventStep) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from monitor.methods import Unable, method_named
-from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport
+from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport, State
 from monitor.store import (
     Database,
     MachineEvent,
@@ -25,7 +25,6 @@ from monitor.workflow.health.facts import (
     event_noted,
     parameter_health,
 )
-from monitor.workflow.health.forecast import drift_forecast
 from monitor.workflow.health.map import probability_beyond, stated_map
 from monitor.workflow.health.model import model_health
 from monitor.workflow.health.refusals import refused_of
@@ -44,8 +43,8 @@ from monitor.workflow.health.verdict import (
     with_volumetric,
 )
 from monitor.workflow.health.weeks import Week
-from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.event_steps import event_steps
+from monitor.workflow.history.forecast import drift_forecast
 from monitor.workflow.history.past import machine_past, splitting_events
 from monitor.workflow.history.runs import only_runs
 from monitor.workflow.models import resolve_for
@@ -140,7 +139,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         if stated is None or name not in parameter_pasts:
             continue
         parameter = parameter_pasts[name]
-        drifts[name] = drift_forecast(parameter.drift, days_since_1970(last.started_at), limits.get(name))
+        drifts[name] = drift_forecast(parameter.drift, limits.get(name))
         starts = [
             at.replace(tzinfo=None)
             for at, has_it in zip(history.started_at, parameter.mask, strict=True)
@@ -166,7 +165,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         past.name.machine, past.name.description, past.name.location, state,
         changed=changed_in_words(noted, explanation, quality),
         since=since_when(state, parameters, noted, measured.span.first), probability_out=judged.any,
-        next_check=next_check(state, drifts, limits, last.local_start, week),
+        next_check=next_check(state, drifts, limits, week),
         run=_in_words(last),
         basis="" if stated is None else stated.input_covariance, factor=factor_in_words(stated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=condition_ranges(past.runs_of_week),
@@ -207,7 +206,7 @@ def _not_measured(db: Database, past: MachineWeek) -> MachineHealth:
         check = "now: no run yet"
         sentence = "not yet measured: the database holds no run of it"
     return MachineHealth(
-        past.name.machine, past.name.description, past.name.location, "not measured",
+        past.name.machine, past.name.description, past.name.location, State.NOT_MEASURED,
         changed="; ".join([sentence, *refusals_in_words(past.refused)]),
         since=past.runs[-1].local_start if past.runs else None, probability_out=None,
         next_check=check, run="", basis="", factor="", parameters=(),

@@ -19,7 +19,15 @@ from typing import BinaryIO
 from monitor import __version__
 from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError
-from monitor.reporting.health.records import ALARMS, Fleet, FleetRow, MachineHealth, by_urgency, fleet_row
+from monitor.reporting.health.records import (
+    ALARMS,
+    Fleet,
+    FleetRow,
+    MachineHealth,
+    State,
+    by_urgency,
+    fleet_row,
+)
 from monitor.reporting.health.render import MACHINES_A_PART, health_html, health_pdf
 from monitor.store import (
     Database,
@@ -222,7 +230,7 @@ def _becoming(path: Path) -> Iterator[BinaryIO]:
 
 
 def _answer(fleet: Fleet, week: Week, files: list[str], looks: WeeklyNotices) -> ReportAnswer:
-    measured = sum(row.state != "not measured" for row in fleet.rows)
+    measured = sum(row.state is not State.NOT_MEASURED for row in fleet.rows)
     return ReportAnswer(
         week=week.name,
         from_=week.first.isoformat(),

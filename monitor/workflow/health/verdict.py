@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from monitor.records import Verdict
 from monitor.reporting.health.records import (
     ALARMS,
     Change,
+    ChangeKind,
     DataQuality,
     ParameterHealth,
     RefusedImport,
@@ -20,8 +21,9 @@ from monitor.reporting.health.records import (
 )
 from monitor.uncertainty.conformity import conformity
 from monitor.workflow.explain.explain_answer import MachineExplanation
-from monitor.workflow.health.forecast import DriftForecast
 from monitor.workflow.health.weeks import Week
+from monitor.workflow.history.calendar import local_time
+from monitor.workflow.history.forecast import DriftForecast
 from monitor.workflow.trend.volumetric import VOLUMETRIC
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 
@@ -72,9 +74,9 @@ def changed_in_words(
     came in."""
     sentences = [
         change.what
-        for kind in ("change", "event step", "event")
+        for kind in (ChangeKind.CHANGE, ChangeKind.EVENT_STEP, ChangeKind.EVENT)
         for change in noted
-        if change.this_week and change.kind == kind
+        if change.this_week and change.kind is kind
     ]
     sentences += refusals_in_words(quality.refused_imports)
     sentences = sentences[:3] + ([f"and {len(sentences) - 3} more"] if len(sentences) > 3 else [])
@@ -102,10 +104,10 @@ def since_when(
     if state in ALARMS:
         # Of the volumetric error there is no value run by run: no day is better than a wrong one.
         return min(beyond, default=None)
-    if state == "model fails":
+    if state is State.MODEL_FAILS:
         return compared
-    changed = [change for change in noted if change.kind == "change"]
-    if state == "changed":
+    changed = [change for change in noted if change.kind is ChangeKind.CHANGE]
+    if state is State.CHANGED:
         return min(change.at for change in changed if change.this_week)
     return max((change.at for change in changed), default=None)
 
@@ -121,49 +123,51 @@ def state_of(
 ) -> State:
     """The most urgent state that holds; ``evaluated``: whether the last run has the results that its method gives."""
     if judged.any is not None and max(judged.single.values()) > 0.5:
-        return "out of tolerance"
+        return State.OUT_OF_TOLERANCE
     if judged.any is not None and judged.any > risk:
-        return "may be out of tolerance"
+        return State.MAY_BE_OUT_OF_TOLERANCE
     if not evaluated:
-        return "not evaluated"
-    if any(change.kind == "change" and change.this_week for change in noted):
-        return "changed"
+        return State.NOT_EVALUATED
+    if any(change.kind is ChangeKind.CHANGE and change.this_week for change in noted):
+        return State.CHANGED
     if explanation is not None and explanation.comparison.verdict is Verdict.SOMETHING_IS_MISSING:
-        return "model fails"
+        return State.MODEL_FAILS
     if quality.suspect:
-        return "suspect data"
-    return "in tolerance" if judged.every_has_one else "no change seen"
+        return State.SUSPECT_DATA
+    return State.IN_TOLERANCE if judged.every_has_one else State.NO_CHANGE_SEEN
 
 
 def next_check(
     state: State,
     drifts: Mapping[str, DriftForecast | None],
     limits: Mapping[str, float],
-    last: datetime,
     week: Week,
 ) -> str:
     """When to measure again, and why: the machine is likely to be in tolerance until then."""
-    good_for = {
-        name: (drift.good_for, drift.horizon)
+    good_until = {
+        name: drift.origin + drift.good_for
         for name, drift in drifts.items()
         if drift is not None and drift.good_for is not None
     }
-    if state == "not evaluated":
+    if state is State.NOT_EVALUATED:
         return "now: the last run could not be evaluated"
     if state in ALARMS:
         return "now"
     if not limits:
         return "no forecast: the campaign states no tolerances"
-    if not good_for:
+    if not good_until:
         return "no forecast: fewer than three days since the last change"
-    name = min(good_for, key=lambda parameter: good_for[parameter][0])
-    days, horizon = good_for[name]
-    day = (last + timedelta(days=days)).date()
-    if days >= horizon and day <= week.last:
-        return f"next week: {horizon:.0f} days of history allow no longer forecast"
+    name = min(good_until, key=good_until.__getitem__)
+    first = drifts[name]
+    assert first is not None
+    until = local_time(good_until[name], first.offset)
+    assert until is not None
+    day, whole = until.date(), first.good_for == first.span
+    if whole and day <= week.last:
+        return f"next week: {first.span:.0f} days of history allow no longer forecast"
     if day <= week.last:
         return f"now: {name} stayed in tolerance with 95 % until {day} only"
-    if days >= horizon:
+    if whole:
         return f"by {day}: in tolerance as far ahead as the history is long"
     return f"by {day}: {name} stays in tolerance with 95 % until then"
 

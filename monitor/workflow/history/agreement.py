@@ -224,22 +224,34 @@ def sentence(pair: AgreementPair) -> str:
     errors = {name: abs(result.e_n) for name, result in pair.parameters.items() if result.e_n is not None}
     worst = max(errors, key=errors.__getitem__, default="")
     number = f"; largest |E_n| {errors[worst]:.2g} ({worst})" if errors else ""
-    if pair.methods is not None:
-        subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
-        if not pair.disagree:
-            return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}"
-        return f"{subject} disagree in {', '.join(pair.disagree)}{number}"
-    moved = ", ".join(
-        f"{name} {pair.parameters[name].first:.3g} -> {pair.parameters[name].second:.3g} {pair.parameters[name].unit}"
-        for name in pair.disagree
+    if pair.methods is None:
+        subject = f"before and after the {pair.event} ({first}, {second}; {pair.method})"
+        return (
+            f"{subject}: {_moved(pair)}{number}{_judged_with(pair)}"
+            if errors
+            else f"{subject}: {NOT_DECIDED}"
+        )
+    subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
+    if not pair.disagree:
+        return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}"
+    return f"{subject} disagree in {', '.join(pair.disagree)}{number}"
+
+
+def _moved(pair: AgreementPair) -> str:
+    """The parameters that moved at an event, from which value to which."""
+    moved = [(name, pair.parameters[name]) for name in pair.disagree]
+    return (
+        ", ".join(f"{name} {result.first:.3g} -> {result.second:.3g} {result.unit}" for name, result in moved)
+        or "nothing moved beyond the scatter of runs and days"
     )
-    subject = f"before and after the {pair.event} ({first}, {second}; {pair.method})"
-    if not errors:
-        return f"{subject}: {NOT_DECIDED}"
-    days = max((result.other_days or 0 for result in pair.parameters.values()), default=0)
-    campaigns = max((result.other_campaigns or 0 for result in pair.parameters.values()), default=0)
+
+
+def _judged_with(pair: AgreementPair) -> str:
+    """Which other days of the machine said how days differ, and the parameters that nothing is said of."""
+    results = pair.parameters.values()
+    days = max((result.other_days or 0 for result in results), default=0)
+    campaigns = max((result.other_campaigns or 0 for result in results), default=0)
     lean = [f"{count} other {of}" for count, of in ((days, "days"), (campaigns, "campaigns")) if count]
     judged = f"; judged with the scatter of {' and '.join(lean)} of the machine" if lean else ""
-    open_ones = [name for name, result in pair.parameters.items() if result.agree is None]
-    undecided = f"; {NOT_DECIDED} ({', '.join(open_ones)})" if open_ones else ""
-    return f"{subject}: {moved or 'nothing moved beyond the scatter of runs and days'}{number}{judged}{undecided}"
+    undecided = [name for name, result in pair.parameters.items() if result.agree is None]
+    return judged + (f"; {NOT_DECIDED} ({', '.join(undecided)})" if undecided else "")

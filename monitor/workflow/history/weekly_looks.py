@@ -151,17 +151,17 @@ def _machine_weeks(db: Database, name: str, last: Week | None) -> _MachineWeeks 
     moments = [event.at.timestamp() for event in machine_events(db, name) if event.kind != NOTE]
     era = np.searchsorted(np.sort(moments), history.seconds, side="right")
     # Of a week that an event divides the runs after it count.
-    weeks, place = np.unique(mondays, return_inverse=True)
+    weeks, week_of = np.unique(mondays, return_inverse=True)
     latest = np.zeros(len(weeks), dtype=np.int64)
-    np.maximum.at(latest, place, era)
-    counts = era == latest[place]
+    np.maximum.at(latest, week_of, era)
+    counts = era == latest[week_of]
     present = np.isfinite(history.values) & counts[:, np.newaxis]
     sums, runs = (
         np.zeros((len(weeks), len(history.parameters))),
         np.zeros((len(weeks), len(history.parameters))),
     )
-    np.add.at(sums, place, np.where(present, history.values, 0.0))
-    np.add.at(runs, place, present)
+    np.add.at(sums, week_of, np.where(present, history.values, 0.0))
+    np.add.at(runs, week_of, present)
     with np.errstate(invalid="ignore"):
         means = sums / np.where(runs > 0.0, runs, np.nan)
     return _MachineWeeks(
@@ -188,10 +188,10 @@ def _looked(fleet: Sequence[_MachineWeeks]) -> WeeklyNotices:
     for week in every.tolist():
         values, anew = np.full(has.shape, np.nan), np.zeros(len(fleet), dtype=np.bool_)
         places = [int(np.searchsorted(machine.weeks, week)) for machine in fleet]
-        for row, (machine, place) in enumerate(zip(fleet, places, strict=True)):
-            if place < len(machine.weeks) and machine.weeks[place] == week:
-                values[row, columns[row]] = machine.values[place]
-                anew[row] = machine.anew[place]
+        for row, (machine, index) in enumerate(zip(fleet, places, strict=True)):
+            if index < len(machine.weeks) and machine.weeks[index] == week:
+                values[row, columns[row]] = machine.values[index]
+                anew[row] = machine.anew[index]
         looks.restart(anew)
         look = looks.look(values)
         series = look.series
@@ -211,27 +211,27 @@ def _notices(
 ) -> list[WeeklyNotice]:
     notices = []
     for row in np.flatnonzero(look.parameters.any(axis=1) | look.vectors).tolist():
-        machine, place = fleet[row], places[row]
+        machine, last = fleet[row], places[row]
         for j in np.flatnonzero(look.parameters[row]).tolist():
             name = names[j]
-            before, since = _sides(machine, (name,), place, int(look.since[row, j]))
+            before, since = _sides(machine, (name,), last, int(look.since[row, j]))
             values = machine.values[:, machine.parameters.index(name)]
             notices.append(
                 WeeklyNotice(
-                    machine.machine, _week(machine, place), NoticeKind.PARAMETER, (name,),
+                    machine.machine, _week(machine, last), NoticeKind.PARAMETER, (name,),
                     _week(machine, int(before[-1])), _week(machine, int(since[0])),
                     float(values[since].mean() - values[before].mean()), machine.units[name],
                 )
             )  # fmt: skip
         if look.vectors[row]:
-            before, since = _sides(machine, machine.parameters, place, int(look.vector_since[row]))
+            before, since = _sides(machine, machine.parameters, last, int(look.vector_since[row]))
             moved = machine.values[since].mean(axis=0) - machine.values[before].mean(axis=0)
             with np.errstate(divide="ignore", invalid="ignore"):
                 scores = np.nan_to_num(np.abs(moved) / machine.values[before].std(axis=0))
             most = tuple(machine.parameters[k] for k in np.argsort(-scores, kind="stable")[:NAMED])
             notices.append(
                 WeeklyNotice(
-                    machine.machine, _week(machine, place), NoticeKind.VECTOR, most,
+                    machine.machine, _week(machine, last), NoticeKind.VECTOR, most,
                     _week(machine, int(before[-1])), _week(machine, int(since[0])),
                 )
             )  # fmt: skip
@@ -239,16 +239,16 @@ def _notices(
 
 
 def _sides(
-    machine: _MachineWeeks, parameters: Sequence[str], place: int, since: int
+    machine: _MachineWeeks, parameters: Sequence[str], last: int, since: int
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """The weeks (indices) before and since a change; the latter are ``since`` and end at ``place``."""
-    began = int(np.flatnonzero(machine.anew[: place + 1])[-1]) if machine.anew[: place + 1].any() else 0
+    """The weeks (indices) before and since a change; the latter are ``since`` and end at ``last``."""
+    began = int(np.flatnonzero(machine.anew[: last + 1])[-1]) if machine.anew[: last + 1].any() else 0
     columns = [machine.parameters.index(name) for name in parameters]
-    measured = np.flatnonzero(np.isfinite(machine.values[: place + 1, columns]).all(axis=1))
+    measured = np.flatnonzero(np.isfinite(machine.values[: last + 1, columns]).all(axis=1))
     measured = measured[measured >= began]
     after = min(max(since, 1), len(measured) - 1)
     return measured[:-after], measured[-after:]
 
 
-def _week(machine: _MachineWeeks, place: int) -> str:
-    return Week(date.fromordinal(int(machine.weeks[place]))).name
+def _week(machine: _MachineWeeks, index: int) -> str:
+    return Week(date.fromordinal(int(machine.weeks[index]))).name

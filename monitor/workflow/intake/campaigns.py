@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime
-from typing import Any
 
 from monitor.store import (
     CampaignRow,
@@ -52,24 +50,3 @@ def runs(db: Database, request: RunsRequest) -> RunsAnswer:
     """List the runs of a campaign. Raises NotFoundError, DataError for a curve, which has none."""
     load_campaign(db, request.campaign)
     return RunsAnswer(request.campaign, list_runs(db, request.campaign), campaign_notes(db, request.campaign))
-
-
-def records(frame: Any) -> list[dict[str, Any]]:
-    """Return the rows of a table as JSON has them; moments in ISO 8601, with Z where they are in UTC."""
-    return [
-        {str(key): _plain(value, str(key)) for key, value in row.items()} for row in frame.to_dict("records")
-    ]
-
-
-def _plain(value: Any, name: str = "") -> Any:
-    if isinstance(value, dict):
-        return {str(key): _plain(inner) for key, inner in value.items()}
-    if isinstance(value, datetime):
-        # The store keeps UTC without its zone; local times are named so.
-        zone = "Z" if value.tzinfo is None and not name.endswith("_local") else ""
-        return None if str(value) == "NaT" else value.isoformat() + zone
-    if hasattr(value, "isoformat"):
-        return None if str(value) == "NaT" else value.isoformat()
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    return None if value != value else value

@@ -36,7 +36,7 @@ def use_model(db: Database, request: UseModelRequest) -> UseModelAnswer:
     before = followed_by(db, request.machine).get(method, (method, 1))
     with db.transaction():
         choice = save_machine_model(db, request.machine, method, (model.name, model.version), request.reason)
-    done, failed = [], {}
+    finished, failed = [], {}
     history = machine_history(db, request.machine, model=model.name, version=model.version)
     for name in history.unidentified:
         campaign = load_campaign(db, name)
@@ -44,12 +44,12 @@ def use_model(db: Database, request: UseModelRequest) -> UseModelAnswer:
             continue
         try:
             save_identification(db, identified(campaign, model)[1])
-            done.append(name)
+            finished.append(name)
         except MonitorError as error:
             # What cannot be identified stays out of the history, and is named with the reason.
             failed[name] = str(error)
     return UseModelAnswer(
-        request.machine, method, label(model), label_of(*before), choice.reason, tuple(done), failed
+        request.machine, method, label(model), label_of(*before), choice.reason, tuple(finished), failed
     )
 
 

@@ -16,21 +16,15 @@ from monitor.methods.planning.search import best_plan
 from monitor.methods.planning.touches import planned_context
 from monitor.records import Array
 from monitor.uncertainty.coverage import rectangle_factor
-from monitor.units import DEGREE, Unit
+from monitor.units import DEGREE
 from monitor.workflow.plan.answer import BallPlan, BallSubset, PlannedParameter, Pose
 from monitor.workflow.plan.candidates import PlannedCampaign
-
-
-def parameter_units(planned: PlannedCampaign) -> dict[str, Unit]:
-    """The display units of the base parameters."""
-    context = planned.problem.context
-    return {name: effect.unit for effect in planned.problem.base for name in effect.parameters(context)}
 
 
 def ball_plan(planned: PlannedCampaign, choice: Choice, p: float) -> BallPlan:
     """A plan with the uncertainties that it promises, against the present one."""
     touches, expected = planned.candidates.touches, choice.expected
-    units, chain = parameter_units(planned), planned.problem.context.chain
+    units, chain = planned.problem.base_units, planned.problem.context.chain
     k = rectangle_factor(max(int(expected.determined.sum()), 1), p)
     merit = _merit(planned.present, choice)
     return BallPlan(
@@ -87,7 +81,7 @@ def _finite(value: float) -> float | None:
 def best_subsets(planned: PlannedCampaign) -> tuple[BallSubset, ...]:
     """The best subset of each size of the campaign's own balls, at its own indexations."""
     targets, present = planned.candidates.touches.targets, planned.present
-    units = parameter_units(planned)
+    units = planned.problem.base_units
     candidates = replace(planned.candidates, balls=present.balls)
     subsets = []
     for count in range(1, len(present.balls) + 1):

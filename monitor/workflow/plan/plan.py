@@ -15,7 +15,7 @@ from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import label, resolve_for
 from monitor.workflow.plan.angles import plan_angles
 from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer, PlanAnswer, TimeAnswer
-from monitor.workflow.plan.balls import ball_plan, best_subsets, blind_spots, parameter_units
+from monitor.workflow.plan.balls import ball_plan, best_subsets, blind_spots
 from monitor.workflow.plan.candidates import PlannedCampaign, planned
 from monitor.workflow.plan.request import PlanRequest
 from monitor.workflow.plan.separate import separation
@@ -73,7 +73,7 @@ def _proposed(weighed: PlannedCampaign, request: PlanRequest) -> Choice | None:
     """The plan that is asked for: the quickest for wanted uncertainties, the best of so many balls and indexations."""
     candidates = weighed.candidates
     if request.wanted:
-        units = parameter_units(weighed)
+        units = weighed.problem.base_units
         wanted = {
             name: units[name].to_internal(u) if name in units else u for name, u in request.wanted.items()
         }

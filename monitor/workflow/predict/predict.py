@@ -66,34 +66,34 @@ def beside(campaign: Campaign, other: Campaign) -> tuple[Campaign, npt.NDArray[n
                 f"{each.name} has {len(each.runs)} runs, each with a set-up of its own; rows of another campaign can "
                 "be predicted from a single run only (leave --of out to predict parts of the runs from each other)"
             )
-    own, more = campaign.probings, other.probings
+    probings, more = campaign.probings, other.probings
     if (campaign.machine.id, campaign.method) != (other.machine.id, other.method):
         raise DataError(
             f"{other.name} measured {other.machine.id} by {other.method}, {campaign.name} {campaign.machine.id} by "
             f"{campaign.method}: a model of the one says nothing of the other"
         )
-    unknown = sorted(set(more.target.tolist()) - set(own.target.tolist()))
+    unknown = sorted(set(more.target.tolist()) - set(probings.target.tolist()))
     if unknown:
         raise DataError(
             f"{other.name} measured {', '.join(unknown)}, whose place {campaign.name} does not determine; it has "
-            f"{', '.join(sorted(set(own.target.tolist())))}"
+            f"{', '.join(sorted(set(probings.target.tolist())))}"
         )
     count = len(more)
     joined = Probings(
-        run=np.concatenate([own.run, np.full(count, own.run[0])]),
-        sequence=np.concatenate([own.sequence, int(own.sequence.max()) + 1 + np.arange(count)]),
-        time=np.concatenate([own.time, float(own.time.max()) + more.time]),
-        target=np.concatenate([own.target, more.target]),
+        run=np.concatenate([probings.run, np.full(count, probings.run[0])]),
+        sequence=np.concatenate([probings.sequence, int(probings.sequence.max()) + 1 + np.arange(count)]),
+        time=np.concatenate([probings.time, float(probings.time.max()) + more.time]),
+        target=np.concatenate([probings.target, more.target]),
         readings={
-            axis: np.concatenate([values, more.readings[axis]]) for axis, values in own.readings.items()
+            axis: np.concatenate([values, more.readings[axis]]) for axis, values in probings.readings.items()
         },
         channels={
             name: np.concatenate([values, more.channels[name]])
-            for name, values in own.channels.items()
+            for name, values in probings.channels.items()
             if name in more.channels
         },
     )
-    return replace(campaign, probings=joined), np.arange(len(joined)) >= len(own)
+    return replace(campaign, probings=joined), np.arange(len(joined)) >= len(probings)
 
 
 def _by_parts(campaign: Campaign, model: StoredModel) -> PredictAnswer:

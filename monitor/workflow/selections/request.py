@@ -8,6 +8,7 @@ from pathlib import Path
 
 from monitor.documents import OMITTED
 from monitor.exceptions import InputError
+from monitor.store import SelectionRow
 
 
 @dataclass(frozen=True)
@@ -37,24 +38,10 @@ class SelectionsRequest:
 
 
 @dataclass(frozen=True)
-class ListedSelection:
-    """A stored selection; ``made_at`` in UTC, ISO 8601."""
-
-    selection: str
-    campaign: str
-    machine: str
-    condition: str
-    runs: tuple[int, ...]
-    run_count: int
-    made_at: str
-    selection_id: int
-
-
-@dataclass(frozen=True)
 class SelectionsAnswer:
     """The stored selections."""
 
-    selections: tuple[ListedSelection, ...]
+    selections: tuple[SelectionRow, ...]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ covariance of the probed coordinates of each (Figure 4.6).
 
 from __future__ import annotations
 
-from monitor.documents import from_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.store import (
     Database,
@@ -17,10 +16,8 @@ from monitor.store import (
     load_campaign,
     save_selection,
 )
-from monitor.workflow.intake.campaigns import records
 from monitor.workflow.run_statistics.columns import campaign_columns, selected
 from monitor.workflow.selections.request import (
-    ListedSelection,
     SelectionAnswer,
     SelectionRequest,
     SelectionsAnswer,
@@ -53,8 +50,7 @@ def select(db: Database, request: SelectionRequest) -> SelectionAnswer:
 
 def selections(db: Database, request: SelectionsRequest) -> SelectionsAnswer:
     """List the stored selections."""
-    rows = records(list_selections(db, request.campaign))
-    return SelectionsAnswer(tuple(from_document(ListedSelection, row) for row in rows))
+    return SelectionsAnswer(list_selections(db, request.campaign))
 
 
 def group(db: Database, name: str, campaign: str | None = None) -> StoredSelection | None:

@@ -5,47 +5,44 @@ from __future__ import annotations
 from dataclasses import replace
 
 from monitor.exceptions import DataError
-from monitor.statistics import Trend, backtest, forecast
+from monitor.statistics import backtest
 from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
-from monitor.workflow.history.series import Series
-from monitor.workflow.trend.answer import Between, ForecastTest, LimitForecast
+from monitor.workflow.history.forecast import crossing_dates, drift_forecast
+from monitor.workflow.trend.answer import ForecastTest, LimitForecast
 
 #: Days from which on forecasts are looked at: five to fit a line, and one to foretell.
 BACKTEST_DAYS = 6
 #: Days foretold at most, evenly spread: of five years of weeks all of them would be most of the time of a page.
 FORETOLD = 60
-#: A forecast beyond this many years is no forecast; the date is then left out.
-HORIZON_YEARS = 20.0
 
 
-def limit_forecast(
-    series: Series, line: Trend | None, limit: float | None, check: float, reliability: float
-) -> LimitForecast:
-    """When the drift reaches the limit, and how likely the parameter is in tolerance at the next ``check``."""
-    none = LimitForecast(limit, None, None, None, date(check, series.offset), None, None, None)
+def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliability: float) -> LimitForecast:
+    """When the drift reaches the limit, and how likely the parameter is in tolerance at the next ``check``.
+
+    A history that is too short for a slope a year has no date; it may still say for how long a run is good.
+    """
+    none = LimitForecast(limit, None, None, None, date(check, drift.whole.offset), None, None, None)
     if limit is None:
         return replace(none, why_no_forecast="no forecast: the machine file states no tolerance for it")
-    if line is None:
+    of_drift = drift_forecast(drift, limit, check, reliability)
+    if of_drift is None or of_drift.ahead is None:
         return replace(none, why_no_forecast="no forecast: there is no drift to extrapolate")
-    now = float(series.t[-1])
-    horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
-    ahead = forecast(line, (-limit, limit), now, [max(check, now)], reliability=reliability, horizon=horizon)
-    crossing, offset = ahead.crossing, series.offset
-    low, high = (date(t, offset) if t < horizon else None for t in crossing.interval)
-    return replace(
+    ahead = of_drift.ahead
+    none = replace(
         none,
-        crosses_limit_at=None if crossing.at is None else date(crossing.at, offset),
-        crosses_limit_interval=interval_or_none(low, high),
-        in_tolerance_at_next_check=float(ahead.probability[0]),
-        recommended_interval_days=float(min(ahead.recommended_interval, horizon - now)),
+        recommended_interval_days=of_drift.good_for,
         recommended_by=f"{ahead.method}: {reliability:g}",
     )
-
-
-def interval_or_none(low: str | None, high: str | None) -> Between | None:
-    """The ends of a crossing. An open end says that the drift may never get there (within the horizon)."""
-    return None if low is None and high is None else (low, high)
+    if drift.stated is None:
+        return replace(none, why_no_forecast="no forecast: there is no drift to extrapolate")
+    at, interval = crossing_dates(ahead.crossing, ahead.horizon, of_drift.offset)
+    return replace(
+        none,
+        crosses_limit_at=at,
+        crosses_limit_interval=interval,
+        in_tolerance_at_next_check=float(ahead.probability[0]),
+    )
 
 
 def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, str | None]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics import Change, control_false_discoveries, dependence, warm_up
+from monitor.statistics import Change, DependenceUnits, control_false_discoveries, dependence, warm_up
 from monitor.units import DEGREE_CELSIUS, ONE, Unit, column_unit
 from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
@@ -138,7 +138,7 @@ def _condition(
     try:
         fit = dependence(
             part.values, part.t, {name: values}, drift=with_drift, u=part.weights(), days=part.days,
-            unit=Unit(series.unit, 1.0), channel_units={name: channel},
+            units=DependenceUnits(Unit(series.unit, 1.0), {name: channel}),
         )  # fmt: skip
     except DataError:
         return None

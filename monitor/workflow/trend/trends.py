@@ -233,7 +233,7 @@ class _Page:
             why_no_cycles=why_no_waves,
             warm_up=warmth,
             why_no_warm_up=why_no_warmth,
-            forecast=limit_forecast(drift.whole, drift.stated, limit, self.check, self.request.reliability),
+            forecast=limit_forecast(drift, limit, self.check, self.request.reliability),
             backtest=test,
             why_no_backtest=why_no_test,
             control=self.charts.of(self.history.parameters.index(series.name)),

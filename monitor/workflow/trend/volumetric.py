@@ -32,9 +32,9 @@ from monitor.store import Database, MachineHistory, load_campaign
 from monitor.units import MICROMETRE
 from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
 from monitor.workflow.history.drift import PieceDrift
+from monitor.workflow.history.forecast import crossing_dates, horizon_of, recommended
 from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import VolumetricForecast, VolumetricTest
-from monitor.workflow.trend.forecast import HORIZON_YEARS, interval_or_none
 
 #: Times between the begin of the drifts and now at which the error is compared with its limit, for the day since when.
 SINCE_STEPS = 400
@@ -64,6 +64,12 @@ class _Extrapolated:
     lines: Mapping[str, Trend]
     t: Array
     days: npt.NDArray[np.int64]
+
+    @property
+    def span(self) -> float:
+        """Days that the drifts were watched for, those that are held aside: of the shortest."""
+        spans = [self.drifts[name].span for name in self.lines if self.drifts[name].stated is not None]
+        return min(spans or [self.drifts[name].span for name in self.lines])
 
     def row_of(self, name: str) -> npt.NDArray[np.intp]:
         """Where the runs of a parameter stand among the times of all."""
@@ -211,11 +217,11 @@ def _backtest(
 
 
 def _beyond_since(
-    parameters: _Extrapolated, vectors: _Vectors, limit: float, now: float, offset: timedelta
+    parameters: _Extrapolated, vectors: _Vectors, limit: float, origin: float, offset: timedelta
 ) -> str | None:
     """Since when the drifts put the error beyond its limit without a break; None where it is not beyond it now."""
     begins = max(float(drift.piece.t[0]) for drift in parameters.drifts.values())
-    times = np.linspace(min(begins, now), now, SINCE_STEPS)
+    times = np.linspace(min(begins, origin), origin, SINCE_STEPS)
     levels = np.column_stack(
         [line.level_at + line.slope * (times - line.at) for line in parameters.lines.values()]
     )
@@ -253,32 +259,33 @@ def volumetric_forecast(
         )
     try:
         lines = {name: drift.stated or _held(drift.piece) for name, drift in drifts.items()}
-        now = max(float(drift.whole.t[-1]) for drift in drifts.values())
-        levels = {name: float(predict(line, now)[0]) for name, line in lines.items()}
+        origin = max(float(drift.whole.t[-1]) for drift in drifts.values())
+        levels = {name: float(predict(line, origin)[0]) for name, line in lines.items()}
         vectors = _vectors(db, history, question.model, levels)
     except DataError as error:
         return replace(none, why=f"no forecast of the volumetric error: {error}")
     parameters = _together(drifts, {name: lines[name] for name in vectors.names})
     correlation, shrunk, _ = residual_correlation(_residuals(parameters), parameters.days)
-    horizon = now + HORIZON_YEARS * DAYS_PER_YEAR
     ahead = forecast_longest(
         JointLines(list(parameters.lines.values()), correlation),
         ErrorVectors(vectors.sensitivity, vectors.at_zero),
-        LengthQuestion(limit, now, [max(question.check, now)], horizon, question.reliability),
+        LengthQuestion(
+            limit, origin, [max(question.check, origin)], horizon_of(origin), question.reliability
+        ),
         rng=rng,
     )
     test, why_no_test = _backtest(parameters, vectors, rng)
-    low, high = (date(t, offset) if t < horizon else None for t in ahead.crossing.interval)
+    crosses_at, interval = crossing_dates(ahead.crossing, ahead.horizon, offset)
     return replace(
         none,
         latest_um=ahead.latest,
-        beyond_since=_beyond_since(parameters, vectors, limit, now, offset),
-        crosses_limit_at=None if ahead.crossing.at is None else date(ahead.crossing.at, offset),
-        crosses_limit_interval=interval_or_none(low, high),
+        beyond_since=_beyond_since(parameters, vectors, limit, origin, offset),
+        crosses_limit_at=crosses_at,
+        crosses_limit_interval=interval,
         predicted_um=float(ahead.predicted[0]),
         predicted_interval_um=tuple(ahead.interval[0].tolist()),
         in_tolerance_at_next_check=float(ahead.probability[0]),
-        recommended_interval_days=float(min(ahead.recommended_interval, horizon - now)),
+        recommended_interval_days=recommended(ahead.recommended_interval, parameters.span),
         # Parameters without a drift stay where they are; those that are no error of the chain take no part.
         held=tuple(name for name in parameters.lines if drifts[name].stated is None),
         left_out=vectors.left_out,

@@ -194,8 +194,8 @@ def _propagated(
 
 def _taken_as_known(campaign: Campaign, axes_covered: bool) -> tuple[TakenAsKnown, ...]:
     """What the method takes as known, less the linear axes where their errors are stated."""
-    known = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
-    return tuple(name for name in known if not (axes_covered and name is TakenAsKnown.LINEAR_AXES))
+    assumed = [TakenAsKnown(name) for name in campaign_method(campaign).taken_as_known]
+    return tuple(name for name in assumed if not (axes_covered and name is TakenAsKnown.LINEAR_AXES))
 
 
 def _lack_of_fit(
@@ -233,8 +233,7 @@ def _refuse_too_many(readings: int, method: str) -> None:
 
 
 def _units(fit: Fit, names: tuple[str, ...]) -> tuple[Unit, ...]:
-    context = fit.problem.context
-    units = {name: effect.unit for effect in fit.problem.base for name in effect.parameters(context)}
+    units = fit.problem.base_units
     return tuple(units[name] for name in names)
 
 

@@ -44,11 +44,11 @@ def counted_columns(
     campaign: Campaign,
     number: int,
     sources: tuple[Source, ...],
-    seen: frozenset[Sharing],
+    in_scatter: frozenset[Sharing],
 ) -> tuple[SourceColumns, ...]:
-    """What the sources that count do to the inputs; those in ``seen`` are looked at, and left out."""
+    """What the sources that count do to the inputs; those that are ``in_scatter`` of the runs are left out."""
     columns = source_columns(run, unknowns, campaign, number, sources)
-    return tuple(part for part in columns if part.source.shared_by not in seen)
+    return tuple(part for part in columns if part.source.shared_by not in in_scatter)
 
 
 def axes_stated(sources: tuple[Source, ...], chain: Chain) -> frozenset[str]:

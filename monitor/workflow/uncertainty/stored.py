@@ -20,9 +20,8 @@ from monitor.reporting.covariance_source import CovarianceSource
 from monitor.store import Database, StoredModel, check_analysis, save_analysis, stored_analyses
 from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-from monitor.workflow.uncertainty.released import covariance_source_of
-from monitor.workflow.uncertainty.released_refusals import with_reason
 from monitor.workflow.uncertainty.request import Asked
+from monitor.workflow.uncertainty.sentences_0_1_0 import covariance_source_of, with_reason
 
 #: The kind of analysis under which answers are stored.
 KIND = "uncertainty"

@@ -99,19 +99,19 @@ def _along(mapped: VolumetricMap, axis: int) -> tuple[Array, PositioningError, f
 def _positioning(mapped: VolumetricMap) -> dict[str, tuple[Sequence[str], list[Row]]]:
     """The tables of the linear and of the rotary axes that have a positioning error, by the names of their files."""
     joints = mapped.errors.chain.joints
-    known = [
+    measured = [
         axis
         for axis, joint in enumerate(joints)
         if joint.kind != "spindle" and positions_itself(mapped.errors, axis)
     ]
-    if not known:
+    if not measured:
         raise InputError(
             f"--compensation positioning-csv: no positioning error of an axis is known from run {mapped.evaluated.run} "
             f"with model {mapped.evaluated.model.name}; volumetric-csv writes what the known errors do at the tool"
         )
     tables: dict[str, tuple[Sequence[str], list[Row]]] = {}
     for name, turns in (("positioning", False), ("positioning-rotary", True)):
-        axes = [axis for axis in known if joints[axis].turns == turns]
+        axes = [axis for axis in measured if joints[axis].turns == turns]
         if axes:
             along = {axis: _along(mapped, axis) for axis in axes}
             header = positioning_header(

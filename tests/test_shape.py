@@ -1,0 +1,165 @@
+"""How the code is cut: branches and parameters of every function, and names that say what they hold.
+
+The limits are those of CONTRIBUTING.md. The numba kernels are let off: a call inside a kernel that is compiled anew
+for every set of types costs more to read than the branches do.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import monitor
+
+PACKAGE = Path(monitor.__file__).parent
+MOST_BRANCHES = 15
+MOST_PARAMETERS = 10
+#: Compiled functions, where every call and every tuple costs.
+KERNELS = {"uncertainty/kernel.py"}
+
+#: Words that do not say what a name holds, as a whole name.
+VAGUE = {
+    "found", "one", "place", "own", "told", "known", "kept", "seen", "chosen", "made", "given", "left", "here", "there",
+    "now", "words", "wished", "begun", "done", "thing", "stuff", "item", "data", "obj",
+}  # fmt: skip
+#: Names that stand in files, stored documents and certificates, where they are read for ever, or that mean a side.
+KEYS = {
+    ("readers/setups_file.py", "known"),
+    ("records.py", "known"),
+    ("reporting/certificate/completeness.py", "item"),
+    ("reporting/certificate/laboratory.py", "place"),
+    ("reporting/certificate/record.py", "place"),
+    ("reporting/certificate/record.py", "item"),
+    ("reporting/svg/map_slices.py", "left"),
+    ("reporting/svg/plot.py", "left"),
+    ("workflow/trend/answer.py", "made"),
+}
+
+_BRANCHES = (
+    ast.If, ast.For, ast.While, ast.IfExp, ast.ExceptHandler, ast.With, ast.Assert, ast.comprehension,
+)  # fmt: skip
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def parsed(package: Path) -> Iterator[tuple[str, ast.Module]]:
+    """Yield the path of every file below the package, and its syntax tree."""
+    for path in sorted(package.rglob("*.py")):
+        yield path.relative_to(package).as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def functions(package: Path) -> Iterator[tuple[str, Function]]:
+    """Yield the file of every function, method and function inside a function, and its node."""
+    for file, tree in parsed(package):
+        for node in ast.walk(tree):
+            if isinstance(node, _FUNCTIONS):
+                yield file, node
+
+
+def branches(function: Function) -> int:
+    """Return the ways through a function: 1 and one for each decision, without those of functions inside it."""
+    total, waiting = 1, list(ast.iter_child_nodes(function))
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, (*_FUNCTIONS, ast.Lambda)):
+            continue
+        total += isinstance(node, _BRANCHES)
+        total += len(node.values) - 1 if isinstance(node, ast.BoolOp) else 0
+        total += len(node.cases) if isinstance(node, ast.Match) else 0
+        waiting += ast.iter_child_nodes(node)
+    return total
+
+
+def parameters(function: Function) -> int:
+    """Return the number of parameters without self and cls; ``*names`` and ``**names`` count as one each."""
+    arguments = function.args
+    names = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+    named = sum(name.arg not in ("self", "cls") for name in names)
+    return named + (arguments.vararg is not None) + (arguments.kwarg is not None)
+
+
+def too_large(package: Path) -> list[str]:
+    """Return every function beyond a limit."""
+    faults = []
+    for file, function in functions(package):
+        if file in KERNELS:
+            continue
+        name = f"{file}:{function.lineno}: {function.name}"
+        if branches(function) > MOST_BRANCHES:
+            faults.append(f"{name} has {branches(function)} branches")
+        if parameters(function) > MOST_PARAMETERS:
+            faults.append(f"{name} has {parameters(function)} parameters")
+    return faults
+
+
+def vague_names(package: Path) -> list[str]:
+    """Return every name of a variable, field or parameter that does not say what it holds."""
+    faults = []
+    for file, tree in parsed(package):
+        for node in ast.walk(tree):
+            if isinstance(node, ast.arg):
+                name = node.arg
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                name = node.id
+            else:
+                continue
+            if name in VAGUE and (file, name) not in KEYS:
+                faults.append(f"{file}:{node.lineno}: {name}")
+    return faults
+
+
+def test_house_no_function_is_too_large() -> None:
+    assert too_large(PACKAGE) == []
+
+
+def test_house_names_say_what_they_hold() -> None:
+    assert vague_names(PACKAGE) == []
+
+
+def test_house_every_key_that_is_let_off_is_there() -> None:
+    names = {
+        (file, node.id)
+        for file, tree in parsed(PACKAGE)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Name)
+    }
+    assert names >= KEYS
+    assert {file for file, _ in functions(PACKAGE)} >= KERNELS
+
+
+@pytest.mark.parametrize(
+    ("source", "faults"),
+    [
+        ("def f(x):\n" + "    if x: pass\n" * 14, []),
+        ("def f(x):\n" + "    if x: pass\n" * 15, ["f has 16 branches"]),
+        ("def f(x):\n" + "    x = [y for y in x if y or x and y]\n" * 5, ["f has 16 branches"]),
+        ("def f(x):\n    def g():\n" + "        if x: pass\n" * 15, ["g has 16 branches"]),
+        ("async def f(x):\n    match x:\n" + "        case 1: pass\n" * 15, ["f has 16 branches"]),
+        ("def f(self, a, b, c, d, e, f, g, h, i, *j): pass", []),
+        ("def f(a, b, c, d, e, /, f, g, *, h, i, j, k): pass", ["f has 11 parameters"]),
+        ("def f(a, b, c, d, e, f, g, h, i, *j, **k): pass", ["f has 11 parameters"]),
+    ],
+)
+def test_house_what_is_too_large_is_named(tmp_path: Path, source: str, faults: list[str]) -> None:
+    (tmp_path / "room.py").write_text(source, encoding="utf-8")
+    assert [fault.partition(": ")[2] for fault in too_large(tmp_path)] == faults
+
+
+@pytest.mark.parametrize(
+    ("source", "faults"),
+    [
+        ("found = 1", ["found"]),
+        ("for item in x: pass", ["item"]),
+        ("[data for data in x]", ["data"]),
+        ("def f(*, own): pass", ["own"]),
+        ("class A:\n    words: str", ["words"]),
+        ("if (one := f()): pass", ["one"]),
+        ("f(place=1)\nx.found = 2\nfound_effects = ones = 3", []),
+    ],
+)
+def test_house_a_vague_name_is_named(tmp_path: Path, source: str, faults: list[str]) -> None:
+    (tmp_path / "room.py").write_text(source, encoding="utf-8")
+    assert [fault.rpartition(": ")[2] for fault in vague_names(tmp_path)] == faults
