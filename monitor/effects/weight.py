@@ -95,7 +95,8 @@ class LinkWeights(DescribedDriver):
         rotations, _ = context.axis_frames
         levered = _levered(context, joint, self.error)
         torques = [
-            np.sum(levered * rotations[:, link, :, axis], axis=1) for link, axis in self._moments(context, joint)
+            np.sum(levered * rotations[:, link, :, axis], axis=1)
+            for link, axis in self._moments(context, joint)
         ]
         return np.column_stack(torques)
 

@@ -113,7 +113,14 @@ def write(
     tool = frames(joints, readings, location, motion)[-1]
     stand, away = Rotation.random(random_state=rng), rng.normal(0.0, 1500.0, 3)
     folder.mkdir(parents=True)
-    text = ["format = 1", f'campaign = "{folder.name}"', 'method = "tracker"', "", "[machine]", 'id = "machine-1"']
+    text = [
+        "format = 1",
+        f'campaign = "{folder.name}"',
+        'method = "tracker"',
+        "",
+        "[machine]",
+        'id = "machine-1"',
+    ]
     for axis in axes:
         key = ("along" if axis.kind == "linear" else "about", "XYZ"[axis.direction.index(1.0)])
         text += ["", "[[machine.tool_chain]]", f'name = "{axis.name}"', f'kind = "{axis.kind}"']
