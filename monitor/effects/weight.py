@@ -32,7 +32,9 @@ def _levered(context: Context, joint: int, error: JointError) -> Array:
     """Torque (n, 3) about the axis of an error of a unit weight 1 mm off that axis along X, Y and Z of the bed's frame:
     axis . (arm x down) = arm . (down x axis)."""
     rotations, _ = context.axis_frames
-    return np.cross(np.array(context.chain.gravity), rotations[:, joint, :, error.term.component - 3])
+    axis = rotations[:, joint, :, error.term.component - 3]
+    levered: Array = np.cross(np.array(context.chain.gravity), axis)
+    return levered
 
 
 def _phrase(weight: str, error: JointError) -> str:

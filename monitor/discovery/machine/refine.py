@@ -214,10 +214,18 @@ def _between_readings(scene: ChainScene) -> float:
 
 
 def _counts_readings(scene: ChainScene) -> bool:
-    """Whether the column of times is no time but the number of the row: no constant in minutes comes from it."""
+    """Whether the column of times is no time but a number: no constant in minutes comes from it.
+
+    It is one where it goes with the sequence number, or where it grows by nothing or by exactly 1 s from row to row: the
+    number of the row, or of the pose that several rows share.
+    """
     context = scene.fit.problem.context
-    steps = np.diff(context.time)[np.diff(context.run) == 0]
-    return bool(len(steps) and np.all(steps == 1.0))
+    together = np.diff(context.run) == 0
+    steps = np.diff(context.time)[together]
+    if not steps.any():
+        return True
+    numbered = np.array_equal(steps, np.diff(context.sequence)[together])
+    return bool(numbered or np.all((steps == 0.0) | (steps == 1.0)))
 
 
 def _uncertainty(scene: ChainScene, candidate: ChainCandidate, slope: Array, others: Array) -> float:

@@ -117,7 +117,7 @@ def _linear(
     # Where all axes meet the equations fix everything but the length; else the scale is 1 already.
     meets = all_axes_meet(origin, size)
     if not meets:
-        guesses = [np.linalg.lstsq(flat, wanted, rcond=OPEN)[0]]
+        guesses = [np.asarray(np.linalg.lstsq(flat, wanted, rcond=OPEN)[0])]
     else:
         values, vectors = np.linalg.eigh(flat.T @ flat)
         spanned = vectors[:, values <= max(NULL * values[-1], 2.0 * values[0])]
@@ -129,7 +129,9 @@ def _linear(
     for free in guesses:
         stretch = float(np.cbrt(np.linalg.det(free[:9].reshape(3, 3) / size)))
         if abs(stretch) > OPEN * np.linalg.norm(free):
-            places.append(free[12:].reshape(kinds, 3) / (stretch if meets else 1.0))
+            places.append(
+                np.asarray(free[12:].reshape(kinds, 3) / (stretch if meets else 1.0), dtype=np.float64)
+            )
     return places
 
 
