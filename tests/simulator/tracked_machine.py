@@ -81,11 +81,19 @@ class Scene:
 
 
 def write(
-    folder: Path, axes: Sequence[Axis], rng: np.random.Generator, scene: Scene | None = None, poses: int = 150
+    folder: Path,
+    axes: Sequence[Axis],
+    rng: np.random.Generator,
+    scene: Scene | None = None,
+    *,
+    poses: int = 150,
+    visits: int = 1,
+    targets: Sequence[str] = tuple(TARGETS),
 ) -> Path:
-    """The campaign folder of one run of random poses."""
+    """The campaign folder of one run of random poses, all of them visited so many times one after the other."""
     scene = scene or Scene()
-    numbers = {axis.name: np.round(rng.uniform(*axis.limits, poses), 3) for axis in axes}
+    numbers = {axis.name: np.tile(np.round(rng.uniform(*axis.limits, poses), 3), visits) for axis in axes}
+    poses *= visits
     for name, step in scene.indexed.items():
         numbers[name] = step * np.round(numbers[name] / step)
     readings = {
@@ -134,8 +142,8 @@ def write(
     lines = [f"run,sequence,time_s,target,{columns},tracker_x_mm,tracker_y_mm,tracker_z_mm"]
     for pose in range(poses):
         at = ",".join(f"{numbers[axis.name][pose]:.3f}" for axis in axes)
-        for name, place in TARGETS.items():
-            seen = stand.inv().apply(point(tool[pose : pose + 1], np.array(place))[0] - away)
+        for name in targets:
+            seen = stand.inv().apply(point(tool[pose : pose + 1], np.array(TARGETS[name]))[0] - away)
             seen = seen + rng.normal(0.0, scene.noise_um / 1e3, 3)
             row = len(lines)
             lines.append(f"1,{row},{5.0 * row:.1f},{name},{at}," + ",".join(f"{value:.5f}" for value in seen))

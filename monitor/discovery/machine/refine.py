@@ -216,8 +216,8 @@ def _between_readings(scene: ChainScene) -> float:
 def _counts_readings(scene: ChainScene) -> bool:
     """Whether the column of times is no time but a number: no constant in minutes comes from it.
 
-    It is one where it goes with the sequence number, or where it grows by nothing or by exactly 1 s from row to row: the
-    number of the row, or of the pose that several rows share.
+    It is one where it goes with the sequence number, or where it grows by nothing or by exactly 1 s from row to row:
+    the number of the row, or of the pose that several rows share.
     """
     context = scene.fit.problem.context
     together = np.diff(context.run) == 0

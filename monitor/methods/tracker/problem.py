@@ -221,7 +221,12 @@ def _frame(
     turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
     remainder = (origin - arm @ turn.T).reshape(-1)
     rest = np.linalg.lstsq(flat[:, 9:], -remainder, rcond=1e-8)[0]
-    return turn, rest[:3] - turn @ middle, rest[3:].reshape(kinds, 3)
+    linear = (turn, rest[:3] - turn @ middle, rest[3:].reshape(kinds, 3))
+    if _left(linear, rotation, origin, points, at) <= CONTRADICTS * size:
+        return linear
+    # Axes that nearly meet, or a geometry that is far off: which guess is better shows in what it leaves.
+    guesses = (linear, best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False))
+    return min(guesses, key=lambda guess: _left(guess, rotation, origin, points, at))
 
 
 def _left(
