@@ -1,8 +1,8 @@
 """A least squares of a measured robot that knows its structure: the yardstick of what a search may reach.
 
 Unknown are every small error of every joint, frame and reflectors, cosine and sine of every line that the robot has,
-and the softness of every joint that gives way under the true weights. Derivatives are differences of 4x4 matrices; nothing
-is shared with the product.
+and the softness of every joint that gives way under the true weights. Derivatives are differences of 4x4 matrices;
+nothing is shared with the product.
 """
 
 from __future__ import annotations
