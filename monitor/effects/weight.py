@@ -56,7 +56,8 @@ class Load(DescribedDriver):
         assert joint is not None
         _, origins = context.axis_frames
         arm = origins[:, _carried(context, joint)[-1]] - origins[:, joint]
-        return np.sum(_levered(context, joint, self.error) * arm, axis=1)[:, None]
+        torque: Array = np.sum(_levered(context, joint, self.error) * arm, axis=1)
+        return torque[:, None]
 
     def unit(self) -> Unit:
         return METRE

@@ -168,8 +168,9 @@ def measured_trial(seed: int, kind: str, poses: int, off_poses: tuple[int, ...] 
     # What drifts is no part of the yardstick.
     known = known_structure_error(whole, scene, poses, off_poses)[1] if kind == "nothing drifts" else np.nan
     cells = [
-        kind, seed, len(names), reached, ", ".join(false) or "0", f"{len(set(off_poses) & dropped)} of {len(off_poses)}",
-        len(dropped - set(off_poses)), f"{1e3 * first.fit.rms:.1f}", f"{1e3 * error:.2f}", f"{1e3 * noise:.2f}",
+        kind, seed, len(names), reached, ", ".join(false) or "0",
+        f"{len(set(off_poses) & dropped)} of {len(off_poses)}", len(dropped - set(off_poses)),
+        f"{1e3 * first.fit.rms:.1f}", f"{1e3 * error:.2f}", f"{1e3 * noise:.2f}",
         f"{1e3 * known:.2f}", f"{error / known:.3f}", f"{seconds:.1f}",
     ]  # fmt: skip
     return "| " + " | ".join(map(str, cells)) + " |"
