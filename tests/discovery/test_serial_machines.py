@@ -13,6 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from monitor.discovery import Verdict, compare, explain, fit
 from monitor.discovery.machine.acceptance import LARGEST_RATIO
+from monitor.discovery.machine.missing import largest_deviation
+from monitor.discovery.machine.refine import counts_readings
+from monitor.effects import parse_effect
 from monitor.methods.model import Model
 from monitor.methods.tracker.method import METHOD as tracker
 from monitor.readers import read_campaign
@@ -95,6 +98,16 @@ def test_weights_of_links_are_one_angle_and_what_remains_is_said(robots, tmp_pat
     )
 
 
+@pytest.mark.parametrize(("step", "shared", "counts"), [(1.0, 1, True), (1.0, 3, True), (5.0, 1, False)])
+def test_a_column_of_times_that_counts_is_no_time(machines, tmp_path, step, shared, counts):
+    """The number of the row, or of the pose that three reflectors share; 5 s from row to row is a time."""
+    axes = machines.MACHINES["pan and tilt"]
+    campaign = read_campaign(machines.write(tmp_path / "m", axes, np.random.default_rng(1), poses=20))
+    time = step * (np.arange(60) // shared)
+    timed = replace(campaign, probings=replace(campaign.probings, time=time))
+    assert counts_readings(tracker.problem_of(timed).context) is counts
+
+
 def textbook_f(machines, folder, axes) -> tuple[float, int, int]:
     """F of lack of fit (Draper and Smith, section 2.1) of a machine of two turning axes by an own least squares: every
     small error of both axes, the frame and the place of the reflector; its degrees of freedom."""
@@ -160,9 +173,6 @@ def test_a_pose_that_is_not_left_shows_the_instrument_alone(machines, tmp_path):
 
 def test_link_weights_are_told_as_the_largest_angle(robots, tmp_path):
     """The coefficients are products of masses and softness, a different one a link; their effect is one angle."""
-    from monitor.discovery.machine.missing import _largest
-    from monitor.effects import parse_effect
-
     track = robots.track(np.random.default_rng(2), robots.Hidden(), poses=60)
     problem = tracker.problem_of(
         read_campaign(robots.write_tracked(tmp_path / "robot", track)), Model("tracker")
@@ -172,7 +182,7 @@ def test_link_weights_are_told_as_the_largest_angle(robots, tmp_path):
     )
     coefficients = np.linspace(1e-7, 4e-7, columns.shape[1])
     angle = columns @ coefficients
-    size, u = _largest(columns, coefficients, 1e-16 * np.eye(len(coefficients)))
+    size, u = largest_deviation(columns, coefficients, 1e-16 * np.eye(len(coefficients)))
     assert size == pytest.approx(np.abs(angle - angle.mean()).max())
     worst = int(np.abs(angle - angle.mean()).argmax())
     assert u == pytest.approx(1e-8 * np.linalg.norm(columns[worst] - columns.mean(axis=0)))

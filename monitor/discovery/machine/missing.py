@@ -178,7 +178,7 @@ def _amplitude(effect: MachineEffect, coefficients: Array, covariance: Array) ->
     return spread, u_of_variance / (2.0 * max(spread, float(np.sqrt(noise))))
 
 
-def _largest(columns: Array, coefficients: Array, covariance: Array) -> tuple[float, float]:
+def largest_deviation(columns: Array, coefficients: Array, covariance: Array) -> tuple[float, float]:
     """The largest deviation from its mean of an error with columns (n, k), and its standard uncertainty; in absolute
     value, for the coefficients of several weights have no sign in common."""
     apart = columns - columns.mean(axis=0)
@@ -207,7 +207,9 @@ def _missing(
     unit = None
     if isinstance(effect, ChainEffect) and isinstance(effect.driver, LinkWeights):
         unit = effect.term.unit
-        amplitude, u = _largest(effect.basis(scene.fit.problem.context).columns, coefficients, covariance)
+        amplitude, u = largest_deviation(
+            effect.basis(scene.fit.problem.context).columns, coefficients, covariance
+        )
     p_value, q_value = _p_and_q(selection, finding, candidate)
     shown = selection.shown
     visible = selection.candidates if shown is scene else shown.candidates
