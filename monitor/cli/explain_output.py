@@ -43,6 +43,7 @@ def _machine(explanation: MachineExplanation) -> None:
     for reading in explanation.suspect_data:
         _bad_probing(reading, explanation.target_word)
     output.say(explanation.answer)
+    _remaining(explanation)
     _next_step(explanation)
     for sentence in explanation.undecided:
         output.say(sentence)
@@ -52,6 +53,23 @@ def _machine(explanation: MachineExplanation) -> None:
             f"blind spots of this plan: {len(explanation.blind_spots)} effects leave nothing to see "
             f"({names}, ...); --json lists them"
         )
+
+
+def _remaining(explanation: MachineExplanation) -> None:
+    """What is left with all findings in the model."""
+    remaining, um = explanation.remaining, output.micrometres
+    if remaining is None:
+        return
+    parts = ""
+    if remaining.carried_rms_um is not None and remaining.resting_rms_um is not None:
+        parts = (
+            f"; RMS of {explanation.target_word}s on the tool {um(remaining.carried_rms_um)} µm, of those beside the "
+            f"machine {um(remaining.resting_rms_um)} µm"
+        )
+    output.say(
+        f"with all of this in the model {um(remaining.deviation_um)} µm remain where "
+        f"{um(remaining.stated_uncertainty_um)} µm are stated{parts}"
+    )
 
 
 def _curve(explanation: CurveExplanation) -> None:

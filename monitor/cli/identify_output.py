@@ -47,8 +47,11 @@ def _machine(answer: IdentifyAnswer, runs: list[MachineRun]) -> None:
         )
         if answer.reversal_values is not None and name in answer.reversal_values:
             output.say(f"   {reversal_words(answer.reversal_values[name])}")
+    alike: dict[str, list[str]] = {}
     for refusal in answer.added_refused:
-        output.say(f"no number: {', '.join(refusal.parameters)}: {refusal.why}")
+        alike.setdefault(refusal.why, []).extend(refusal.parameters)
+    for why, names in alike.items():
+        output.say(f"no number: {', '.join(names)}: {why}")
 
 
 def _taken_up(answer: IdentifyAnswer) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError
-from monitor.machine import Chain, gravity_in_joint_frames
+from monitor.machine import Chain, axis_frames, gravity_in_joint_frames
 from monitor.records import Array, Campaign, Probings
 from monitor.units import DEGREE
 
@@ -129,6 +129,11 @@ class Context:
     def gravity(self) -> Array:
         """Unit vectors (n, J, 3) of gravity in the frame of every axis."""
         return gravity_in_joint_frames(self.chain, self.positions)
+
+    @cached_property
+    def axis_frames(self) -> tuple[Array, Array]:
+        """Rotations (n, J, 3, 3) and origins (n, J, 3) mm of the frames of every axis, by the nominal chain."""
+        return axis_frames(self.chain, self.positions)
 
 
 def positions_of(chain: Chain, readings: Mapping[str, Array]) -> Array:

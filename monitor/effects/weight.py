@@ -18,7 +18,6 @@ from monitor.effects.driver import DescribedDriver
 from monitor.effects.joint_error import JointError
 from monitor.effects.shapes.compliance import example_of
 from monitor.exceptions import EffectError
-from monitor.machine import torques_in_joint_frames
 from monitor.records import Array
 from monitor.units import METRE, MILLIMETRE, Unit
 
@@ -27,6 +26,15 @@ def _carried(context: Context, joint: int) -> range:
     """Return the joint and those further out on its branch."""
     work = len(context.chain.work)
     return range(joint, work if joint < work else len(context.chain.joints))
+
+
+def _levered(context: Context, joint: int, error: JointError) -> Array:
+    """Torque (n, 3) about the axis of an error of a unit weight 1 mm off that axis along X, Y and Z of the bed's frame:
+    axis . (arm x down) = arm . (down x axis)."""
+    rotations, _ = context.axis_frames
+    axis = rotations[:, joint, :, error.term.component - 3]
+    levered: Array = np.cross(np.array(context.chain.gravity), axis)
+    return levered
 
 
 def _phrase(weight: str, error: JointError) -> str:
@@ -46,9 +54,10 @@ class Load(DescribedDriver):
 
     def columns(self, context: Context, joint: int | None) -> Array:
         assert joint is not None
-        flange = _carried(context, joint)[-1]
-        torques = torques_in_joint_frames(context.chain, context.positions, flange, np.zeros(3))
-        return torques[:, joint, self.error.term.component - 3, None]
+        _, origins = context.axis_frames
+        arm = origins[:, _carried(context, joint)[-1]] - origins[:, joint]
+        torque: Array = np.sum(_levered(context, joint, self.error) * arm, axis=1)
+        return torque[:, None]
 
     def unit(self) -> Unit:
         return METRE
@@ -86,11 +95,12 @@ class LinkWeights(DescribedDriver):
 
     def columns(self, context: Context, joint: int | None) -> Array:
         assert joint is not None
-        torques = []
-        for link, axis in self._moments(context, joint):
-            at_origin = torques_in_joint_frames(context.chain, context.positions, link, np.zeros(3))
-            off_origin = torques_in_joint_frames(context.chain, context.positions, link, np.eye(3)[axis])
-            torques.append((off_origin - at_origin)[:, joint, self.error.term.component - 3])
+        rotations, _ = context.axis_frames
+        levered = _levered(context, joint, self.error)
+        torques = [
+            np.sum(levered * rotations[:, link, :, axis], axis=1)
+            for link, axis in self._moments(context, joint)
+        ]
         return np.column_stack(torques)
 
     def unit(self) -> Unit:

@@ -2,7 +2,7 @@
 
 from monitor.machine.chain import ChainPose, Orientation, evaluate, orientation
 from monitor.machine.frames import MachineFrame, frame_of, machine_frame
-from monitor.machine.gravity import gravity_in_joint_frames, torques_in_joint_frames
+from monitor.machine.gravity import axis_frames, gravity_in_joint_frames
 from monitor.machine.inverse import refuse_untouchable, touching_positions, travel_slopes
 from monitor.machine.terms import COMPONENTS, LOCATION, MOTION, Term, parse_term
 from monitor.machine.topology import Chain, Joint, chain_of_axes, parse_topology
@@ -17,6 +17,7 @@ __all__ = [
     "MachineFrame",
     "Orientation",
     "Term",
+    "axis_frames",
     "chain_of_axes",
     "evaluate",
     "frame_of",
@@ -26,7 +27,6 @@ __all__ = [
     "parse_term",
     "parse_topology",
     "refuse_untouchable",
-    "torques_in_joint_frames",
     "touching_positions",
     "travel_slopes",
 ]

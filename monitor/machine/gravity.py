@@ -1,4 +1,4 @@
-"""Gravity as each axis feels it while the chain turns: its direction, and the torques of weights further out."""
+"""Gravity as each axis feels it while the chain turns: its direction, and the frames in which weights hang."""
 
 from __future__ import annotations
 
@@ -26,30 +26,20 @@ def gravity_in_joint_frames(chain: Chain, positions: Array) -> Array:
     return directions
 
 
-def torques_in_joint_frames(chain: Chain, positions: Array, carried: int, centre_of_mass: Array) -> Array:
-    """Torques (n, J, 3) mm about the origin of every axis, in its frame after its own motion, of a unit weight.
-
-    The weight hangs at ``centre_of_mass`` (3,) mm in the frame of joint ``carried``; joints that do not carry it feel
-    none. ``positions`` (n, J); the nominal chain is used, as for the direction.
-    """
-    down = np.array(chain.gravity)
-    torques = np.zeros((len(positions), len(chain.joints), 3))
-    on_tool = carried >= len(chain.work)
-    first = len(chain.work) if on_tool else 0
-    rotation = np.broadcast_to(np.eye(3), (len(positions), 3, 3))
-    origin = np.zeros((len(positions), 3))
-    frames = []
-    for at in range(first, carried + 1):
-        joint = chain.joints[at]
-        step = np.array(joint.offset)
-        if joint.turns:
-            origin = origin + rotation @ step
-            rotation = rotation @ rotation_about(joint.direction, positions[:, at])
-        else:
-            moved = step + positions[:, at, None] * np.array(joint.direction)
-            origin = origin + np.einsum("nij,nj->ni", rotation, moved)
-        frames.append((at, rotation, origin))
-    weight = origin + rotation @ centre_of_mass
-    for at, turned, centre in frames:
-        torques[:, at] = np.einsum("nji,nj->ni", turned, np.cross(weight - centre, down))
-    return torques
+def axis_frames(chain: Chain, positions: Array) -> tuple[Array, Array]:
+    """Rotations (n, J, 3, 3) into the bed's frame and origins (n, J, 3) mm of the frame of every axis after its own
+    motion, for positions (n, J). The nominal chain is used, as for the direction of gravity."""
+    count = len(positions)
+    rotations = np.empty((count, len(chain.joints), 3, 3))
+    origins = np.empty((count, len(chain.joints), 3))
+    for branch, first in ((chain.work, 0), (chain.tool, len(chain.work))):
+        rotation, origin = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
+        for index, joint in enumerate(branch, start=first):
+            step = np.broadcast_to(np.array(joint.offset, dtype=float), (count, 3))
+            if not joint.turns:
+                step = step + positions[:, index, None] * np.array(joint.direction)
+            origin = origin + np.einsum("nij,nj->ni", rotation, step)
+            if joint.turns:
+                rotation = rotation @ rotation_about(joint.direction, positions[:, index])
+            rotations[:, index], origins[:, index] = rotation, origin
+    return rotations, origins

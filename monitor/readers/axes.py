@@ -23,6 +23,14 @@ FARTHEST_MM = 100_000.0
 FARTHEST_DEG = 36_000.0
 
 
+#: Words for machines whose axes carry the tool side by side.
+PARALLEL = ("hexa", "delta", "tripod", "stewart", "parallel", "gough")
+PARALLEL_KINEMATICS = (
+    "the model of a machine is one serial chain, each axis carried by the one before it; hexapods, delta "
+    "robots and other parallel kinematics cannot be identified here"
+)
+
+
 @dataclass(frozen=True)
 class Axis:
     """One axis of the topology, with the unit that its readings have in a file."""
@@ -66,6 +74,8 @@ def axes_of(topology: str) -> tuple[tuple[Axis, ...], str | None]:
     parts: list[str] = []
     axes: list[Axis] = []
     for bracket, name, mark, wrong in TOKEN.findall(topology):
+        if wrong and any(word in topology.lower() for word in PARALLEL):
+            return (), PARALLEL_KINEMATICS
         if wrong:
             return (), f"{quoted(wrong)} has no meaning in a topology; {EXAMPLE}"
         parts.append(mark or (f"({name})" if bracket else name))

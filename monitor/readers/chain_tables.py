@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from monitor.readers.axes import FARTHEST_MM
+from monitor.readers.axes import FARTHEST_MM, PARALLEL_KINEMATICS
 from monitor.readers.faults import quoted
 from monitor.readers.toml_table import Table
 from monitor.records import Branch, ChainAxis, Kind, Vector
@@ -15,6 +15,8 @@ MOST_JOINTS = 9
 # A name stands inside ISO 230-1 symbols (EA0J2) and in columns (j2_deg): it begins with a letter, so that the
 # 0 of a location error before it stays readable.
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9]{0,15}")
+#: What people call the axes of parallel kinematics.
+STRUTS = ("strut", "leg", "parallel")
 KINDS: tuple[Kind, ...] = ("linear", "rotary", "spindle")
 LETTERS: dict[str, Vector] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 #: A vector typed with four decimals is a unit vector to a ten-thousandth; further off it is something else.
@@ -76,7 +78,9 @@ def _kind(table: Table) -> Kind | None:
     for kind in KINDS:
         if value == kind:
             return kind
-    if value is not None:
+    if value in STRUTS:
+        table.fault("kind", f"{quoted(value)} is no kind of axis: {PARALLEL_KINEMATICS}")
+    elif value is not None:
         table.fault("kind", f"{quoted(value)} is no kind of axis; write linear, rotary or spindle")
     return None
 

@@ -57,7 +57,7 @@ class MethodRules:
     """The rules of one method.
 
     ``needs_...`` and ``targets_are_balls`` say what the artefact must hold (setups stand in the place of probe and
-    targets), ``targets_are_reflectors`` that targets
+    targets) and whether every run must have the ambient temperature, ``targets_are_reflectors`` that targets
     are the listed reflectors where any is listed; ``suffixes`` are the units that a recorded column may end in,
     ``plain_columns`` columns that are allowed besides, ``measured_columns`` those that must be there with a number in
     every row; ``check`` judges the plan; ``declared`` says where the targets stand by their declaration.
@@ -68,6 +68,7 @@ class MethodRules:
     needs_self_calibration: bool = False
     needs_l_shape: bool = False
     needs_setups: bool = False
+    needs_ambient: bool = True
     targets_are_balls: bool = False
     targets_are_reflectors: bool = False
     suffixes: tuple[str, ...] = tuple(COLUMN_UNITS)

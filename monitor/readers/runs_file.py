@@ -36,9 +36,9 @@ class RunsPart:
 
 def read_runs(table: CsvTable, faults: Faults, *, ambient: bool = True) -> RunsPart | None:
     """Read the runs; None where the column of their numbers is missing. ``ambient`` is whether each must have the
-    ambient temperature."""
+    ambient temperature; else the column may be empty or missing."""
     required = (*PLAN, AMBIENT)
-    refuse_missing(table, required, faults)
+    refuse_missing(table, required if ambient else PLAN, faults)
     conditions = _conditions(table, recorded_columns(table, required, faults), faults, ambient=ambient)
     day = wholes(table, "day", faults) if "day" in table.columns else None
     warm_up = _truths(table, faults) if "warm_up" in table.columns else None

@@ -118,6 +118,7 @@ def test_a_machine_of_letters_is_stored_as_ever(robot):
         ('name = "rail"', f'name = "{"r" * 17}"', 8, "machine.work_chain[1].name", "cannot name an axis"),
         ('name = "rail"', 'name = "j2"', 18, "machine.tool_chain[2].name", "axis J2 appears twice (small and capital letters are the same in columns)"),
         ('kind = "linear"', 'kind = "prismatic"', 9, "machine.work_chain[1].kind", "'prismatic' is no kind of axis; write linear, rotary or spindle"),
+        ('kind = "linear"', 'kind = "strut"', 9, "machine.work_chain[1].kind", "hexapods, delta robots and other parallel kinematics cannot be identified here"),
         ('kind = "linear"\n', "", 7, "machine.work_chain[1].kind", 'this key is missing; write for example kind = "rotary"'),
         ('along = "Y"', 'about = "Y"', 10, "machine.work_chain[1].about", "a linear axis travels along a direction: write along = ... instead of about"),
         ('about = "Z"', 'along = "Z"', 14, "machine.tool_chain[1].along", "a rotary axis turns about a direction: write about = ... instead of along"),

@@ -24,6 +24,7 @@ ONE_FAULT = [
     ('id = "M1"', 'id = "M1"\nvertical = "Y"', 7, "machine.vertical", "this key is not known"),
     # a topology that cannot be parsed
     (TOPOLOGY, '"w C B X Z Y (C1) t"', 7, "machine.topology", "cannot be parsed: name w (workpiece), b (bed) and t (tool) once each"),
+    (TOPOLOGY, '"hexapod"', 7, "machine.topology", "one serial chain, each axis carried by the one before it; hexapods, delta robots"),
     (TOPOLOGY, '"C w B X b Z Y (C1) t"', 7, "machine.topology", "must begin with w and end with t"),
     (TOPOLOGY, '"w C B X b Z Y (C) t"', 7, "machine.topology", "axis C appears twice; name each axis once"),
     (TOPOLOGY, '"w C B Q b Z Y (C1) t"', 7, "machine.topology", "an axis cannot be called Q"),

@@ -77,6 +77,16 @@ def test_any_target_is_taken_where_no_reflector_is_listed(arm):
 
 
 @pytest.mark.parametrize(
+    "runs", [RUNS.replace(",20\n", ",\n"), RUNS.replace(",ambient_degC", "").replace(",20\n", "\n")]
+)
+def test_nothing_depends_on_the_ambient_temperature(arm, tmp_path, runs):
+    (arm / "runs.csv").write_text(runs)
+    campaign = read_campaign(arm)
+    assert campaign.runs[0].conditions == {}
+    assert read_campaign(write_campaign(campaign, tmp_path / "again")).runs == campaign.runs
+
+
+@pytest.mark.parametrize(
     ("file", "old", "new", "line", "column", "words"),
     [
         ("probings.csv", "tracker_z_mm", "laser_z_mm", 1, "tracker_z_mm", "missing"),

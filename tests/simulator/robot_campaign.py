@@ -41,6 +41,7 @@ class Hidden:
 
     ``compliance``: rad per metre of lever of a load at the flange. ``harmonic``: (order, amplitude, phase).
     ``lag``: part of the last move that is missing. ``reversal``: half the jump when the joint turns back.
+    ``hanging``: shift in mm along X of a joint's own frame as gravity turns from across X to along it.
     ``drift_mm`` and ``drift_rad`` (3,): how the tracker's frame moves over the run, in its own axes.
     """
 
@@ -48,6 +49,7 @@ class Hidden:
     harmonic: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     lag: Mapping[str, float] = field(default_factory=dict)
     reversal: Mapping[str, float] = field(default_factory=dict)
+    hanging: Mapping[str, float] = field(default_factory=dict)
     drift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     drift_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -108,7 +110,8 @@ def track(
     readings = {str(joint["name"]): np.deg2rad(degrees[:, place]) for place, joint in enumerate(JOINTS)}
     arms = lever_arms(readings)
     motion = {}
-    for joint in JOINTS:
+    nominal = frames(JOINTS, readings) if hidden.hanging else []
+    for place, joint in enumerate(JOINTS):
         name = str(joint["name"])
         q = float(joint["sign"]) * readings[name]
         turn = rng.normal(0.0, 1e-6 * repeatability_urad, poses) if repeatability_urad else np.zeros(poses)
@@ -122,6 +125,9 @@ def track(
         signs[0] = np.sign(q[0])
         turn += hidden.reversal.get(name, 0.0) * signs
         motion[name] = np.concatenate([np.zeros((poses, 3)), turn[:, None] * np.array(joint["axis"])], axis=1)
+        if name in hidden.hanging:
+            # The third row of a rotation is the bed's Z in the frame: gravity is its negative.
+            motion[name][:, 0] -= hidden.hanging[name] * nominal[place][:, 2, 0]
     tool = frames(JOINTS, readings, location, motion)[-1]
     stand = Rotation.random(random_state=rng)
     away = rng.uniform(-1.0, 1.0, 3)

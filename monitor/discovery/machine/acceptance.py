@@ -35,6 +35,9 @@ from monitor.records import Array
 
 # Readings of one block of a run: some minutes, beyond what neighbours share once their correlation is taken out.
 BLOCK = 15
+# Two effects that all but cancel are each hundreds of times as large as the error that they take away; the effects of
+# the trial of power are at most 32 times as large.
+LARGEST_RATIO = 100.0
 # So many effects within the shape of another are named at most.
 MOST_NAMED = 5
 
@@ -150,9 +153,14 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         )
 
     def _is_plausible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
-        """Whether an effect beside others is no larger than a machine could have."""
+        """Whether an effect beside others is no larger than a machine could have, and not many times as large as what
+        it takes of the residual: such a one is nearly cancelled by others."""
         size = candidate.columns.shape[1]
         fitted = amplitudes(self.scene, [*others, candidate])
+        peak = float(np.linalg.norm(candidate.raw @ fitted.estimate[-size:], axis=1).max())
+        taken = self.scene.fit.sigma * float(np.sqrt(self._explained(others, candidate)))
+        if peak > LARGEST_RATIO * taken / float(np.sqrt(self.scene.fit.readings)):
+            return False
         sizes, spread = fitted.estimate[-size:], np.sqrt(np.diag(fitted.covariance)[-size:])
         sure = np.maximum(np.abs(sizes) - STANDS_OUT * spread, 0.0)
         return float(np.linalg.norm(sure)) <= BEYOND * candidate.largest

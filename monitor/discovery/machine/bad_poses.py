@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-import scipy
+from scipy import special
 
 from monitor.discovery.machine.anomalies import BadPoint
 from monitor.discovery.machine.fit import Fit
@@ -26,14 +26,14 @@ LEAST_TIMES = 6.0
 
 def _chi_squares(squares: Array, numbers: int) -> Array:
     """Squares (m,) of vectors of so many numbers, scaled so that most of them are as chi-square says."""
-    median = np.median(squares) / scipy.stats.chi2.median(numbers)
-    upper = np.quantile(squares, UPPER) / scipy.stats.chi2.ppf(UPPER, numbers)
+    median = np.median(squares) / special.chdtri(numbers, 0.5)
+    upper = np.quantile(squares, UPPER) / special.chdtri(numbers, 1.0 - UPPER)
     return np.asarray(squares / max(median, upper, 1e-300))
 
 
 def _outstanding(chi_square: Array, numbers: int, alpha: float) -> npt.NDArray[np.int64]:
     """Indices of those that noise makes with a probability below ``alpha`` in all, the worst first."""
-    p_values = scipy.special.chdtrc(numbers, chi_square) * len(chi_square)
+    p_values = special.chdtrc(numbers, chi_square) * len(chi_square)
     worst = np.argsort(-chi_square)
     marked = (p_values[worst] <= alpha) & (chi_square[worst] > LEAST_TIMES**2)
     return np.asarray(worst[marked])
@@ -70,7 +70,7 @@ def bad_poses(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
 def _point(fit: Fit, rows: list[int], white: Array, chi_square: float, numbers: int, tests: int) -> BadPoint:
     context, first = fit.problem.context, rows[0]
     targets = ", ".join(dict.fromkeys(str(context.target[row]) for row in rows))
-    p_value = float(scipy.special.chdtrc(numbers, chi_square)) * tests
+    p_value = float(special.chdtrc(numbers, chi_square)) * tests
     return BadPoint(
         row=first,
         run=int(context.run[first]),

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.plan_cells import plan_cells
+from monitor.discovery.machine.plan_cells import plan_cells, readings_a_visit, revisited_cells
 from monitor.discovery.search.comparison import (
     Comparison,
     LackOfFit,
@@ -48,9 +48,16 @@ class ChainComparison(Comparison):
 
 
 def pure_error(fit: Fit) -> tuple[float, float, float]:
-    """Sum of squares and degrees of freedom of the whitened residual over the runs, and the lack-of-fit sum."""
+    """Sum of squares and degrees of freedom of the whitened residual over the runs, and the lack-of-fit sum.
+
+    In a single run the readings of poses to which it came back are compared: the fit is the same at each, so that no
+    degree of freedom of theirs is lost.
+    """
     weighted = ~fit.left_out
     white = fit.vectors[weighted] / fit.problem.sigma[weighted]
+    if len(fit.problem.runs) == 1:
+        error, lack, repeated = split(white, revisited_cells(fit.problem)[weighted])
+        return error, float(repeated * white.shape[1]), lack
     error, lack, repeated = split(white, plan_cells(fit.problem)[weighted])
     # The runs' own unknowns take their part of the scatter in proportion to the rows.
     return error, repeated / len(white) * fit.degrees_of_freedom, lack
@@ -59,7 +66,8 @@ def pure_error(fit: Fit) -> tuple[float, float, float]:
 def lack_of_fit(fit: Fit) -> tuple[LackOfFit | None, float | None]:
     """The test of lack of fit and the repeatability in mm; None where no probing was repeated."""
     error, freedom, lack = pure_error(fit)
-    test = lack_of_fit_test(lack, fit.degrees_of_freedom - freedom, error, freedom)
+    together = readings_a_visit(fit.problem) if len(fit.problem.runs) == 1 else 1.0
+    test = lack_of_fit_test(lack, fit.degrees_of_freedom - freedom, error, freedom, together)
     return test, None if test is None else fit.sigma * float(np.sqrt(error / freedom))
 
 

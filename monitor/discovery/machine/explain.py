@@ -24,6 +24,7 @@ from monitor.discovery.machine.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
 from monitor.discovery.machine.poses import poses_of_rows
 from monitor.discovery.machine.refine import Refined, refine_all
+from monitor.discovery.machine.robot_search import MOST_EFFECTS as MOST_BESIDE_CURVES
 from monitor.discovery.machine.robot_search import search_beside_curves
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
@@ -92,12 +93,13 @@ class _Search:
     under: Fit
     unfitted: tuple[str, ...] = ()
     settled: bool = True
+    most_effects: int = MOST_EFFECTS
 
     @property
     def limits(self) -> tuple[Limit, ...]:
         """The ends that the search came to."""
         reached = {
-            Limit.EFFECTS: len(self.refined) >= MOST_EFFECTS,
+            Limit.EFFECTS: len(self.refined) >= self.most_effects,
             Limit.BAD_POINTS: len(self.suspects.bad) >= MOST_BAD_POINTS,
             Limit.ROUNDS: not self.settled,
         }
@@ -238,6 +240,7 @@ def _search(
     """Search effects and suspects in turn, each under the others and the ``gross`` readings that ``first`` leaves out,
     until nothing changes; beside the curves of joints it leaves out the suspects so far."""
     initial = suspects = gross if beside_curves is None else beside_curves
+    most = MOST_EFFECTS if beside_curves is None else MOST_BESIDE_CURVES
     noise = _Noise()
     earlier: list[Suspects] = []
     unfitted: list[str] = []
@@ -259,7 +262,9 @@ def _search(
         # What all runs share and what the effects explain is no noise of neighbours.
         search = noise.settled(
             _correlation(under),
-            _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted))),
+            _Search(
+                scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted)), most_effects=most
+            ),
         )
         if search is None:
             continue

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from monitor.discovery.machine.acceptance import LARGEST_RATIO
 from monitor.discovery.machine.curve_findings import is_curve
 from monitor.discovery.machine.curves import Curve, curve_of
 from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows, widening
@@ -23,15 +24,15 @@ from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.missing import Missing, Rival
 from monitor.discovery.search.rivals import least_likelihood
 from monitor.discovery.search.scan import Finding, except_for, reduced
+from monitor.effects import ChainEffect
 from monitor.effects.drivers import EachRun
+from monitor.effects.weight import LinkWeights
 from monitor.effects.words import describe
 from monitor.records import Array
+from monitor.units import Unit
 
 # An effect of less than twice its standard uncertainty is no answer.
 SMALLEST_RATIO = 2.0
-# Two effects that all but cancel are each hundreds of times as large as the error that they take away; the effects of
-# the trial of power are at most 32 times as large.
-LARGEST_RATIO = 300.0
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,9 @@ class ChainMissing(Missing):
     poses that would separate the rivals; ``varies`` says that the effect has another size in every run. Where the
     catalogue does not have its shape, ``nearest`` is the entry that comes closest, and ``curve`` the shape.
     ``travelled_periods`` of a harmonic are less than one where the axis did not turn through its period (else None);
-    ``within_its_shape`` are effects that stand out beside it, but not beside its error in any shape.
+    ``unit`` is that of ``amplitude`` where it is not that of the coefficients: the weights of many links are one angle,
+    the largest of the run. ``within_its_shape`` are effects that stand out beside it, but not beside its error in any
+    shape.
     """
 
     held_out_days_before: float | None
@@ -56,6 +59,7 @@ class ChainMissing(Missing):
     curve: Curve | None = None
     travelled_periods: float | None = None
     within_its_shape: tuple[str, ...] = ()
+    unit: Unit | None = None
 
 
 @dataclass(frozen=True)
@@ -174,6 +178,14 @@ def _amplitude(effect: MachineEffect, coefficients: Array, covariance: Array) ->
     return spread, u_of_variance / (2.0 * max(spread, float(np.sqrt(noise))))
 
 
+def largest_deviation(columns: Array, coefficients: Array, covariance: Array) -> tuple[float, float]:
+    """The largest deviation from its mean of an error with columns (n, k), and its standard uncertainty; in absolute
+    value, for the coefficients of several weights have no sign in common."""
+    apart = columns - columns.mean(axis=0)
+    row = apart[int(np.abs(apart @ coefficients).argmax())]
+    return abs(float(row @ coefficients)), float(np.sqrt(max(row @ covariance @ row, 0.0)))
+
+
 def _name(candidate: ChainCandidate) -> str:
     """The effect as written; searched pitches, orders and nodes are part of it, a searched time constant is not."""
     searched = candidate.family.endswith((":cyclic", ":harmonic", ":table", ":free", ":curve"))
@@ -192,6 +204,12 @@ def _missing(
     coefficients, covariance = sizes
     candidate, effect = refined.candidate, refined.candidate.effect
     amplitude, u = _amplitude(effect, coefficients, covariance)
+    unit = None
+    if isinstance(effect, ChainEffect) and isinstance(effect.driver, LinkWeights):
+        unit = effect.term.unit
+        amplitude, u = largest_deviation(
+            effect.basis(scene.fit.problem.context).columns, coefficients, covariance
+        )
     p_value, q_value = _p_and_q(selection, finding, candidate)
     shown = selection.shown
     visible = selection.candidates if shown is scene else shown.candidates
@@ -228,6 +246,7 @@ def _missing(
         ),
         varies=isinstance(effect.driver, EachRun),
         travelled_periods=part_of_period(effect, scene.fit.problem.context),
+        unit=unit,
         nearest=candidate.variant.nearest,
         curve=None
         if candidate.variant.nearest is None and not is_curve(candidate)

@@ -16,7 +16,7 @@ from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.missing import Searched
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
-from monitor.effects import ChainEffect, with_time_constant
+from monitor.effects import ChainEffect, Context, with_time_constant
 from monitor.effects.catalogue import SCREW_LEADS_MM
 from monitor.effects.drivers import WarmUp
 from monitor.effects.shapes import Cyclic, Harmonic
@@ -156,7 +156,7 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     if searched.unit == "min" and 60.0 * value < SETTLED_READINGS * _between_readings(scene):
         # It has settled before the second reading: the plain effect.
         return Refined(at_rest(scene, candidate), None, np.zeros((len(scene.residual), 0)))
-    if searched.unit == "min" and _counts_readings(scene):
+    if searched.unit == "min" and counts_readings(scene.fit.problem.context):
         return Refined(refined, None, slope)
     return Refined(refined, Searched(searched.name, value, u if u < value else None, searched.unit), slope)
 
@@ -213,11 +213,18 @@ def _between_readings(scene: ChainScene) -> float:
     return float(np.median(steps)) if len(steps) else 0.0
 
 
-def _counts_readings(scene: ChainScene) -> bool:
-    """Whether the column of times is no time but the number of the row: no constant in minutes comes from it."""
-    context = scene.fit.problem.context
-    steps = np.diff(context.time)[np.diff(context.run) == 0]
-    return bool(len(steps) and np.all(steps == 1.0))
+def counts_readings(context: Context) -> bool:
+    """Whether the column of times is no time but a number: no constant in minutes comes from it.
+
+    It is one where it goes with the sequence number, or where it grows by nothing or by exactly 1 s from row to row:
+    the number of the row, or of the pose that several rows share.
+    """
+    together = np.diff(context.run) == 0
+    steps = np.diff(context.time)[together]
+    if not steps.any():
+        return True
+    numbered = np.array_equal(steps, np.diff(context.sequence)[together])
+    return bool(numbered or np.all((steps == 0.0) | (steps == 1.0)))
 
 
 def _uncertainty(scene: ChainScene, candidate: ChainCandidate, slope: Array, others: Array) -> float:

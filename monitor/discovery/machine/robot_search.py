@@ -15,6 +15,7 @@ import numpy as np
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.held_out import poses_of
 from monitor.discovery.machine.joint_curves import Pursuit, protecting
+from monitor.discovery.machine.refine import refine
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.search.evidence import weigh_beside
@@ -51,6 +52,8 @@ def search_beside_curves(
         # What the new effect contains has nothing of its own.
         selected = [other for other in selected if not _contains(best, other)]
         selected.append(best)
+        # At a time constant of the grid a warm-up leaves a bend, which the next step would take for an effect.
+        selected[-1] = refine(scene, selected, len(selected) - 1).candidate
         selected = _standing(fit, selected, rate / len(pool))
     evidence = [
         weigh_beside(scene, [candidate], except_for(selected, index))[0]

@@ -81,13 +81,23 @@ def split(residual: Array, cells: npt.NDArray[np.int64]) -> tuple[float, float, 
 
 
 def lack_of_fit_test(
-    lack: float, degrees_of_freedom: float, pure_error: float, pure_error_degrees_of_freedom: float
+    lack: float,
+    degrees_of_freedom: float,
+    pure_error: float,
+    pure_error_degrees_of_freedom: float,
+    together: float = 1.0,
 ) -> LackOfFit | None:
-    """Test the sum of squares of lack of fit against that of pure error; None where either has no freedom."""
+    """Test the sum of squares of lack of fit against that of pure error; None where either has no freedom.
+
+    Where so many readings were taken ``together`` they share what the machine did there, and the p-value counts them
+    as one.
+    """
     if degrees_of_freedom < 1 or pure_error_degrees_of_freedom < 1 or pure_error <= 0.0:
         return None
     f = (lack / degrees_of_freedom) / (pure_error / pure_error_degrees_of_freedom)
-    p_value = float(scipy.special.fdtrc(degrees_of_freedom, pure_error_degrees_of_freedom, f))
+    p_value = float(
+        scipy.special.fdtrc(degrees_of_freedom / together, pure_error_degrees_of_freedom / together, f)
+    )
     return LackOfFit(float(f), p_value, float(degrees_of_freedom), float(pure_error_degrees_of_freedom))
 
 

@@ -21,6 +21,7 @@ from monitor.effects.catalogue import of_tracker
 from monitor.exceptions import DataError
 from monitor.machine import ChainPose, evaluate
 from monitor.machine.chain import rotation_about
+from monitor.methods.chain.first_frame import all_axes_meet, best_frame
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
@@ -190,11 +191,14 @@ def _frame(
     rotation: Array, origin: Array, points: Array, at: npt.NDArray[np.int64]
 ) -> tuple[Array, Array, Array]:
     """Rotation (3, 3) and shift (3,) of the tracker's frame and places (K, 3) such that
-    rotation_i place + origin_i = turn point_i + shift, as well as may be."""
+    rotation_i place + origin_i = turn point_i + shift, as well as may be. Where all axes meet in a point or there is
+    only one, these equations have no right-hand side, and the guess is improved in turn."""
     count, kinds = len(points), int(at.max()) + 1
     middle = points.mean(axis=0)
     arm = points - middle
     size = max(float(np.sqrt(np.mean(arm**2))), 1.0)
+    if all_axes_meet(origin, size):
+        return best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False)
     columns = np.zeros((count, 3, 9 + 3 + 3 * kinds))
     for row in range(3):
         columns[:, row, 3 * row : 3 * row + 3] = -arm / size
@@ -206,6 +210,10 @@ def _frame(
     u, stretch, vt = np.linalg.svd(free[:9].reshape(3, 3) / size)
     times = float(np.prod(stretch) ** (1.0 / 3.0))
     if rank == flat.shape[1] and not 1.0 / OTHER_UNIT < times < OTHER_UNIT:
+        # Axes that nearly meet hardly fix the size: what fits at the size as measured is in the right unit.
+        guess = best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False)
+        if _left(guess, rotation, origin, points, at) <= CONTRADICTS * size:
+            return guess
         raise DataError(
             f"the measured points would have to be {times:.3g} times as large to come from this chain: check the units "
             "of the tracker's columns (mm) and of offset_mm"
@@ -213,4 +221,22 @@ def _frame(
     turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
     remainder = (origin - arm @ turn.T).reshape(-1)
     rest = np.linalg.lstsq(flat[:, 9:], -remainder, rcond=1e-8)[0]
-    return turn, rest[:3] - turn @ middle, rest[3:].reshape(kinds, 3)
+    linear = (turn, rest[:3] - turn @ middle, rest[3:].reshape(kinds, 3))
+    if _left(linear, rotation, origin, points, at) <= CONTRADICTS * size:
+        return linear
+    # Axes that nearly meet, or a geometry that is far off: which guess is better shows in what it leaves.
+    guesses = (linear, best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False))
+    return min(guesses, key=lambda guess: _left(guess, rotation, origin, points, at))
+
+
+def _left(
+    guess: tuple[Array, Array, Array],
+    rotation: Array,
+    origin: Array,
+    points: Array,
+    at: npt.NDArray[np.int64],
+) -> float:
+    """Root mean square in mm of what a guess leaves of points (n, 3)."""
+    turn, shift, places = guess
+    apart = np.einsum("nij,nj->ni", rotation, places[at]) + origin - points @ turn.T - shift
+    return float(np.sqrt(np.mean(apart**2)))

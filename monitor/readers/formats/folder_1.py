@@ -62,7 +62,7 @@ def read(folder: Path) -> Campaign:
     files = tuple({source.name: source for source in sources.values()}.values())
     head = _head(texts.get(TOML), faults)
     runs_table = _table(runs_file.FILE, texts, faults)
-    ambient = head.rules is None or not head.rules.needs_setups
+    ambient = head.rules is None or (head.rules.needs_ambient and not head.rules.needs_setups)
     runs = None if runs_table is None else runs_file.read_runs(runs_table, faults, ambient=ambient)
     table = _table(probings_file.FILE, texts, faults)
     part = None

@@ -59,6 +59,7 @@ def _lost_beam(plan: Plan) -> Iterable[Fault]:
 RULES = MethodRules(
     "tracker",
     targets_are_reflectors=True,
+    needs_ambient=False,
     suffixes=CHANNELS_ONLY,
     measured_columns=COLUMNS,
     check=check,

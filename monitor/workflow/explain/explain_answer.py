@@ -203,6 +203,22 @@ class LikelyMistake:
     rms_undone_um: float
 
 
+@dataclass(frozen=True)
+class Remaining:
+    """What the model with all that was found leaves.
+
+    ``deviation_um`` is the root mean square per degree of freedom, to be compared with ``stated_uncertainty_um``;
+    ``carried_rms_um`` is the RMS of the targets that the machine moves and ``resting_rms_um`` that of those beside it,
+    both None where all are of one kind.
+    """
+
+    deviation_um: float
+    stated_uncertainty_um: float
+    rms_um: float
+    carried_rms_um: float | None
+    resting_rms_um: float | None
+
+
 @dataclass(frozen=True, kw_only=True)
 class MachineExplanation:
     """The explanation of a machine; ``answer`` is the finding in a few sentences.
@@ -210,7 +226,8 @@ class MachineExplanation:
     ``blind_spots`` are effects that leave nothing to see, ``not_recorded`` those that lack a column, and why;
     ``held_out`` are the parts left out in turn for the held-out errors. ``limits_reached`` says where the search ended
     at a limit and more may be there: ``effects``, ``bad_points``, ``rounds``. ``not_fitted`` are effects that stood out
-    but could not be fitted, and were skipped. The residual is pictured where something is missing.
+    but could not be fitted, and were skipped. ``remaining`` is what is left with all that is missing in the model, None
+    where nothing is. The residual is pictured where something is missing.
     """
 
     comparison: MachineComparison = field(metadata=INLINED)
@@ -228,6 +245,7 @@ class MachineExplanation:
     residual_against: ResidualAgainst | None
     not_fitted: tuple[str, ...] = ()
     limits_reached: tuple[str, ...] = ()
+    remaining: Remaining | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

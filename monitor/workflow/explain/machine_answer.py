@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 
 from monitor.discovery import ChainComparison, ChainMissing, Explanation
+from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.steps import Step
 from monitor.records import Verdict
 from monitor.units import DEGREE, MICROMETRE, Unit
@@ -21,6 +23,7 @@ from monitor.workflow.explain.explain_answer import (
     MachineExplanation,
     MachineMissing,
     MovedTarget,
+    Remaining,
 )
 from monitor.workflow.explain.machine_sentences import ONE_RUN, machine_sentences
 from monitor.workflow.explain.residuals_against import pictures_of
@@ -78,7 +81,7 @@ def _curve(effect: ChainMissing, unit: Unit) -> tuple[CurvePoint, ...]:
 
 
 def _machine_missing(effect: ChainMissing) -> MachineMissing:
-    unit, um = effect.units[0], MICROMETRE.to_display
+    unit, um = effect.unit or effect.units[0], MICROMETRE.to_display
     return MachineMissing(
         rank=effect.rank,
         effect=effect.effect,
@@ -108,7 +111,7 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         varies_from_run_to_run=effect.varies,
         shape_unknown=effect.nearest is not None,
         nearest_shape=effect.nearest,
-        curve=_curve(effect, unit),
+        curve=_curve(effect, effect.units[0]),
         searched=searched_value(effect),
         travelled_periods=effect.travelled_periods,
         within_its_shape=effect.within_its_shape,
@@ -144,6 +147,24 @@ def _changes(explanation: Explanation) -> tuple[MovedTarget | ChangedTarget | Ch
     return (*moved, *(_step(step, units) for step in explanation.steps))
 
 
+def _remaining(final: Fit) -> Remaining:
+    """What the model with all findings leaves."""
+    um = MICROMETRE.to_display
+    resting = np.isin(final.problem.context.target, list(final.problem.resting))[:, None]
+
+    def rms(rows: npt.NDArray[np.bool_]) -> float | None:
+        inside = rows & final.has_weight
+        return um(float(np.sqrt(np.mean(final.vectors[inside] ** 2)))) if inside.any() else None
+
+    return Remaining(
+        deviation_um=um(final.sigma * final.scale),
+        stated_uncertainty_um=um(final.sigma),
+        rms_um=um(final.rms),
+        carried_rms_um=rms(~resting) if resting.any() else None,
+        resting_rms_um=rms(resting),
+    )
+
+
 def machine_explanation(explanation: Explanation) -> MachineExplanation:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
@@ -177,4 +198,5 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
         residual_against=residual_against,
         not_fitted=explanation.unfitted,
         limits_reached=tuple(explanation.limits),
+        remaining=_remaining(explanation.final) if missing else None,
     )

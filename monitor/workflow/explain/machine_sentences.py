@@ -9,7 +9,6 @@ import numpy as np
 from monitor.discovery import Explanation, Mistake
 from monitor.discovery.machine.explain import Limit
 from monitor.discovery.machine.suspects import MOST_BAD_POINTS
-from monitor.discovery.search.scan import MOST_EFFECTS
 from monitor.records import Verdict
 from monitor.units import MICROMETRE
 from monitor.workflow.explain.explain_answer import (
@@ -29,7 +28,8 @@ GROSS = (
 # What is said where the search ended at a limit.
 LIMITS = {
     Limit.EFFECTS: (
-        f"The search ended at {MOST_EFFECTS} effects: more may be missing; add these to the model and look again."
+        "The search ended at the most effects that it looks for: more may be missing; add these to the model and "
+        "look again."
     ),
     Limit.BAD_POINTS: f"The search for bad points ended at {MOST_BAD_POINTS}: there may be more.",
     Limit.ROUNDS: (

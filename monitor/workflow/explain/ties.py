@@ -10,7 +10,7 @@ from monitor.discovery import ChainMissing
 from monitor.documents import OMITTED
 
 #: Drivers that follow from where the axes stand.
-OF_POSES = ("", "gravity")
+OF_POSES = ("", "gravity", "link_weights")
 
 
 class TieBreak(Enum):

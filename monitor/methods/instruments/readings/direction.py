@@ -15,7 +15,7 @@ import numpy as np
 
 from monitor.machine import orientation
 from monitor.machine.chain import rotation_about
-from monitor.methods.instruments.frames import nearest_rotation
+from monitor.methods.chain.first_frame import nearest_rotation
 from monitor.methods.instruments.reading import LEVER, TURN, Plain, Rows, Shown, Stance, cross_matrix
 from monitor.records import Array, Setup
 
