@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import duckdb
 import pytest
 
 from monitor.exceptions import BusyError, DataError, StoreError
@@ -113,6 +114,22 @@ def _is_open(path: Path) -> bool:
     if not links.is_dir():
         return False
     return any(os.path.realpath(link) == str(path.resolve()) for link in links.iterdir())
+
+
+def test_a_file_that_another_part_of_the_process_is_closing_is_waited_for_and_not_called_damaged(
+    path: Path,
+) -> None:
+    Database(path).close()
+    other = duckdb.connect()
+    literal = str(path).replace("'", "''")
+    other.execute(f"ATTACH '{literal}' AS other (READ_ONLY)")
+    with pytest.raises(StoreError, match="is open in this process already"):
+        Database(path)
+    reports: list[Holder] = []
+    patience = Patience(60, lambda who, seconds: (reports.append(who), other.close()))
+    with SharedDatabase(path, patience=patience) as db:
+        save(db)
+    assert [who.pid for who in reports] == [os.getpid()]
 
 
 def test_a_campaign_that_was_exchanged_meanwhile_takes_no_result_of_the_one_before(
