@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: challenge concurrency kills pages real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
+.PHONY: challenge concurrency kills pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -25,6 +25,9 @@ demo: setup  ## the main job on the example campaigns; leaves its results in dem
 
 test: setup  ## the tests
 	@$(IN_MEMORY) $(PYTEST) $(PARALLEL) $(ARGS)
+
+slow: setup  ## the tests that make test leaves out or does less of: long ones that rarely fail
+	@$(IN_MEMORY) $(PYTEST) $(PARALLEL) --slow $(ARGS)
 
 check: setup  ## format, lint, types
 	@$(RUN) -m ruff format --check .

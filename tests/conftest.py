@@ -39,6 +39,11 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
         action="store_true",
         help="run only the tests of rates, over all their seeds (make trials)",
     )
+    parser.addoption(
+        "--slow",
+        action="store_true",
+        help="run only what is slow, and what can be tested more thoroughly (make slow)",
+    )
     pluginmanager.register(
         sys.modules["by_path"].load("processor_time", Path(__file__).with_name("processor_time.py"))
     )
@@ -50,16 +55,26 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what only ``make trials`` runs, or everything else."""
+    """Leave out what only ``make trials`` or ``make slow`` runs, or everything else."""
 
     def is_run(item: pytest.Item) -> bool:
-        if item.get_closest_marker("all_seeds") is not None:
-            return all_seeds
-        return not all_seeds or "seeds" in getattr(item, "fixturenames", ())
+        fixtures = getattr(item, "fixturenames", ())
+        of_trials = item.get_closest_marker("all_seeds") is not None
+        if config.getoption("--all-seeds"):
+            return of_trials or "seeds" in fixtures
+        is_slow = item.get_closest_marker("slow") is not None
+        if config.getoption("--slow"):
+            return not of_trials and (is_slow or "thorough" in fixtures)
+        return not of_trials and not is_slow
 
-    all_seeds = config.getoption("--all-seeds")
     config.hook.pytest_deselected(items=[item for item in items if not is_run(item)])
     items[:] = filter(is_run, items)
+
+
+@pytest.fixture(scope="session")
+def thorough(pytestconfig: pytest.Config) -> bool:
+    """Whether a test shall do all of its rounds, as in ``make slow``; in ``make test`` the first of them do."""
+    return bool(pytestconfig.getoption("--slow") or pytestconfig.getoption("--all-seeds"))
 
 
 @pytest.fixture(scope="session")
