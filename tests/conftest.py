@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import os
+import pickle
 import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -136,6 +139,36 @@ def pdf_unread() -> Callable[[], AbstractContextManager[None]]:
             yield
 
     return unread
+
+
+@pytest.fixture(scope="session")
+def laid_out_once() -> Iterator[Callable[..., bytes]]:
+    """A page that was laid out in this session, with the same files inside, is not laid out again.
+
+    So tests of what is made again ask whether the page is the same. That its layout has the same bytes each time is
+    asked with ``laid_out_anew``, and in tests/reporting. Yields what lays out.
+    """
+    laid_out: dict[str, bytes] = {}
+    lay_out: Callable[..., bytes] = importlib.import_module("monitor.reporting.pdf.render").pdf_of
+
+    def page(html: str, **options: Any) -> bytes:
+        fonts = [font.read_bytes() for font in options.get("extra_fonts", ()) if font.is_file()]
+        key = hashlib.sha256(pickle.dumps((html, fonts, sorted(options.items())))).hexdigest()
+        if key not in laid_out:
+            laid_out[key] = lay_out(html, **options)
+        return laid_out[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        for room in ("pdf", "health"):
+            patch.setattr(f"monitor.reporting.{room}.render.pdf_of", page)
+        yield lay_out
+
+
+@pytest.fixture
+def laid_out_anew(laid_out_once: Callable[..., bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of the bytes of a PDF: every page is laid out."""
+    for room in ("pdf", "health"):
+        monkeypatch.setattr(f"monitor.reporting.{room}.render.pdf_of", laid_out_once)
 
 
 @pytest.fixture(scope="session")
