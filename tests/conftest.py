@@ -57,6 +57,32 @@ def pytest_xdist_auto_num_workers() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+#: Files of more than 15 s of processor time, the longest first.
+_LONGEST = {
+    name: rank
+    for rank, name in enumerate(
+        (
+            "workflow/test_health.py",
+            "discovery/test_explain.py",
+            "test_readme.py",
+            "workflow/test_budget.py",
+            "workflow/test_health_pictures.py",
+            "cli/test_output.py",
+            "cli/test_json.py",
+            "discovery/test_anomalies.py",
+            "workflow/test_certificate_contents.py",
+            "cli/test_interruptions.py",
+            "curves/test_real_data.py",
+        )
+    )
+}
+
+
+def _file(item: pytest.Item) -> str:
+    """The file of a test, below this folder."""
+    return os.path.relpath(item.path, Path(__file__).parent)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what only ``make trials`` or ``make slow`` runs, or everything else."""
 
@@ -71,7 +97,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return not of_trials and not is_slow
 
     config.hook.pytest_deselected(items=[item for item in items if not is_run(item)])
-    items[:] = filter(is_run, items)
+    # The longest files first: one that began last would be waited for by all workers but its own.
+    items[:] = sorted(filter(is_run, items), key=lambda item: _LONGEST.get(_file(item), len(_LONGEST)))
 
 
 @pytest.fixture(scope="session")

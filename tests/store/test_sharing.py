@@ -134,6 +134,30 @@ def test_a_file_that_another_part_of_the_process_is_closing_is_waited_for_and_no
     assert [who.pid for who in reports] == [os.getpid()]
 
 
+#: Ends while another thread writes the log into the file, which takes long enough to be met.
+_END_WHILE_LETTING_GO = """
+import sys, time
+from monitor.store import SharedDatabase
+db = SharedDatabase(sys.argv[1])
+with db.transaction():
+    db.execute("CREATE TABLE large AS SELECT range AS i, md5(range::text) AS a FROM range(300000)")
+while db._lock.acquire(blocking=False):
+    db._lock.release()
+    if db._connection is None:
+        break
+    time.sleep(0.001)
+"""
+
+
+def test_a_process_that_ends_without_closing_lets_go_of_the_file_first(path: Path) -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", _END_WHILE_LETTING_GO, str(path)], capture_output=True, text=True, check=False
+    )
+    assert (said.returncode, said.stderr) == (0, "")
+    with SharedDatabase(path) as db:
+        assert db.rows("SELECT count(*) FROM large") == [(300000,)]
+
+
 def test_a_campaign_that_was_exchanged_meanwhile_takes_no_result_of_the_one_before(
     path: Path,
     make_campaign: Callable[..., Campaign],
