@@ -177,6 +177,7 @@ def test_the_demo_does_the_main_job_and_prints_what_the_readme_shows(folder: Pat
     assert "$ monitor --db demo-output/demo.duckdb import " in demo
 
 
+@pytest.mark.slow
 def test_the_python_of_the_documents_runs(tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(CHECKOUT / "examples")
     typed = examples((CHECKOUT / "docs/python.md").read_text(encoding="utf-8"))

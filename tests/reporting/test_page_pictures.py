@@ -144,7 +144,7 @@ def test_usual_certificate_looks_right(make_record: Make, tmp_path: Path) -> Non
     assert faults_of(certificate_pdf(make_record()), tmp_path) == []
 
 
-@pytest.mark.parametrize("language", ["en", "de"])
+@pytest.mark.parametrize("language", [pytest.param("en", marks=pytest.mark.slow), "de"])
 def test_thirty_parameters_long_names_three_alphabets_and_a_map_look_right(
     make_record: Make, tmp_path: Path, language: str
 ) -> None:

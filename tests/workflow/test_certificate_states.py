@@ -44,7 +44,7 @@ def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
         yield opened
 
 
-@pytest.fixture(scope="module", params=["en", "de"])
+@pytest.fixture(scope="module", params=["en", pytest.param("de", marks=pytest.mark.slow)])
 def adjusted(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A laboratory that adjusted the machine, in both languages."""
     name = "laboratory.toml" if request.param == "en" else "laboratory-de.toml"
