@@ -127,7 +127,7 @@ def test_a_pipe_as_database_is_refused_at_once(typed: Any, tmp_path: Path) -> No
     assert "is a pipe or device, not a file" in said.err
 
 
-@pytest.mark.parametrize("kilobytes", [100, 7000, 8000])
+@pytest.mark.parametrize("kilobytes", [*(pytest.param(k, marks=pytest.mark.slow) for k in (100, 7000)), 8000])
 def test_a_full_disk_in_a_migration_ends_in_words_and_loses_nothing(
     typed: Any, tmp_path: Path, environment: dict[str, str], kilobytes: int
 ) -> None:

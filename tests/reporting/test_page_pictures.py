@@ -179,9 +179,15 @@ def test_chinese_and_japanese_letters_are_drawn_with_a_font_that_is_given(
     ("style", "fault"),
     [
         (".results { width: 230mm; }", "is off the page's text area"),
-        (".results { width: 230mm; }", "ink in the right margin"),
-        ("dl > div { height: 1.2mm; overflow: hidden; }", "is not to be seen"),
-        ("h1 { white-space: nowrap; overflow: hidden; width: 55mm; }", "'certificate' is not to be seen"),
+        pytest.param(".results { width: 230mm; }", "ink in the right margin", marks=pytest.mark.slow),
+        pytest.param(
+            "dl > div { height: 1.2mm; overflow: hidden; }", "is not to be seen", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "h1 { white-space: nowrap; overflow: hidden; width: 55mm; }",
+            "'certificate' is not to be seen",
+            marks=pytest.mark.slow,
+        ),
         ("h2 { color: white; }", "is not to be seen"),
         (".statements dd { margin-left: -45mm; }", "stands on"),
     ],

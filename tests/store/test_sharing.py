@@ -30,10 +30,9 @@ from monitor.store import (
 CONCURRENCY = Path(__file__).parents[1] / "soak" / "concurrency.py"
 
 
-def test_two_importers_and_readers_at_once_lose_nothing_and_refuse_nobody(thorough: bool) -> None:
-    """Two readers in ``make test``: a process takes a second of processor time."""
-    readers = "4" if thorough else "2"
-    options = ["--importers", "2", "--readers", readers, "--seconds", "0", "--least", "1", "--pause", "0"]
+@pytest.mark.slow
+def test_two_importers_and_four_readers_at_once_lose_nothing_and_refuse_nobody() -> None:
+    options = ["--importers", "2", "--readers", "4", "--seconds", "0", "--least", "1", "--pause", "0"]
     said = subprocess.run(
         [sys.executable, str(CONCURRENCY), *options], capture_output=True, text=True, check=False
     )

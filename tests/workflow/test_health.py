@@ -426,6 +426,7 @@ def test_the_volumetric_error_is_mapped_from_the_runs_up_to_the_week_and_told_wi
     assert "Volumetric error, run 20" in Path(later["files"][1]).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_report_made_late_says_what_one_made_on_monday_said(
     week10: dict, fleet: Database, tmp_path: Path, make_folder: Callable[..., Path], pdf_unread
 ) -> None:
@@ -461,6 +462,7 @@ def test_a_report_made_late_says_what_one_made_on_monday_said(
     assert stored(fleet, "B-stepped").basis == then.basis
 
 
+@pytest.mark.slow
 def test_a_first_report_has_the_whole_history_though_nothing_of_it_was_identified(
     tmp_path: Path, pdf_unread
 ) -> None:
