@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: browser challenge concurrency kills pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
+.PHONY: supply browser challenge concurrency kills pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -91,6 +91,10 @@ WHEEL_PARTS := tests/test_wheel.py tests/cli/test_json.py tests/cli/test_certifi
 	tests/store/test_migrations.py tests/reporting/test_render.py tests/reporting/test_dcc.py tests/web
 wheel-parts: setup
 	@$(RUN) tests/setup/installed_wheel.py $(WHEEL_PARTS) $(PARALLEL) $(ARGS)
+
+supply: setup  ## wheel with its bill of materials in dist/, docs/licences.md, the hashes of all pins
+	@$(RUN) -m pip install --quiet --constraint constraints.txt 'cyclonedx-bom>=7' 'pip-licenses>=5' 'uv>=0.9'
+	@$(RUN) tests/setup/supply.py
 
 clean:  ## remove what the others left, except the virtual environment
 	@rm -rf demo-output pages-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
