@@ -130,7 +130,7 @@ def test_a_certificate_that_another_signs_than_it_states_is_not_confirmed(
     issued = issue(
         db,
         CertificateRequest(
-            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="S-2", issued_on=DAY, key=key
+            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="S-3", issued_on=DAY, key=key
         ),
     )
     answer = verify_file(db, VerificationRequest(Path(issued.file)))
