@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: supply challenge concurrency kills manual pages real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
+.PHONY: supply browser challenge concurrency kills manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -26,6 +26,9 @@ demo: setup  ## the main job on the example campaigns; leaves its results in dem
 test: setup  ## the tests
 	@$(IN_MEMORY) $(PYTEST) $(PARALLEL) $(ARGS)
 
+slow: setup  ## the tests that make test leaves out or does less of: long ones that rarely fail
+	@$(IN_MEMORY) $(PYTEST) $(PARALLEL) --slow $(ARGS)
+
 check: setup  ## format, lint, types
 	@$(RUN) -m ruff format --check .
 	@$(RUN) -m ruff check .
@@ -41,8 +44,10 @@ bench: setup  ## how long things take (tests/benchmarks)
 real-data: setup  ## docs/real-data.md and its pictures, from the measured series of NIST
 	@OMP_NUM_THREADS=1 $(RUN) tests/curves/real_data.py $(ARGS)
 
-pages: setup  ## the pages in a real browser; pictures of every page in pages-output/
+browser: setup
 	@sh tests/setup/browser.sh
+
+pages: browser  ## the pages in a real browser; pictures of every page in pages-output/
 	@$(PYTEST) -n 0 tests/browser $(ARGS)
 
 manual: setup  ## the manual as a site in manual-output/, and every block of code of its pages
@@ -85,9 +90,12 @@ challenge: setup  ## campaigns with sealed truth, answered by ours and four othe
 wheel: setup  ## build the wheel and run the tests against it, away from the checkout
 	@$(RUN) tests/setup/installed_wheel.py $(PARALLEL) $(ARGS)
 
-# What a wheel can lack shows in these: files of the package, migrations, texts and fonts, the command.
+# What a wheel can lack: files of the package (test_wheel compares them one by one), so migrations, templates, fonts and
+# pages; what is imported and not declared; the command. Each is met here once; what the code does, make test has shown.
+WHEEL_PARTS := tests/test_wheel.py tests/cli/test_json.py tests/cli/test_certificates.py tests/cli/test_usage.py \
+	tests/store/test_migrations.py tests/reporting/test_render.py tests/reporting/test_dcc.py tests/web
 wheel-parts: setup
-	@$(RUN) tests/setup/installed_wheel.py tests/cli tests/readers tests/store tests/reporting tests/test_wheel.py $(PARALLEL) $(ARGS)
+	@$(RUN) tests/setup/installed_wheel.py $(WHEEL_PARTS) $(PARALLEL) $(ARGS)
 
 supply: setup  ## wheel with its bill of materials in dist/, docs/licences.md, the hashes of all pins
 	@$(RUN) -m pip install --quiet --constraint constraints.txt 'cyclonedx-bom>=7' 'pip-licenses>=5' 'uv>=0.9'

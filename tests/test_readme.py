@@ -102,7 +102,7 @@ def run_in_shell(example: Example, source: str, folder: Path) -> tuple[int, str]
         stderr=subprocess.STDOUT,
         stdin=subprocess.DEVNULL,
         text=True,
-        timeout=300,
+        timeout=600,
     )
     return done.returncode, done.stdout
 
@@ -144,26 +144,40 @@ def try_out(example: Example, folder: Path, *, in_shell: bool = True) -> str:
     return printed
 
 
-def test_readme_examples_do_what_it_says(tmp_path: Path) -> None:
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the examples, as a reader has it."""
     if (CHECKOUT / "examples").is_dir():
         shutil.copytree(CHECKOUT / "examples", tmp_path / "examples")
+    return tmp_path
+
+
+def test_readme_examples_do_what_it_says(folder: Path) -> None:
     typed = examples(README.read_text(encoding="utf-8"))
     assert any(example.language == "console" for example in typed)
     first = next(example for example in typed if example.source.startswith("monitor "))
-    printed = {example.source: try_out(example, tmp_path, in_shell=example == first) for example in typed}
-    # The demo is the main job; it takes long and is looked at here, where it runs anyway.
-    demo = printed["make demo"]
+    for example in typed:
+        if example.source not in MAKE:
+            try_out(example, folder, in_shell=example == first)
+
+
+@pytest.mark.slow
+def test_the_demo_does_the_main_job_and_prints_what_the_readme_shows(folder: Path) -> None:
+    typed = examples(README.read_text(encoding="utf-8"))
+    (example,) = (example for example in typed if example.source == "make demo")
+    demo = try_out(example, folder)
     assert "five-days: imported, 20 runs, 1240 probings\n" in demo
     assert "U = k_q u" in demo
     step = next(line for line in demo.splitlines() if line.startswith("EB0C ") and "< 0.0001" in line)
     assert "µrad" in step
     assert "EZC1:const@warmup" in demo
-    assert len(list((tmp_path / "demo-output").glob("certificate-*.pdf"))) == 1
-    assert (tmp_path / "demo-output/demo.duckdb").is_file()
+    assert len(list((folder / "demo-output").glob("certificate-*.pdf"))) == 1
+    assert (folder / "demo-output/demo.duckdb").is_file()
     # What it shows is typed below it, and every command may be copied.
     assert "$ monitor --db demo-output/demo.duckdb import " in demo
 
 
+@pytest.mark.slow
 def test_the_python_of_the_documents_runs(tmp_path: Path) -> None:
     (tmp_path / "examples").symlink_to(CHECKOUT / "examples")
     typed = examples((CHECKOUT / "docs/python.md").read_text(encoding="utf-8"))

@@ -11,8 +11,10 @@ computed is then refused (``is_same_campaign``). A block that has to see one mom
 
 from __future__ import annotations
 
+import atexit
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -29,6 +31,11 @@ from monitor.store.turns import Patience, turn_to_write, writer_at_work
 _IDLE_READING_S, _IDLE_WRITING_S, _LOOK_S = 0.05, 0.02, 0.01
 #: How long it is kept without a pause, in s; longer only by the one question or transaction that is under way.
 _LONGEST_S = 0.5
+#: How long a process that ends waits for a question of another thread, in s.
+_LAST_QUESTION_S = 10.0
+
+#: The databases of this process that have their file open.
+_OPEN: weakref.WeakSet[SharedDatabase] = weakref.WeakSet()
 
 
 class SharedDatabase(Database):
@@ -52,6 +59,7 @@ class SharedDatabase(Database):
         self._writes = False
         self._blocks = 0
         self._opened_at = self._used_at = 0.0
+        self._openings = 0
         self._numbers: dict[str, int] = {}
         super().__init__(path, read_only=read_only, threads=threads, actor=actor)
 
@@ -165,23 +173,44 @@ class SharedDatabase(Database):
     def _keep(self, connection: duckdb.DuckDBPyConnection) -> None:
         self._connection = connection
         self._opened_at = self._used_at = time.monotonic()
-        threading.Thread(target=self._watch, args=(connection,), daemon=True).start()
+        self._openings += 1
+        _OPEN.add(self)
+        threading.Thread(target=self._watch, args=(self._openings,), daemon=True).start()
 
-    def _watch(self, connection: duckdb.DuckDBPyConnection) -> None:
-        """Let go of the file once nothing was asked for a moment."""
-        while self._connection is connection:
+    def _watch(self, opening: int) -> None:
+        """Let go of the file once nothing was asked for a moment.
+
+        It knows the opening by its number: a connection that lost its last reference here, outside of the lock, while
+        Python ends, would abort the process.
+        """
+        while self._is_open_since(opening):
             time.sleep(_LOOK_S)
             if not self._lock.acquire(blocking=False):
                 continue
             try:
                 idle_s = _IDLE_WRITING_S if self._writes else _IDLE_READING_S
-                if self._connection is connection and time.monotonic() - self._used_at > idle_s:
+                if self._is_open_since(opening) and time.monotonic() - self._used_at > idle_s:
                     self._let_go()
             finally:
                 self._lock.release()
+
+    def _is_open_since(self, opening: int) -> bool:
+        return self._connection is not None and self._openings == opening
 
     def _let_go(self) -> None:
         super().close()
         self._connection = None
         self._writes = False
         self._turn.close()
+        _OPEN.discard(self)
+
+
+@atexit.register
+def _let_go_of_all() -> None:
+    """Let go of what was not closed before Python ends its threads: one in the middle of it would abort the process."""
+    for database in tuple(_OPEN):
+        if database._lock.acquire(timeout=_LAST_QUESTION_S):
+            try:
+                database._let_go()
+            finally:
+                database._lock.release()

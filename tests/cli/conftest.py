@@ -42,6 +42,11 @@ Typed = Callable[..., Answer]
 
 
 @pytest.fixture(scope="session", autouse=True)
+def layouts(laid_out_once: object) -> None:
+    """No page is laid out twice."""
+
+
+@pytest.fixture(scope="session", autouse=True)
 def clock() -> Iterator[None]:
     """Certificates are issued on a day of ours, whatever the clock of the computer says."""
     with pytest.MonkeyPatch.context() as patch:

@@ -48,11 +48,12 @@ def test_a_folder_exhausts_neither_memory_nor_time(
 ) -> None:
     (folder / file).unlink()
     what(folder / file)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     said = typed("import", folder, db=tmp_path / "new.duckdb")
     assert said.status == 2
     assert "not a regular file" in said.err or "is larger than" in said.err
-    # What was read is bounded, and has been freed: the process never had a gigabyte.
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 1.5e6
+    # What was read is bounded, and has been freed: the process never had a gigabyte more than before.
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1e6
 
 
 @pytest.mark.parametrize("what", [endless, pipe, huge])
@@ -126,7 +127,7 @@ def test_a_pipe_as_database_is_refused_at_once(typed: Any, tmp_path: Path) -> No
     assert "is a pipe or device, not a file" in said.err
 
 
-@pytest.mark.parametrize("kilobytes", [100, 7000, 8000])
+@pytest.mark.parametrize("kilobytes", [*(pytest.param(k, marks=pytest.mark.slow) for k in (100, 7000)), 8000])
 def test_a_full_disk_in_a_migration_ends_in_words_and_loses_nothing(
     typed: Any, tmp_path: Path, environment: dict[str, str], kilobytes: int
 ) -> None:

@@ -132,7 +132,7 @@ def test_the_file_of_an_issued_certificate_is_not_written_over(
 
 
 def test_a_file_that_nobody_knows_is_not_written_over(
-    typed: Any, issued: Any, db: Path, laboratory: Path
+    typed: Any, issued: Any, db: Path, laboratory: Path, pdf_unread: Any
 ) -> None:
     """Two databases in one folder both count from 0001: the second may not take the place of the first's."""
     shutil.copyfile(issued.file("2026-0001"), "certificate-2026-0001.pdf")
@@ -153,26 +153,30 @@ def test_a_file_that_nobody_knows_is_not_written_over(
     assert Path("certificate-2026-0001.pdf").read_bytes() == issued.file("2026-0001").read_bytes()
     assert typed("certificate", "show", db=db).out == "no certificate was made yet\n"
     Path("empty.pdf").touch()  # as mktemp makes it
-    assert typed(*issue, "--out", "empty.pdf", db=db).status == 0
+    with pdf_unread():
+        assert typed(*issue, "--out", "empty.pdf", db=db).status == 0
 
 
 @pytest.mark.parametrize("out", ["text", "text/x.pdf"])
 def test_a_file_that_cannot_be_written_leaves_no_certificate(
-    typed: Any, db: Path, laboratory: Path, out: str
+    typed: Any, db: Path, laboratory: Path, out: str, pdf_unread: Any
 ) -> None:
     Path("text").write_text("hello")
-    answer = typed(
-        "certificate", "issue", "cold-cold", "--run", 3, "--laboratory", laboratory, "--out", out, db=db
-    )
+    issue = ["certificate", "issue", "cold-cold", "--run", 3, "--laboratory", laboratory, "--out", out]
+    with pdf_unread():
+        answer = typed(*issue, db=db)
     assert (answer.status, answer.out) == (2, "")
     assert "the certificate cannot be written to" in answer.err
     assert typed("certificate", "show", db=db).out == "no certificate was made yet\n"
     assert [path.name for path in Path().iterdir()] == ["text"]
 
 
-def test_a_number_with_slashes_stays_in_its_folder(typed: Any, db: Path, laboratory: Path) -> None:
+def test_a_number_with_slashes_stays_in_its_folder(
+    typed: Any, db: Path, laboratory: Path, pdf_unread: Any
+) -> None:
     issue = ["certificate", "issue", "cold-cold", "--run", 3, "--laboratory", laboratory, "--out", "out"]
-    answer = typed(*issue, "--number", "../../x/1", "--json", db=db)
+    with pdf_unread():
+        answer = typed(*issue, "--number", "../../x/1", "--json", db=db)
     assert answer.document["number"] == "../../x/1"
     (file,) = Path("out").iterdir()
     assert str(file) == answer.document["file"]

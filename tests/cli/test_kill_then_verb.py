@@ -88,7 +88,15 @@ def _copied(killed: Path, folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("verb", READING, ids=lambda verb: " ".join(verb[:2]))
+#: Those that read the tables, views and files in ways of their own; the others have their turn in ``make slow``.
+QUICK = ("campaigns", "trend", "verify", "backup")
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [pytest.param(verb, marks=() if verb[0] in QUICK else pytest.mark.slow) for verb in READING],
+    ids=lambda verb: " ".join(verb[:2]),
+)
 def test_no_campaign_is_lost_whichever_verb_comes_first_after_a_kill(
     killed: Path, tmp_path: Path, typed: Typed, examples: Path, verb: list[str]
 ) -> None:

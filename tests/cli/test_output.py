@@ -181,7 +181,7 @@ def terminal(environment: dict[str, str], tmp_path: Path) -> Callable[..., str]:
             with contextlib.suppress(OSError):
                 while part := os.read(leader, 65536):
                     seen += part
-            process.wait(60)
+            process.wait(250)
         os.close(leader)
         return seen.decode()
 
@@ -213,7 +213,7 @@ def test_a_narrow_terminal_breaks_words_and_no_number(terminal: Any, filled: Pat
 
 def test_pipes_get_no_progress(started: Any, filled: Path) -> None:
     process = started("--db", filled, "compare", "five-days", env={"FORCE_COLOR": "1", "TERM": "xterm"})
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=250)
     assert (process.returncode, err) == (0, "")
     assert ANSI not in out
 
@@ -240,7 +240,7 @@ def test_a_reader_that_goes_away_is_no_fault(started: Any, filled: Path, argumen
     process = started("--db", filled, *arguments)
     process.stdout.close()
     err = process.stderr.read()
-    process.wait(60)
+    process.wait(250)
     assert (process.returncode, err) == (0, "")
     process.stderr.close()
 
@@ -250,7 +250,7 @@ def test_a_full_disk_behind_the_pipe_is_told(started: Any) -> None:
         pytest.skip("no /dev/full here")
     with open("/dev/full", "w") as full:
         process = started("effects", stdout=full)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=250)
     assert process.returncode == 2
     assert err == "monitor: the output could not be written: No space left on device\n"
 
@@ -258,11 +258,11 @@ def test_a_full_disk_behind_the_pipe_is_told(started: Any) -> None:
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
 def test_any_encoding_of_the_terminal_will_do(started: Any, encoding: str) -> None:
     process = started("effects", "backlash", env={"PYTHONIOENCODING": encoding}, encoding=encoding)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=250)
     assert (process.returncode, err) == (0, "")
     assert ("µm" in out) == (encoding != "ascii")
     process = started("effects", "backlash", "--json", env={"PYTHONIOENCODING": encoding}, encoding=encoding)
-    assert "µm" in str(output.json.loads(process.communicate(timeout=60)[0]))
+    assert "µm" in str(output.json.loads(process.communicate(timeout=250)[0]))
 
 
 def test_the_installed_command_is_the_same(filled: Path, environment: dict[str, str]) -> None:

@@ -1,12 +1,15 @@
-"""Virtual campaigns, and what the demo refuses; that it does the main job is tested with the README, which runs it."""
+"""Virtual campaigns, the steps of the demo, and what it refuses; ``test_readme.py`` runs all of it in ``make slow``."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
+from monitor.cli.parser import Parser
+from monitor.cli.verbs import demo_
 from monitor.cli.verbs.demo_ import _quoted
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -44,6 +47,31 @@ def test_a_virtual_campaign_is_imported_and_its_effect_found(typed: Any, tmp_pat
 def test_the_demo_prints_paths_with_blanks_as_one_types_them() -> None:
     assert _quoted("out folder/demo.duckdb") == '"out folder/demo.duckdb"'
     assert _quoted("demo-output/demo.duckdb") == "demo-output/demo.duckdb"
+
+
+@pytest.mark.usefixtures("beside_the_examples")
+def test_every_step_of_the_demo_is_a_verb_with_options_that_it_has_on_campaigns_that_are_there(
+    typed: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[str] = []
+
+    def parsed(verb: ModuleType, name: str, database: str, arguments: list[str], silent: bool) -> int:
+        parser = Parser(prog=name)
+        verb.options(parser)
+        parser.parse_args(arguments)
+        taken.extend([name, *arguments])
+        return 0
+
+    monkeypatch.setattr(demo_, "_call", parsed)
+    answer = typed("demo", "--out", "out")
+    assert answer.status == 0
+    assert [line for line in answer.out.splitlines() if line.startswith("$ monitor --db out/demo.duckdb ")]
+    campaigns = [part for part in taken if "/" in part and "out" not in part]
+    assert len(campaigns) > 2
+    assert all(Path(part).exists() for part in campaigns)
+    assert {"import", "identify", "stats", "uncertainty", "explain", "model", "certificate", "report"} <= set(
+        taken
+    )
 
 
 @pytest.mark.usefixtures("beside_the_examples")

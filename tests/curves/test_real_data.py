@@ -71,6 +71,7 @@ def test_loadcell_lack_of_fit_112_then_0_35(told: dict[str, Any]) -> None:
     assert after["lack_of_fit_f"] == pytest.approx(0.35, abs=5e-3)
 
 
+@pytest.mark.slow
 def test_dziuba1_drift_then_yearly_with_bic_falling(told: dict[str, Any]) -> None:
     assert effects(told, "dziuba1") == ["date:drift", "date:sin365.2422"]
     bic = [one["bic"] for one in told["dziuba1"].history]
@@ -112,6 +113,7 @@ def test_enso_two_more_periods_certified_after_the_refit(told: dict[str, Any], c
     assert digits(found.deviation, float(certified["residual_sd"])) > 9.0
 
 
+@pytest.mark.slow
 def test_lew_period_at_0_302_and_the_better_optimum(told: dict[str, Any], curve: Any) -> None:
     first = told["lew"].explained["missing"][0]
     assert first["searched"]["frequency"] == pytest.approx(0.302, abs=5e-4)
@@ -125,6 +127,7 @@ def test_lew_period_at_0_302_and_the_better_optimum(told: dict[str, Any], curve:
     assert beyond.tolist() == [2, 3, 6, 8, 11, 158]
 
 
+@pytest.mark.slow
 def test_lew_outliers_named(told: dict[str, Any]) -> None:
     named = {one["sequence"] for one in told["lew"].explained["suspect_data"]}
     assert {2, 3, 6, 8, 11, 158} <= named
@@ -171,6 +174,7 @@ def test_autocorrelation_is_noticed(told: dict[str, Any], name: str, r: float) -
     assert noise["lag_one"] == pytest.approx(r, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_page_holds_what_comes_out_now(script: Any, told: dict[str, Any]) -> None:
     if not script.PAGE.exists():
         pytest.skip("the wheel is tested away from the checkout's docs")

@@ -144,7 +144,7 @@ def test_usual_certificate_looks_right(make_record: Make, tmp_path: Path) -> Non
     assert faults_of(certificate_pdf(make_record()), tmp_path) == []
 
 
-@pytest.mark.parametrize("language", ["en", "de"])
+@pytest.mark.parametrize("language", [pytest.param("en", marks=pytest.mark.slow), "de"])
 def test_thirty_parameters_long_names_three_alphabets_and_a_map_look_right(
     make_record: Make, tmp_path: Path, language: str
 ) -> None:
@@ -179,9 +179,15 @@ def test_chinese_and_japanese_letters_are_drawn_with_a_font_that_is_given(
     ("style", "fault"),
     [
         (".results { width: 230mm; }", "is off the page's text area"),
-        (".results { width: 230mm; }", "ink in the right margin"),
-        ("dl > div { height: 1.2mm; overflow: hidden; }", "is not to be seen"),
-        ("h1 { white-space: nowrap; overflow: hidden; width: 55mm; }", "'certificate' is not to be seen"),
+        pytest.param(".results { width: 230mm; }", "ink in the right margin", marks=pytest.mark.slow),
+        pytest.param(
+            "dl > div { height: 1.2mm; overflow: hidden; }", "is not to be seen", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "h1 { white-space: nowrap; overflow: hidden; width: 55mm; }",
+            "'certificate' is not to be seen",
+            marks=pytest.mark.slow,
+        ),
         ("h2 { color: white; }", "is not to be seen"),
         (".statements dd { margin-left: -45mm; }", "stands on"),
     ],

@@ -16,6 +16,24 @@ from pathlib import Path
 
 from environment import CHECKOUT, EXTRAS
 
+# What a user installs on top of the wheel, by the names under which it is imported: the modules that need it are
+# imported late, and may fail without it. Everything else has to be declared.
+OF_EXTRAS = (
+    "asn1crypto", "cryptography", "dask", "distributed", "fastapi", "multipart", "openpyxl", "pkcs11", "plotly",
+    "pydantic", "pyhanko", "pyhanko_certvalidator", "shtab", "starlette", "uvicorn",
+)  # fmt: skip
+IMPORT_ALL = f"""
+import importlib, pkgutil, monitor
+for module in pkgutil.walk_packages(monitor.__path__, "monitor.", onerror=lambda name: None):
+    if module.name.endswith("__main__"):
+        continue
+    try:
+        importlib.import_module(module.name)
+    except ModuleNotFoundError as missing:
+        if (missing.name or "").partition(".")[0] not in {OF_EXTRAS!r}:
+            raise
+"""
+
 # What a build needs, and what the tests need besides the installed package.
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "monitor", "migrations", "reports")
 TEST_FILES = ("pyproject.toml", "README.md", "Makefile", "tests", "examples")
@@ -67,7 +85,7 @@ def build(place: Path) -> Path:
 
 def install(wheel: Path, venv: Path) -> Path:
     """Python of a new environment that holds the wheel; first alone, to see that it declares what it imports."""
-    say("install alone, and ask the command for help")
+    say("install alone, ask the command for help, import every module")
     run(sys.executable, "-m", "venv", venv)
     python = venv / "bin" / "python"
     pip = (python, "-m", "pip", "--disable-pip-version-check", "-q")
@@ -75,6 +93,7 @@ def install(wheel: Path, venv: Path) -> Path:
     run(*pip, "install", "-c", constraints, wheel)
     run(*pip, "check")
     run(venv / "bin" / "monitor", "--help", quiet=True)
+    run(python, "-c", IMPORT_ALL)
     say(f"install with the extras {EXTRAS}")
     run(*pip, "install", "-c", constraints, f"{wheel}[{EXTRAS}]")
     return python

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
@@ -157,13 +158,33 @@ def filled(
     return db
 
 
+@pytest.fixture(scope="session")
+def everything_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the file of ``something_of_everything`` is kept once it was made, to be copied."""
+    return tmp_path_factory.mktemp("everything") / "everything.duckdb"
+
+
 @pytest.fixture
 def something_of_everything(
+    path: Path,
+    everything_once: Path,
+    make_campaign: Callable[..., Campaign],
+    make_identification: Callable[..., StoredIdentification],
+) -> Iterator[Database]:
+    """A database with something of everything."""
+    if not everything_once.exists():
+        with Database(everything_once, actor="the test") as database:
+            _fill(database, make_campaign, make_identification)
+    shutil.copy(everything_once, path)
+    with Database(path, actor="the test") as database:
+        yield database
+
+
+def _fill(
     db: Database,
     make_campaign: Callable[..., Campaign],
     make_identification: Callable[..., StoredIdentification],
-) -> Database:
-    """A database with something of everything."""
+) -> None:
     one = make_campaign("one")
     import_campaign(db, one)
     import_campaign(db, make_campaign("two"))
@@ -172,4 +193,3 @@ def something_of_everything(
     save_analysis(db, "uncertainty", {"a": 1}, method="guf", campaign="one")
     save_certificate(db, "C-1", "issued", "one", [1], {"a": 1}, b"pdf")
     record_event(db, one.machine.id, datetime(2026, 1, 1, tzinfo=UTC), "crash", "x")
-    return db

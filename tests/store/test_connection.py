@@ -23,6 +23,8 @@ print("open", flush=True)
 sys.stdin.read()
 """
 
+pytestmark = pytest.mark.usefixtures("made_anew")
+
 _OPEN = """
 import sys
 from monitor.exceptions import StoreError

@@ -12,6 +12,8 @@ import pytest
 from monitor.exceptions import StoreError
 from monitor.store import Database, restore, take_backup
 
+pytestmark = pytest.mark.usefixtures("made_anew")
+
 REFUSED = {
     "x.csv": "x.csv ends in .csv, the name of a data file and not of a database; name a file such as x.duckdb",
     "x.CSV": "ends in .csv",

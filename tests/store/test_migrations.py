@@ -14,6 +14,8 @@ from monitor.exceptions import StoreError
 from monitor.store import Database, migrations
 from monitor.store.migrations import Migration, migrate, pending
 
+pytestmark = pytest.mark.usefixtures("made_anew")
+
 FIRST = Migration(1, "0001_first.sql", "CREATE TABLE first (a INTEGER);\nINSERT INTO first VALUES (1);\n")
 SECOND = Migration(2, "0002_second.sql", "CREATE TABLE second (b INTEGER);\n")
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import duckdb
 import pytest
 
 from monitor.exceptions import BusyError, DataError, StoreError
@@ -29,6 +30,7 @@ from monitor.store import (
 CONCURRENCY = Path(__file__).parents[1] / "soak" / "concurrency.py"
 
 
+@pytest.mark.slow
 def test_two_importers_and_four_readers_at_once_lose_nothing_and_refuse_nobody() -> None:
     options = ["--importers", "2", "--readers", "4", "--seconds", "0", "--least", "1", "--pause", "0"]
     said = subprocess.run(
@@ -113,6 +115,46 @@ def _is_open(path: Path) -> bool:
     if not links.is_dir():
         return False
     return any(os.path.realpath(link) == str(path.resolve()) for link in links.iterdir())
+
+
+def test_a_file_that_another_part_of_the_process_is_closing_is_waited_for_and_not_called_damaged(
+    path: Path,
+) -> None:
+    Database(path).close()
+    other = duckdb.connect()
+    literal = str(path).replace("'", "''")
+    other.execute(f"ATTACH '{literal}' AS other (READ_ONLY)")
+    with pytest.raises(StoreError, match="is open in this process already"):
+        Database(path)
+    reports: list[Holder] = []
+    patience = Patience(60, lambda who, seconds: (reports.append(who), other.close()))
+    with SharedDatabase(path, patience=patience) as db:
+        save(db)
+    assert [who.pid for who in reports] == [os.getpid()]
+
+
+#: Ends while another thread writes the log into the file, which takes long enough to be met.
+_END_WHILE_LETTING_GO = """
+import sys, time
+from monitor.store import SharedDatabase
+db = SharedDatabase(sys.argv[1])
+with db.transaction():
+    db.execute("CREATE TABLE large AS SELECT range AS i, md5(range::text) AS a FROM range(300000)")
+while db._lock.acquire(blocking=False):
+    db._lock.release()
+    if db._connection is None:
+        break
+    time.sleep(0.001)
+"""
+
+
+def test_a_process_that_ends_without_closing_lets_go_of_the_file_first(path: Path) -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", _END_WHILE_LETTING_GO, str(path)], capture_output=True, text=True, check=False
+    )
+    assert (said.returncode, said.stderr) == (0, "")
+    with SharedDatabase(path) as db:
+        assert db.rows("SELECT count(*) FROM large") == [(300000,)]
 
 
 def test_a_campaign_that_was_exchanged_meanwhile_takes_no_result_of_the_one_before(

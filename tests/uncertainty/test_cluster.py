@@ -103,6 +103,21 @@ def test_jcgm102_7_2_same_bits_on_two_processes_of_which_one_is_killed_in_the_mi
     assert _same(found, alone)
 
 
+def test_jcgm102_7_2_same_bits_on_a_dask_cluster(evaluation):
+    distributed = pytest.importorskip("distributed")
+    recipe, sampler, alone = evaluation
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
+            silence_logs=50,
+        ) as local,
+        cluster(local.scheduler_address) as engine,
+        spread(engine, recipe, sampler) as (model, blocks),
+    ):  # fmt: skip
+        assert _same(_evaluate(model, blocks), alone)
+
+
+@pytest.mark.slow
 def test_jcgm102_7_2_same_bits_on_a_dask_cluster_of_which_one_worker_is_killed_in_the_middle(evaluation):
     distributed = pytest.importorskip("distributed")
     recipe, sampler, alone = evaluation

@@ -256,6 +256,7 @@ def test_it_is_said_in_german_too(db):
     assert "sie sind nicht auf 20 °C bezogen" in length_sentence(answer.length, texts)
 
 
+@pytest.mark.slow
 def test_a_german_certificate_over_the_campaign_has_every_source_and_is_made_again(db, tmp_path):
     text = issued(db, tmp_path, "steel-bar", 20, "laboratory-de.toml", holds_for="campaign")
     assert remake(db, RemakeRequest("B-steel-bar")).identical is True

@@ -86,6 +86,7 @@ def guarded(db: Database, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return Path(made.file)
 
 
+@pytest.mark.usefixtures("laid_out_anew")
 def test_an_issued_certificate_is_made_again_byte_for_byte(
     db: Database, guarded: Path, tmp_path: Path
 ) -> None:

@@ -54,6 +54,7 @@ def test_identification_and_framework_state_the_same_uncertainty(db):
         assert framework.estimate[name] == pytest.approx(estimate.value, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_monte_carlo_agrees_with_the_framework(db):
     found = uncertainty(db, UncertaintyRequest("free-form-pocket", 2, method="mcm", digits=1, seed=3))
     assert found.mcm.not_converged == 0

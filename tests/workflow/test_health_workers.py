@@ -29,11 +29,15 @@ STOPPED = "monitor: stopped; what was not finished was not stored\n"
 
 
 @pytest.fixture
-def fleet(tmp_path: Path) -> Path:
-    """Three machines: one lacks an effect, one was measured only in February, one has nothing to report."""
+def fleet(tmp_path: Path, thorough: bool) -> Path:
+    """Three machines: one lacks an effect, one was measured only in February, one has nothing to report.
+
+    In ``make test`` the second and another of its kind, for which nothing is searched.
+    """
     path = tmp_path / "fleet.duckdb"
+    examples = ("hidden-b-indexing", "cold-cold", "nothing-hidden") if thorough else ("cold-cold", "hot-cold")
     with Database(path, threads=1) as db:
-        for example in ("hidden-b-indexing", "cold-cold", "nothing-hidden"):
+        for example in examples:
             folder = tmp_path / example
             shutil.copytree(EXAMPLES / example, folder)
             file = folder / "campaign.toml"
@@ -44,12 +48,12 @@ def fleet(tmp_path: Path) -> Path:
 
 
 def test_one_process_and_two_write_the_same_bytes_and_store_the_same(
-    fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fleet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, thorough: bool, laid_out_anew: None
 ) -> None:
     # The entries of the two audits bear the times of their making; printed in the report, they would differ.
     monkeypatch.setattr("monitor.workflow.health.report.last_anchor", lambda db: AuditAnchor(7, "ab" * 32))
     # Two parts, so that the PDF is spread too.
-    monkeypatch.setattr("monitor.workflow.health.report.MACHINES_A_PART", 2)
+    monkeypatch.setattr("monitor.workflow.health.report.MACHINES_A_PART", 2 if thorough else 1)
     files, stored = [], []
     for workers in (1, 2):
         path, out = tmp_path / f"{workers}.duckdb", tmp_path / f"by-{workers}"

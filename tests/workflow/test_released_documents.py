@@ -132,6 +132,7 @@ def test_a_sentence_of_another_hand_stays_as_it_is() -> None:
     assert with_reason(refused) == refused
 
 
+@pytest.mark.slow
 def test_a_record_without_reasons_is_made_again_byte_for_byte_and_in_german(
     db: Database, tmp_path: Path
 ) -> None:

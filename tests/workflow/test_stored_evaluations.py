@@ -49,7 +49,9 @@ def pages_and_files(file: str) -> tuple[list[bytes], dict[str, bytes]]:
     return [b"" if page is None else page.get_data() for page in pages], files
 
 
-@pytest.mark.parametrize("wishes", [{}, {"with_map": True}], ids=["plain", "map"])
+@pytest.mark.parametrize(
+    "wishes", [pytest.param({}, marks=pytest.mark.slow), {"with_map": True}], ids=["plain", "map"]
+)
 def test_from_a_stored_result_it_is_the_same_as_evaluated_for_it(
     db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wishes: dict[str, bool]
 ) -> None:
