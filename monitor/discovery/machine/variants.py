@@ -11,7 +11,7 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
-from monitor.effects.drivers import Always, Channel, EachRun, LaggedTemperature, SettlingDriver, parse_driver
+from monitor.effects.drivers import Always, EachRun, LaggedTemperature, SettlingDriver, parse_driver
 from monitor.effects.drivers.gravity import Gravity
 from monitor.effects.shapes import Compliance, Cyclic, Harmonic
 from monitor.effects.weight import LinkWeights, Load

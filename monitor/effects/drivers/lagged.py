@@ -37,7 +37,9 @@ class LaggedTemperature(SettlingDriver):
             return cls(groups["channel"])
         minutes = float(groups["minutes"])
         if minutes == 0:
-            raise EffectError(f"the time constant of @lagged must be above 0 min; without one: @{groups['channel']}")
+            raise EffectError(
+                f"the time constant of @lagged must be above 0 min; without one: @{groups['channel']}"
+            )
         return cls(groups["channel"], time_constant_s=MINUTE.to_internal(minutes))
 
     @property

@@ -1,6 +1,6 @@
 """Added effects and their unknowns, shared by all runs; unknown time constants are unknowns of the fit like any other.
 
-An effect ``@warmup`` or ``@lagged_...`` without a time constant has one more common unknown, the logarithm of that constant in
+An effect ``@warmup`` or ``@lagged_...`` without a time constant has one more common unknown, the logarithm of it in
 seconds, so that it stays positive. Its derivative is taken numerically: the basis is a smooth function of it.
 """
 
