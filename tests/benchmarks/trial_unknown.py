@@ -156,7 +156,7 @@ PLANS = {4: (2, 2), 8: (2, 4), 20: (5, 4), 60: (15, 4), 1: (1, 1), 2: (1, 2), 7:
 def visible(seed: int, name: str, peak: float, runs: int) -> tuple[Any, float]:
     """A campaign with a hidden shape, and how many standard deviations of the noise an oracle sees of it: the
     likelihood ratio of the true curve, of which only the size is unknown, in the residual of the plain model."""
-    right, effect, curve = FAMILIES[name]
+    _, effect, curve = FAMILIES[name]
     last: list[np.ndarray] = []
 
     def kept(q: np.ndarray, travel: np.ndarray, now: Any) -> np.ndarray:

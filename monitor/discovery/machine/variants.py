@@ -13,7 +13,7 @@ from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
 from monitor.effects.drivers import Always, EachRun, LaggedTemperature, SettlingDriver, parse_driver
 from monitor.effects.drivers.gravity import Gravity
-from monitor.effects.shapes import Compliance, Cyclic, Harmonic
+from monitor.effects.shapes import Compliance, Cyclic, Harmonic, parse_shape
 from monitor.effects.weight import LinkWeights, Load
 from monitor.machine import COMPONENTS, Chain
 from monitor.records import Array
@@ -68,6 +68,18 @@ def part_of_period(effect: MachineEffect, context: Context) -> float | None:
         return None
     part = periods * float(np.ptp(context.positions[:, effect.term.joint])) / (2.0 * np.pi)
     return part if 0.0 < part < WHOLE_PERIOD else None
+
+
+def bends_of(effect: MachineEffect) -> list[ChainVariant]:
+    """What the same error looks like over a part of a period: a slope and bends of any cause, and the weight on it."""
+    if not isinstance(effect, ChainEffect):
+        return []
+    plain = replace(effect, driver=Always(), driver_text="")
+    bends = [replace(plain, shape=parse_shape(text), shape_text=text) for text in ("poly1", "poly2", "poly3")]
+    weight = replace(
+        effect, shape=parse_shape("const"), shape_text="const", driver=Gravity(), driver_text="gravity"
+    )
+    return [Variant(bend.text, bend) for bend in (*bends, weight)]
 
 
 def variants_of(effect: MachineEffect) -> list[ChainVariant]:
