@@ -26,9 +26,11 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1)
 MOST_RUNS = 5
 # Neighbours that resemble each other by less than so many standard deviations of white noise are white.
 NOTICED = 1.5
-# Twice the logarithm of the likelihood ratio from which on noise is correlated: 5 % of white campaigns with two
+# A slow drift under independent noise shows in readings so far apart.
+FAR = 8
+# Twice the logarithm of the likelihood ratio from which on noise is correlated: 10 % of white campaigns with two
 # parameters. Taking white noise for hardly correlated noise costs next to nothing.
-LIKELIER = 6.0
+LIKELIER = 4.6
 # Directions of which a filter leaves less than this part (squared) are unknown to it.
 SMALLEST_EIGENVALUE = 1e-9
 
@@ -39,6 +41,11 @@ class Correlation:
 
     rho: float
     share: float
+
+
+def slowness(correlation: Correlation) -> float:
+    """What a correlation adds to the variance of the mean of many neighbours, as a multiple of that of white noise."""
+    return correlation.share * 2.0 * correlation.rho / (1.0 - correlation.rho)
 
 
 def caution(correlation: Correlation | None) -> tuple[float, float]:
@@ -180,8 +187,14 @@ class NoiseDesign:
             Correlation(rho, share) for share in SHARES for rho in CORRELATIONS[max(start - 1, 0) :: 2][:4]
         ]
         best = min((best, *trials), key=criterion)
-        gain = criterion(Correlation(0.0, 0.0)) - criterion(best)
-        return best if gain > LIKELIER else None
+        least = criterion(best)
+        if criterion(Correlation(0.0, 0.0)) - least <= LIKELIER:
+            return None
+        # A slow drift under much independent noise: far readings resemble each other as much as neighbours, hardly.
+        # Of the slow correlations that are likelier still the slowest counts: a drift that is taken for white noise
+        # makes an effect.
+        slow = [Correlation(rho, share) for share in SHARES for rho in CORRELATIONS if rho >= best.rho]
+        return max((best, *(trial for trial in slow if criterion(trial) < least)), key=slowness)
 
     @cached_property
     def _runs(self) -> npt.NDArray[np.int64]:
@@ -216,13 +229,19 @@ class NoiseDesign:
         return readings.reshape(runs, touches, -1), numbers[:, rows.count :]
 
     def _resemblance(self, readings: Array) -> float:
-        """The sum of products of neighbours, less what the fit alone makes of white noise, in standard deviations."""
+        """The sum of products of neighbours, and of all readings up to ``FAR`` apart, less what the fit alone makes of
+        white noise, in standard deviations; the larger of the two."""
         own = self._own[0].reshape(*self._weighted.shape, self.rows.numbers, -1)
         number = self._share * (int(self._weighted.sum()) * self.rows.numbers - float(np.sum(own**2)))
         variance = max(float(np.sum(readings**2)) / max(number, 1.0), 1e-300)
-        product = float(np.sum(readings[:, 1:] * readings[:, :-1])) / variance
-        expected = -self._share * float(np.sum(own[:, 1:] * own[:, :-1]))
-        return (product - expected) / float(np.sqrt(max(number, 1.0)))
+        lags = np.arange(1, min(FAR, readings.shape[1] - 1) + 1)
+        beyond = [
+            float(np.sum(readings[:, lag:] * readings[:, :-lag])) / variance
+            + self._share * float(np.sum(own[:, lag:] * own[:, :-lag]))
+            for lag in lags
+        ]
+        deviates = np.cumsum(beyond) / np.sqrt(np.maximum(lags * number, 1.0))
+        return float(max(deviates[0], deviates[-1])) if len(lags) else 0.0
 
     def _criterion(self, readings: Array, rest: Array, correlation: Correlation) -> float:
         """Minus twice the logarithm of the restricted likelihood, but for a constant."""
