@@ -57,7 +57,7 @@ NOISES: dict[str, Callable[[np.random.Generator, np.ndarray], np.ndarray]] = {
 }
 
 # Seeds that are weighed together.
-PORTION = 100
+PORTION = 50
 
 
 @dataclass
