@@ -6,6 +6,8 @@ A driver is one small class like a shape. Another one is one more file of ``driv
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import Protocol
 
 from monitor.effects.context import Context
@@ -56,3 +58,19 @@ class HeatDriver(DescribedDriver):
 
     def explanation(self, error: JointError) -> Explanation | None:
         return error.explanation_of_heat()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SettlingDriver(HeatDriver, ABC):
+    """A driver with a time constant in s, which is searched where it is None."""
+
+    time_constant_s: float | None = None
+
+    @property
+    def settled(self) -> str:
+        """The name of what remains of the driver where it settles at once; empty where no driver remains."""
+        return ""
+
+    @abstractmethod
+    def columns(self, context: Context, joint: int | None) -> Array:
+        """Return the multipliers (n, m) at every probing."""

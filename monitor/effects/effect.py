@@ -16,7 +16,7 @@ import numpy as np
 from monitor.effects.artefact import HEADS, ArtefactChange, parse_artefact
 from monitor.effects.context import Context
 from monitor.effects.driver import Driver
-from monitor.effects.drivers import Always, WarmUp, parse_driver
+from monitor.effects.drivers import Always, SettlingDriver, parse_driver
 from monitor.effects.joint_error import JointError
 from monitor.effects.shape import DescribedShape, Shape
 from monitor.effects.shapes import Compliance, Const, Nodes, Poly, parse_shape
@@ -277,5 +277,6 @@ def _split_driver(text: str) -> tuple[str, str]:
 
 
 def with_time_constant(effect: ParsedEffect, seconds: float) -> ParsedEffect:
-    """Return the effect with the time constant of its warm-up fixed; its text keeps ``@warmup``."""
-    return replace(effect, driver=WarmUp(seconds))
+    """Return the effect with the time constant of its driver fixed; its text keeps ``@warmup``."""
+    assert isinstance(effect.driver, SettlingDriver)
+    return replace(effect, driver=replace(effect.driver, time_constant_s=seconds))

@@ -6,8 +6,10 @@ A campaign without noise is made and fitted once for every number of runs; then 
 residual, the base parameters are taken out again (they are linear to parts in a million at these sizes), and the scan
 of the catalogue is asked as ``explain`` asks it, under the correlation of neighbours that the noise itself shows.
 What is left out of ``explain`` can add no effect of the catalogue, only free shapes; those are counted by
-``trial_unknown.py``. Seeds go round over all kinds until ``--seconds`` of processor time are used.
-Stopped early, it prints what it has, with exact (Clopper-Pearson) intervals.
+``trial_unknown.py``. Campaigns whose noise shows the same correlation are weighed together; where no candidate passes
+the first control of the false discovery rate the scan ends there, and is not asked (it cannot name anything).
+Portions of seeds go round over all kinds until ``--seconds`` of processor time are used. Stopped early, it prints what
+it has, with exact (Clopper-Pearson) intervals.
 """
 
 from __future__ import annotations
@@ -18,8 +20,8 @@ import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,11 +34,13 @@ from monitor.discovery.machine.acceptance import ChainAcceptance
 from monitor.discovery.machine.correlation import Correlation
 from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.fit import Fit, fit
-from monitor.discovery.machine.scene import ChainScene, scene_of
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.surroundings import surroundings_of
+from monitor.discovery.search.evidence import Pool, best_of_families, weigh_beside
 from monitor.discovery.search.scan import scan
 from monitor.methods.chain.least_squares import eliminate, project_out
 from monitor.methods.samba.method import problem_of
+from monitor.statistics import control_false_discoveries
 
 ROOT = Path(__file__).resolve().parents[2]
 virtual_campaigns = load("virtual_campaigns", ROOT / "tests" / "discovery" / "virtual.py")
@@ -52,17 +56,16 @@ NOISES: dict[str, Callable[[np.random.Generator, np.ndarray], np.ndarray]] = {
     "rounded to 1 µm": lambda rng, run: rng.standard_normal((len(run), 3)),
 }
 
-# Scenes are remembered up to so many probings together: 100 MB a plan.
-MOST_ROWS = 4_000
+# Seeds that are weighed together.
+PORTION = 50
 
 
 @dataclass
 class Plan:
-    """A campaign without noise, fitted, and its scene under every correlation that came up."""
+    """A campaign without noise, fitted."""
 
     days: int
     each: int
-    scenes: dict[Correlation | None, ChainScene] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         campaign, _ = virtual_campaigns.virtual(
@@ -92,41 +95,55 @@ class Plan:
         last = replace(self.fit.solution.last, residual=residual)
         return replace(self.fit, solution=replace(self.fit.solution, last=last))
 
-    def scene(self, noisy: Fit, correlation: Correlation | None) -> ChainScene:
-        """What the scan sees of it under a correlation; the candidates' columns do not depend on the noise."""
-        if correlation not in self.scenes:
-            while len(self.scenes) * len(self.run) > MOST_ROWS:
-                del self.scenes[next(iter(self.scenes))]
-            self.scenes[correlation] = scene_of(self.fit.with_correlation(correlation), self.variants)
-        known = self.scenes[correlation]
-        whitened = replace(noisy, whitening=known.fit.whitening)
-        whitened.__dict__["nuisance"] = known.fit.nuisance
-        return ChainScene(whitened, known.shared, known.candidates, known.refused)
+    def effects(self, noises: Sequence[np.ndarray], rate: float = 0.01) -> list[list[str]]:
+        """The effects that the scan names in campaigns with each of the noises."""
+        groups: dict[Correlation | None, list[int]] = {}
+        fits = [self.noisy(noise) for noise in noises]
+        for index, noisy in enumerate(fits):
+            design = self.fit.noise_design
+            groups.setdefault(design.correlation(noisy.solution.last.residual), []).append(index)
+        named: list[list[str]] = [[] for _ in noises]
+        for correlation, members in groups.items():
+            scene = scene_of(self.fit.with_correlation(correlation), self.variants)
+            pool = Pool(tuple(candidate for candidate in scene.candidates if candidate.visible))
+            for index in members:
+                whitened = replace(fits[index], whitening=scene.fit.whitening)
+                whitened.__dict__["nuisance"] = scene.fit.nuisance
+                whitened.__dict__["by_error"] = self.fit.by_error
+                seen = ChainScene(whitened, scene.shared, scene.candidates, scene.refused)
+                if not self.begins(seen, pool, rate):
+                    continue
+                result = scan(seen, ChainAcceptance(seen, self.drivers, rate), rate=rate)
+                named[index] = [finding.candidate.family for finding in result.findings]
+        return named
 
-    def effects(self, noise: np.ndarray, rate: float = 0.01) -> list[str]:
-        """The effects that the scan names."""
-        noisy = self.noisy(noise)
-        noisy.__dict__["by_error"] = self.fit.by_error
-        scene = self.scene(noisy, noisy.correlation())
-        result = scan(scene, ChainAcceptance(scene, self.drivers, rate), rate=rate)
-        return [finding.candidate.family for finding in result.findings]
+    @staticmethod
+    def begins(scene: ChainScene, pool: Pool[ChainCandidate], rate: float) -> bool:
+        """Whether some candidate passes the first control of a scan."""
+        weighed = best_of_families(weigh_beside(scene, pool, []))
+        p_values = [evidence.p_value for evidence in weighed]
+        return bool(control_false_discoveries(p_values, rate=rate).q_value.min() <= rate)
 
 
 def campaigns(options: argparse.Namespace) -> Iterator[tuple[int, str, list[str]]]:
-    """Runs, noise and named effects of one empty campaign after another."""
+    """Runs, noise and named effects of empty campaigns."""
     begin = time.process_time()
     plans = {count: Plan(*unknown.PLANS[count]) for count in options.runs}
-    for seed in range(options.seeds):
+    for first in range(0, options.seeds, PORTION):
         for count, plan in plans.items():
-            for name, noise in NOISES.items():
-                if options.only not in name:
-                    continue
-                if time.process_time() - begin > options.seconds:
-                    return
-                sizes = 1e-3 * noise(np.random.default_rng((30000 + seed, count)), plan.run)
+            if time.process_time() - begin > options.seconds:
+                return
+            names = [name for name in NOISES if options.only in name]
+            kinds = [name for _ in range(first, min(first + PORTION, options.seeds)) for name in names]
+            noises = []
+            for index, name in enumerate(kinds):
+                rng = np.random.default_rng((30000 + first + index // len(names), count))
+                sizes = 1e-3 * NOISES[name](rng, plan.run)
                 if name.startswith("rounded"):
                     sizes = np.round(plan.readings + sizes, 3) - plan.readings
-                yield count, name, plan.effects(sizes)
+                noises.append(sizes)
+            for name, effects in zip(kinds, plan.effects(noises), strict=True):
+                yield count, name, effects
 
 
 def main() -> None:
@@ -144,6 +161,7 @@ def main() -> None:
         for count, name, effects in campaigns(options):
             tried[count, name] += 1
             if effects:
+                print(f"{count} runs, {name}: {' + '.join(effects)}", file=sys.stderr, flush=True)
                 false[count, name] += 1
                 named.setdefault((count, name), []).append(effects[0])
     print("| noise | runs | false effects | named |")

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from monitor.discovery import explain, fit
-from monitor.discovery.machine.explain import _variants as variants_of_campaign
+from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.methods.samba.method import problem_of

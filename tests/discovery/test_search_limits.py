@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 from by_path import simulator
 
-from monitor.discovery import fit
+from monitor.discovery import explain, fit
 from monitor.discovery.machine.correlation import Correlation, caution
 from monitor.discovery.machine.explain import Limit, _Noise
 from monitor.discovery.machine.refine import refine_all
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.variants import part_of_period, variants_of
+from monitor.discovery.search.candidate import Candidate, Variant
+from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.remainder import Remainders
 from monitor.discovery.search.sign_flips import effective_number
 from monitor.effects import parse_effect
+from monitor.methods.chain.least_squares import COMMON_RANK_TOLERANCE, _common_step
 from monitor.methods.samba.method import problem_of
 from monitor.workflow.explain.machine_sentences import LIMITS
 
@@ -128,3 +131,40 @@ def test_correlations_that_go_round_in_a_circle_end_at_the_most_cautious():
 
 def test_every_end_of_a_search_is_said():
     assert set(LIMITS) == set(Limit)
+
+
+def test_a_part_of_a_turn_names_a_slope_as_rival(virtual_campaigns):
+    hidden = simulator().Effect("EBB:harmonic1", peak_um=4.0)
+    campaign, _ = virtual_campaigns.virtual(
+        3,
+        [hidden],
+        days=2,
+        runs_per_day=4,
+        keep=lambda told: (told["readings"]["B"] >= -60.0) & (told["readings"]["B"] <= 30.0),
+    )
+    answer = explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(3))
+    leader = answer.missing[0]
+    assert (leader.effect, leader.travelled_periods) == ("EBB:harmonic1", pytest.approx(0.25))
+    assert "EBB:poly1" in {rival.effect for rival in leader.rivals}
+
+
+def test_a_combination_that_only_products_of_errors_determine_is_held():
+    """A candidate of which another effect and the runs' own unknowns leave less than the fit's limit is no finding,
+    however much of the residual lies there; a little more is one."""
+    rng = np.random.default_rng(5)
+    directions, _ = np.linalg.qr(rng.standard_normal((60, 3)))
+    whole, selected, apart = 1.0, directions[:, [0]], directions[:, 1]
+    residual = 5.0 * apart + 0.1 * directions[:, 2] + 0.01 * rng.standard_normal(60)
+    # Of the whole effect (length 1) the runs' own unknowns leave a hundredth, the selected effect this much of it.
+    for left, determined in ((0.5 * COMMON_RANK_TOLERANCE, False), (2.0 * COMMON_RANK_TOLERANCE, True)):
+        column = 0.01 * whole * directions[:, 0] + left * apart
+        candidate = Candidate(Variant("EXX:poly2", None), column[:, None], 0.01, np.inf)
+        (evidence,) = weigh([candidate], residual, selected, 59)
+        assert (evidence.rank == 1) == determined
+        assert (evidence.p_value < 1e-6) == determined
+        # The fit decides likewise.
+        remainder = np.column_stack([selected, column])[None]
+        before = np.column_stack([selected, column + np.sqrt(whole - column @ column) * directions[:, 2]])[
+            None
+        ]
+        assert np.all(_common_step(remainder, before, residual[None]).free) == determined

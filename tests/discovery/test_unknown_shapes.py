@@ -5,17 +5,24 @@ All families are in tests/benchmarks/trial_unknown.py; here three of them.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 from by_path import load, simulator
 
 from monitor.discovery import explain, fit
+from monitor.discovery.machine.acceptance import ChainAcceptance
+from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.fit import fit_those_possible
 from monitor.discovery.machine.held_out import held_out_by_poses, pose_folds
+from monitor.discovery.machine.scene import scene_of
+from monitor.discovery.machine.surroundings import surroundings_of
+from monitor.discovery.search.candidate import Variant
 from monitor.effects import parse_effect
-from monitor.effects.shapes.free import way_since_reversal
+from monitor.effects.shapes.free import Free, way_since_reversal
 from monitor.exceptions import DataError
 from monitor.methods.model import Model
 from monitor.methods.samba.method import problem_of
@@ -136,3 +143,68 @@ def test_a_warm_up_of_two_time_constants_is_told_although_few_runs_show_it(
     campaign, _ = virtual_campaigns.virtual(0, [hidden], days=2, runs_per_day=4)
     (found,) = explained(campaign).missing
     assert found.effect.partition(":")[0] in right
+
+
+def test_a_bump_that_another_error_mimics_in_part_is_the_error_of_its_axis(
+    virtual_campaigns, trial, explained
+):
+    """A small cycle of another axis stood the scan first, and everything else lay within that axis in any shape."""
+    _, effect, curve = trial.FAMILIES["wear bump"]
+    hidden = simulator().Effect(effect, peak_um=8.0, curve=curve)
+    campaign, _ = virtual_campaigns.virtual(1, [hidden], days=2, runs_per_day=4)
+    (found,) = explained(campaign).missing
+    assert found.effect.partition(":")[0] == "EYX"
+
+
+def test_a_part_that_follows_a_temperature_late_has_its_time_constant(virtual_campaigns, trial, explained):
+    _, effect, curve = trial.FAMILIES["lag behind a temperature"]
+    hidden = simulator().Effect(effect, peak_um=8.0, curve=curve)
+    campaign, _ = virtual_campaigns.virtual(3, [hidden], days=2, runs_per_day=4)
+    (found,) = explained(campaign).missing
+    assert found.effect == "EXX:poly1@lagged_x_axis_degC"
+    assert found.searched.value == pytest.approx(25.0, abs=3.0 * found.searched.u)
+
+
+def test_what_lies_within_the_shape_of_a_named_error_is_said_not_separable(virtual_campaigns, trial):
+    """Beside the nearest entry of the catalogue effects of other errors stand out; beside all that the named error
+    could do in any shape, by numpy's least squares, they do not."""
+    _, effect, curve = trial.FAMILIES["wear bump"]
+    hidden = simulator().Effect(effect, peak_um=5.0, curve=curve)
+    campaign, _ = virtual_campaigns.virtual(1, [hidden], days=2, runs_per_day=2)
+    problem = problem_of(campaign).for_search()
+    drivers = surroundings_of(campaign, problem).drivers
+    scene = scene_of(fit(problem), variants_of_campaign(campaign, problem, drivers))
+    by_name = {candidate.family: candidate for candidate in scene.candidates}
+    (names,) = ChainAcceptance(scene, drivers, 0.01).within_shapes([by_name["EYX:poly2"]])
+    assert all(not name.startswith("EYX") for name in names)
+    # Those of which one variant is looked at.
+    names = tuple(name for name in names if by_name[name].variant.tries == 1)
+    assert names
+    named = parse_effect("EYX:poly2", problem.context.chain)
+    any_shape = scene_of(scene.fit, [Variant("EYX:free", replace(named, shape=Free(), shape_text="free"))])
+
+    def p_value(name: str, *others: np.ndarray) -> float:
+        beside = np.column_stack(others)
+        beside = beside[:, np.any(beside, axis=0)] / np.linalg.norm(beside[:, np.any(beside, axis=0)], axis=0)
+        own = by_name[name].columns / np.linalg.norm(by_name[name].columns, axis=0)
+        squares = [
+            float(np.sum((scene.residual - x @ np.linalg.lstsq(x, scene.residual, rcond=1e-4)[0]) ** 2))
+            for x in (beside, np.column_stack([beside, own]))
+        ]
+        number = own.shape[1]
+        freedom = scene.degrees_of_freedom - np.linalg.matrix_rank(beside, tol=1e-4) - number
+        f = (squares[0] - squares[1]) / number / (squares[1] / freedom)
+        return float(scipy.stats.f.sf(f, number, freedom)) * by_name[name].variant.odds
+
+    families = len({candidate.family for candidate in scene.candidates if candidate.visible})
+    for name in names:
+        assert p_value(name, by_name["EYX:poly2"].columns) * families < 0.01
+        assert p_value(name, by_name["EYX:poly2"].columns, any_shape.candidates[0].columns) * families > 0.01
+    # What its shape cannot do is named for itself, and a shape that is right has nothing within.
+    right = simulator().Effect("EYX:poly2", peak_um=5.0)
+    campaign, _ = virtual_campaigns.virtual(1, [right], days=2, runs_per_day=2)
+    assert all(effect.within_its_shape == () for effect in _explained(campaign))
+
+
+def _explained(campaign):
+    return explain(campaign, problem_of(campaign), "samba", rng=np.random.default_rng(1)).missing

@@ -8,6 +8,7 @@ from datetime import datetime, timedelta, timezone
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from monitor.effects import Context, context_of, parse_effect, positions_of, with_time_constant
 from monitor.exceptions import DataError, EffectError
@@ -80,6 +81,41 @@ def test_warmup_counts_from_the_first_run_of_each_day() -> None:
     context = context_of(campaign, parse_topology(HU40))
     expected = [10, 110, 210, 3610, 3710, 3810, 10, 110, 210, 7210, 7310, 7410]
     np.testing.assert_allclose(context.day_time, expected, rtol=0, atol=1e-9)
+
+
+def test_a_lagged_temperature_solves_its_differential_equation() -> None:
+    """tau dy/dt = T - y with straight lines between the readings, against an integration of scipy's; each day begins
+    settled."""
+    context = context_of(small_campaign(), parse_topology(HU40))
+    lagged = columns("EXX:const@lagged5min_x_axis_degC", context).ravel()
+    temperature = columns("EXX:const@x_axis_degC", context).ravel()
+    for day in (slice(0, 6), slice(6, 12)):
+        time, recorded = context.day_time[day], temperature[day]
+        solved = solve_ivp(
+            lambda t, y, time=time, recorded=recorded: (np.interp(t, time, recorded) - y) / 300.0,
+            (time[0], time[-1]),
+            recorded[:1],
+            t_eval=time,
+            rtol=1e-9,
+            atol=1e-10,
+            max_step=20.0,
+        )
+        np.testing.assert_allclose(lagged[day], solved.y[0], atol=1e-7)
+    at_once = columns("EXX:const@lagged0.001min_x_axis_degC", context).ravel()
+    np.testing.assert_allclose(at_once, temperature, atol=1e-2)
+
+
+def test_a_lagged_temperature_has_a_time_constant_like_a_warm_up() -> None:
+    context = context_of(small_campaign(), parse_topology(HU40))
+    searched = parse_effect("EXX:poly1@lagged_x_axis_degC", context.chain)
+    fixed = with_time_constant(searched, 300.0)
+    assert fixed.text == "EXX:poly1@lagged_x_axis_degC"
+    known = parse_effect("EXX:poly1@lagged5min_x_axis_degC", context.chain)
+    np.testing.assert_array_equal(fixed.basis(context).columns, known.basis(context).columns)  # type: ignore[union-attr]
+    with pytest.raises(EffectError, match=re.escape("must be above 0 min; without one: @x_axis_degC")):
+        parse_effect("EXX:poly1@lagged0min_x_axis_degC", context.chain)
+    with pytest.raises(EffectError, match="no channel 'y_axis_degC'; this campaign has"):
+        parse_effect("EXX:poly1@lagged_y_axis_degC", context.chain).basis(context)
 
 
 def test_run_time_goes_from_zero_to_one_in_every_run() -> None:

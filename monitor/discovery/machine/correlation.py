@@ -8,8 +8,8 @@ independent.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +26,13 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1)
 MOST_RUNS = 5
 # Neighbours that resemble each other by less than so many standard deviations of white noise are white.
 NOTICED = 1.5
-# Twice the logarithm of the likelihood ratio from which on noise is correlated: 5 % of white campaigns with two
+# A slow drift under independent noise shows in readings so far apart.
+FAR = 8
+# Twice the logarithm of the likelihood ratio from which on noise is correlated: 10 % of white campaigns with two
 # parameters. Taking white noise for hardly correlated noise costs next to nothing.
-LIKELIER = 6.0
+LIKELIER = 4.6
+# Directions of which a filter leaves less than this part (squared) are unknown to it.
+SMALLEST_EIGENVALUE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,11 @@ class Correlation:
 
     rho: float
     share: float
+
+
+def slowness(correlation: Correlation) -> float:
+    """What a correlation adds to the variance of the mean of many neighbours, as a multiple of that of white noise."""
+    return correlation.share * 2.0 * correlation.rho / (1.0 - correlation.rho)
 
 
 def caution(correlation: Correlation | None) -> tuple[float, float]:
@@ -141,75 +150,124 @@ def deviations(residual: Array, rows: Rows, cells: npt.NDArray[np.int64]) -> Arr
     return result
 
 
-def estimate(residual: Array, basis: Array, rows: Rows) -> Correlation | None:
-    """The correlation of residuals (R, N), whose own unknowns span ``basis`` (R, N, p); None where they are white.
+@dataclass(frozen=True)
+class _White:
+    """What one correlation makes of a plan: the ``triangle`` (R, T, T), the span of what is unknown (R, N, p) less the
+    correlation, its decomposition (R, p), (R, p, p), and the part of the criterion that no residual changes."""
 
-    ``residual`` are ``deviations``: the means over the runs take their part of the degrees of freedom.
-    """
-    runs = np.unique(np.linspace(0, len(residual) - 1, min(len(residual), MOST_RUNS)).astype(np.int64))
-    likelihood = _likelihood(
-        residual[runs],
-        basis[runs],
-        Rows(rows.weighted[runs], rows.numbers, None if rows.turned is None else rows.turned[runs]),
-        (len(residual) - 1) / len(residual) if len(residual) > 1 else 1.0,
-    )
-    if likelihood.resemblance() < NOTICED:
-        return None
-    best = min((Correlation(rho, 1.0) for rho in CORRELATIONS), key=likelihood.criterion)
-    # The more independent noise, the more alike has the rest to be.
-    start = CORRELATIONS.index(best.rho)
-    trials = [Correlation(rho, share) for share in SHARES for rho in CORRELATIONS[max(start - 1, 0) :: 2][:4]]
-    best = min((best, *trials), key=likelihood.criterion)
-    gain = likelihood.criterion(Correlation(0.0, 0.0)) - likelihood.criterion(best)
-    return best if gain > LIKELIER else None
+    triangle: Array
+    own: Array
+    values: Array
+    vectors: Array
+    logarithm: float
 
 
 @dataclass(frozen=True)
-class _Likelihood:
-    """The restricted likelihood of noise: ``readings`` (R, T, d (p + 1)) are the residuals and then the span of each
-    run's own unknowns, ``rest`` (R, e, p + 1) the same of what is no reading."""
+class NoiseDesign:
+    """What the estimate of a correlation needs besides residuals: the ``rows`` with the ``cells`` (R, T) of the plan,
+    and an orthonormal ``basis`` (R, N, p) of what is unknown in every run."""
 
-    readings: Array
-    rest: Array
     rows: Rows
-    share: float
+    cells: npt.NDArray[np.int64]
+    basis: Array
 
-    def resemblance(self) -> float:
-        """The sum of products of neighbours, less what the fit alone makes of white noise, in standard deviations."""
-        numbers = self.rows.numbers
-        parts = self.readings.reshape(*self.rows.weighted.shape, numbers, -1)
-        residual, effect_columns = parts[..., 0], parts[..., 1:]
-        number = self.share * (int(self.rows.weighted.sum()) * numbers - float(np.sum(effect_columns**2)))
-        variance = max(float(np.sum(residual**2)) / max(number, 1.0), 1e-300)
-        product = float(np.sum(residual[:, 1:] * residual[:, :-1])) / variance
-        expected = -self.share * float(np.sum(effect_columns[:, 1:] * effect_columns[:, :-1]))
-        return (product - expected) / float(np.sqrt(max(number, 1.0)))
+    def correlation(self, residual: Array) -> Correlation | None:
+        """The correlation of residuals (R, N); None where they are white.
 
-    def criterion(self, correlation: Correlation) -> float:
+        Of several runs only what they do not share counts; their means take their part of the degrees of freedom.
+        """
+        readings, rest = self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
+        if self._resemblance(readings) < NOTICED:
+            return None
+        criterion = partial(self._criterion, readings, rest)
+        best = min((Correlation(rho, 1.0) for rho in CORRELATIONS), key=criterion)
+        # The more independent noise, the more alike has the rest to be.
+        start = CORRELATIONS.index(best.rho)
+        trials = [
+            Correlation(rho, share) for share in SHARES for rho in CORRELATIONS[max(start - 1, 0) :: 2][:4]
+        ]
+        best = min((best, *trials), key=criterion)
+        least = criterion(best)
+        if criterion(Correlation(0.0, 0.0)) - least <= LIKELIER:
+            return None
+        # A slow drift under much independent noise: far readings resemble each other as much as neighbours, hardly.
+        # Of the slow correlations that are likelier still the slowest counts: a drift that is taken for white noise
+        # makes an effect.
+        slow = [Correlation(rho, share) for share in SHARES for rho in CORRELATIONS if rho >= best.rho]
+        return max((best, *(trial for trial in slow if criterion(trial) < least)), key=slowness)
+
+    @cached_property
+    def _runs(self) -> npt.NDArray[np.int64]:
+        runs = len(self.basis)
+        return np.unique(np.linspace(0, runs - 1, min(runs, MOST_RUNS)).astype(np.int64))
+
+    @cached_property
+    def _weighted(self) -> npt.NDArray[np.bool_]:
+        return np.asarray(self.rows.weighted[self._runs])
+
+    @cached_property
+    def _own(self) -> tuple[Array, Array]:
+        return self._parts(self.basis[self._runs])
+
+    @cached_property
+    def _share(self) -> float:
+        """The part of the degrees of freedom that the means over the runs leave."""
+        return (len(self.basis) - 1) / len(self.basis) if len(self.basis) > 1 else 1.0
+
+    @cached_property
+    def _whites(self) -> dict[Correlation, _White]:
+        return {}
+
+    def _parts(self, numbers: Array) -> tuple[Array, Array]:
+        """Columns (R, N, k) as readings (R, T, d k) in their own directions, and what is no reading (R, e, k)."""
+        rows = self.rows
+        runs, touches = self._weighted.shape
+        readings = numbers[:, : rows.count].reshape(runs, touches, rows.numbers, -1)
+        if rows.turned is not None:
+            readings = rows.turned[self._runs] @ readings
+        readings = np.where(self._weighted[..., None, None], readings, 0.0)
+        return readings.reshape(runs, touches, -1), numbers[:, rows.count :]
+
+    def _resemblance(self, readings: Array) -> float:
+        """The sum of products of neighbours, and of all readings up to ``FAR`` apart, less what the fit alone makes of
+        white noise, in standard deviations; the larger of the two."""
+        own = self._own[0].reshape(*self._weighted.shape, self.rows.numbers, -1)
+        number = self._share * (int(self._weighted.sum()) * self.rows.numbers - float(np.sum(own**2)))
+        variance = max(float(np.sum(readings**2)) / max(number, 1.0), 1e-300)
+        lags = np.arange(1, min(FAR, readings.shape[1] - 1) + 1)
+        beyond = [
+            float(np.sum(readings[:, lag:] * readings[:, :-lag])) / variance
+            + self._share * float(np.sum(own[:, lag:] * own[:, :-lag]))
+            for lag in lags
+        ]
+        deviates = np.cumsum(beyond) / np.sqrt(np.maximum(lags * number, 1.0))
+        return float(max(deviates[0], deviates[-1])) if len(lags) else 0.0
+
+    def _criterion(self, readings: Array, rest: Array, correlation: Correlation) -> float:
         """Minus twice the logarithm of the restricted likelihood, but for a constant."""
-        triangle, determinant = Whitening(replace(self.rows, turned=None), correlation).factors
-        runs, touches = self.rows.weighted.shape
-        white = (triangle @ self.readings).reshape(runs, touches * self.rows.numbers, -1)
-        white = np.concatenate([white, self.rest], axis=1)
-        residual, effect_columns = white[..., 0], white[..., 1:]
-        values, vectors = np.linalg.eigh(np.swapaxes(effect_columns, 1, 2) @ effect_columns)
-        able = values > 1e-9
-        onto = np.einsum("rij,ri->rj", vectors, np.einsum("rnp,rn->rp", effect_columns, residual))
+        if correlation not in self._whites:
+            self._whites[correlation] = self._white(correlation)
+        white = self._whites[correlation]
+        residual = _flat(white.triangle @ readings, rest, self.rows.numbers)[..., 0]
+        able = white.values > SMALLEST_EIGENVALUE
+        onto = np.einsum("rij,ri->rj", white.vectors, np.einsum("rnp,rn->rp", white.own, residual))
         squares = float(
-            np.sum(residual**2) - np.sum(np.where(able, onto**2 / np.where(able, values, 1.0), 0.0))
+            np.sum(residual**2) - np.sum(np.where(able, onto**2 / np.where(able, white.values, 1.0), 0.0))
         )
+        number = self._share * (int(self._weighted.sum()) * self.rows.numbers - int(able.sum()))
+        return self._share * white.logarithm + number * float(np.log(max(squares, 1e-300)))
+
+    def _white(self, correlation: Correlation) -> _White:
+        plain = Rows(self._weighted, self.rows.numbers, None)
+        triangle, determinant = Whitening(plain, correlation).factors
+        own = _flat(triangle @ self._own[0], self._own[1], self.rows.numbers)
+        values, vectors = np.linalg.eigh(np.swapaxes(own, 1, 2) @ own)
+        able = values > SMALLEST_EIGENVALUE
         logarithm = float(determinant.sum() + np.sum(np.log(np.where(able, values, 1.0))))
-        number = self.share * (int(self.rows.weighted.sum()) * self.rows.numbers - int(able.sum()))
-        return self.share * logarithm + number * float(np.log(max(squares, 1e-300)))
+        return _White(triangle, own, values, vectors, logarithm)
 
 
-def _likelihood(residual: Array, basis: Array, rows: Rows, share: float) -> _Likelihood:
-    """The likelihood of residuals (R, N) whose own unknowns span ``basis`` (R, N, p), in the directions of the
-    readings."""
-    numbers = np.concatenate([residual[..., None], basis], axis=2)
-    runs, touches = rows.weighted.shape
-    readings = numbers[:, : rows.count].reshape(runs, touches, rows.numbers, -1)
-    if rows.turned is not None:
-        readings = rows.turned @ readings
-    readings = np.where(rows.weighted[..., None, None], readings, 0.0)
-    return _Likelihood(readings.reshape(runs, touches, -1), numbers[:, rows.count :], rows, share)
+def _flat(readings: Array, rest: Array, numbers: int) -> Array:
+    """Readings (R, T, d k) and what is no reading (R, e, k), one after the other (R, N, k)."""
+    runs, touches = readings.shape[:2]
+    return np.concatenate([readings.reshape(runs, touches * numbers, -1), rest], axis=1)

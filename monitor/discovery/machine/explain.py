@@ -35,6 +35,7 @@ from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.machine.variants import (
     cycles_of_unknown_pitch,
     resolvable,
+    that_lag,
     variants_of,
     without_part_periods,
 )
@@ -122,6 +123,7 @@ def variants_of_campaign(
     effects = catalogue(chain, texts, drivers, pitches, problem.method_effects(drivers))
     shown = filter(problem.can_show, effects)
     variants = [variant for effect in shown for variant in variants_of(effect)]
+    variants += that_lag([variant.effect for variant in variants], problem.context)
     if problem.needs_whole_periods:
         variants = without_part_periods(variants, problem.context)
     return [*variants, *resolvable(cycles_of_unknown_pitch(chain), problem.context)]

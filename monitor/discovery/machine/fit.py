@@ -11,9 +11,8 @@ import numpy.typing as npt
 
 from monitor.discovery.machine.correlation import (
     Correlation,
+    NoiseDesign,
     Whitening,
-    deviations,
-    estimate,
     rows_of,
     turned_into_readings,
 )
@@ -118,15 +117,20 @@ class Fit:
 
         Of several runs only what they do not share counts: an effect that the model lacks makes neighbours alike too.
         """
+        return self.noise_design.correlation(self.solution.last.residual)
+
+    @cached_property
+    def noise_design(self) -> NoiseDesign:
+        """What the estimate of that correlation needs besides the residuals."""
         rows = rows_of(self.problem)
         cells = self.problem.padded(plan_cells(self.problem)[:, None, None].astype(np.float64) + 1.0).reshape(
             rows.weighted.shape
         )
         rows = replace(rows, turned=turned_into_readings(self.problem, self.by_error))
         last = self.solution.last
-        residual = deviations(last.residual, rows, cells.astype(np.int64) - 1)
-        unknowns = last.local if len(residual) > 1 else np.concatenate([last.local, last.common], axis=2)
-        return estimate(residual, eliminate(unknowns).basis, rows)
+        several = len(last.residual) > 1
+        unknowns = last.local if several else np.concatenate([last.local, last.common], axis=2)
+        return NoiseDesign(rows, cells.astype(np.int64) - 1, eliminate(unknowns).basis)
 
     def with_correlation(self, correlation: Correlation | None) -> Fit:
         """The fit with the noise of neighbours correlated as said."""

@@ -12,13 +12,14 @@ from monitor.discovery.machine.gears import STEP as ORDER_STEP
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.variants import TIME_CONSTANTS_S, with_drivers
 from monitor.discovery.search.amplitudes import amplitudes
+from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.missing import Searched
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.effects import ChainEffect, Context, with_time_constant
 from monitor.effects.catalogue import SCREW_LEADS_MM
-from monitor.effects.drivers import WarmUp
+from monitor.effects.drivers import SettlingDriver, parse_driver
 from monitor.effects.shapes import Cyclic, Harmonic
 from monitor.records import Array
 
@@ -65,7 +66,7 @@ def _range_of(candidate: ChainCandidate) -> _Range | None:
     effect, family, variant = candidate.effect, candidate.family, candidate.variant
     if variant.tries == 1:
         return None
-    if isinstance(effect.driver, WarmUp) and effect.driver.time_constant_s is not None:
+    if isinstance(effect.driver, SettlingDriver) and effect.driver.time_constant_s is not None:
         return _Range(
             "time constant",
             "min",
@@ -154,8 +155,8 @@ def refine(scene: ChainScene, selected: Sequence[ChainCandidate], index: int) ->
     if likely is not None and abs(likely - value) < 2.0 * u:
         value, refined = likely, at(likely)
     if searched.unit == "min" and 60.0 * value < SETTLED_READINGS * _between_readings(scene):
-        # It has settled before the second reading: the plain effect.
-        return Refined(at_rest(scene, candidate), None, np.zeros((len(scene.residual), 0)))
+        # It has settled before the second reading: what it follows at once.
+        return Refined(_settled(scene, candidate), None, np.zeros((len(scene.residual), 0)))
     if searched.unit == "min" and counts_readings(scene.fit.problem.context):
         return Refined(refined, None, slope)
     return Refined(refined, Searched(searched.name, value, u if u < value else None, searched.unit), slope)
@@ -204,6 +205,15 @@ def at_rest(scene: ChainScene, candidate: ChainCandidate) -> ChainCandidate:
     """A candidate that follows a driver, without it."""
     (bare,) = with_drivers(candidate.effect, ()) or [candidate.variant]
     return scene_of(scene.fit, [bare]).candidates[0]
+
+
+def _settled(scene: ChainScene, candidate: ChainCandidate) -> ChainCandidate:
+    """A candidate whose driver settles at once: with the channel that it follows, or without a driver."""
+    driver = candidate.effect.driver
+    if isinstance(driver, SettlingDriver) and driver.settled:
+        effect = replace(candidate.effect, driver=parse_driver(driver.settled), driver_text=driver.settled)
+        return scene_of(scene.fit, [Variant(effect.text, effect)]).candidates[0]
+    return at_rest(scene, candidate)
 
 
 def _between_readings(scene: ChainScene) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from monitor.discovery.machine.refine import refine
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
-from monitor.discovery.machine.variants import with_drivers
+from monitor.discovery.machine.variants import bends_of, part_of_period, with_drivers
 from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
 from monitor.discovery.search.projection import without
 from monitor.discovery.search.rivals import coincides
@@ -57,7 +57,10 @@ class RivalSearch:
             if rival.family not in families and np.any(rival.columns) and not _same_cycle(rival, candidate)
         ]
         families |= {rival.family for rival in pool}
-        driven = scene_of(self.scene.fit, with_drivers(candidate.effect, self.drivers)).candidates
+        variants = with_drivers(candidate.effect, self.drivers)
+        if part_of_period(candidate.effect, self.scene.fit.problem.context) is not None:
+            variants += bends_of(candidate.effect)
+        driven = scene_of(self.scene.fit, variants).candidates
         return pool + [rival for rival in driven if rival.family not in families and np.any(rival.columns)]
 
     def _at_best_value(self, index: int, evidence: Evidence[ChainCandidate]) -> Evidence[ChainCandidate]:

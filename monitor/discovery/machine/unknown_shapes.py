@@ -24,6 +24,7 @@ from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.rivals import UNDECIDED
 from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of
+from monitor.discovery.search.scene import family_count
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.drivers import Always
 from monitor.effects.shapes.free import Free
@@ -62,7 +63,7 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
         if free is not None:
             selected = [*others, free]
             scene = _with_candidate(scene, free)
-    if not selected or any(_is_free(shape) for shape in selected):
+    if not selected or any(_is_free(shape) for shape in selected) or _leaves_something(scene, selected):
         alone = _alone(scene, selected)
         if alone is not None:
             selected, scene = [alone], _with_candidate(scene, alone)
@@ -82,6 +83,13 @@ def _lacks_something(scene: ChainScene) -> bool:
     """Whether the runs agree on what the model leaves, although no effect of the catalogue stands out."""
     test, _ = lack_of_fit(scene.fit)
     return test is not None and test.p_value < LACK_OF_FIT_LEVEL
+
+
+def _leaves_something(scene: ChainScene, selected: Sequence[ChainCandidate]) -> bool:
+    """Whether some candidate stands out beside selected effects: a scan that ends so was led astray by one of them."""
+    pool = [candidate for candidate in scene.candidates if candidate.visible]
+    weighed = weigh_beside(scene, pool, selected)
+    return bool(weighed) and weighed[0].p_value * family_count(scene) < LEVEL
 
 
 def _is_free(candidate: ChainCandidate) -> bool:

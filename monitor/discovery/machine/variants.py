@@ -11,9 +11,9 @@ import numpy as np
 from monitor.discovery.machine.scene import ChainVariant, MachineEffect
 from monitor.discovery.search.candidate import Variant
 from monitor.effects import ChainEffect, Context, TurnEffect, parse_effect, with_time_constant
-from monitor.effects.drivers import Always, EachRun, WarmUp, parse_driver
+from monitor.effects.drivers import Always, EachRun, LaggedTemperature, SettlingDriver, parse_driver
 from monitor.effects.drivers.gravity import Gravity
-from monitor.effects.shapes import Compliance, Cyclic, Harmonic
+from monitor.effects.shapes import Compliance, Cyclic, Harmonic, parse_shape
 from monitor.effects.weight import LinkWeights, Load
 from monitor.machine import COMPONENTS, Chain
 from monitor.records import Array
@@ -21,6 +21,8 @@ from monitor.records import Array
 # Warm-up takes from ten minutes (a small spindle) to a shift (a machine bed); neighbours differ by a factor of
 # two, within which exponentials seen over some hours agree to a few per cent.
 TIME_CONSTANTS_S = tuple(600.0 * 2.0**step for step in range(7))
+# A part follows its sensor in ten minutes to some hours; what is slower hardly moves within a shift.
+LAGS_S = TIME_CONSTANTS_S[:5]
 # Pitches searched for an unknown cycle, from fine screw leads up to a third of a small machine's stroke. The
 # grid is even in 1/pitch; its step is half a period over a travel of 400 mm.
 SHORTEST_PITCH_MM, LONGEST_PITCH_MM, FREQUENCY_STEP = 4.0, 130.0, 1.0 / 800.0
@@ -32,6 +34,9 @@ GRID_TOLERANCE_MM, FEWEST_POSITIONS = 0.05, 6
 # leads and the driven one is reported as its rival. 2 log 400 = 12 is what counts as decided.
 ODDS_OF_A_DRIVER = 400.0
 
+
+# Odds against a temperature that is followed late: one that is followed at once does where both do as well.
+ODDS_OF_A_LAG = 20.0
 
 # Odds against what is named beside a finding and never found itself; any evidence of a campaign is smaller.
 NEVER_FOUND = 1e300
@@ -65,12 +70,26 @@ def part_of_period(effect: MachineEffect, context: Context) -> float | None:
     return part if 0.0 < part < WHOLE_PERIOD else None
 
 
+def bends_of(effect: MachineEffect) -> list[ChainVariant]:
+    """What the same error looks like over a part of a period: a slope and bends of any cause, and the weight on it."""
+    if not isinstance(effect, ChainEffect):
+        return []
+    plain = replace(effect, driver=Always(), driver_text="")
+    bends = [replace(plain, shape=parse_shape(text), shape_text=text) for text in ("poly1", "poly2", "poly3")]
+    weight = replace(
+        effect, shape=parse_shape("const"), shape_text="const", driver=Gravity(), driver_text="gravity"
+    )
+    return [Variant(bend.text, bend) for bend in (*bends, weight)]
+
+
 def variants_of(effect: MachineEffect) -> list[ChainVariant]:
     """The effect itself, or one variant for every time constant where it has none of its own."""
-    if isinstance(effect.driver, WarmUp) and effect.driver.time_constant_s is None:
+    if isinstance(effect.driver, SettlingDriver) and effect.driver.time_constant_s is None:
+        late = isinstance(effect.driver, LaggedTemperature)
+        constants = LAGS_S if late else TIME_CONSTANTS_S
+        odds = ODDS_OF_A_LAG if late else 1.0
         return [
-            Variant(effect.text, with_time_constant(effect, tau), len(TIME_CONSTANTS_S))
-            for tau in TIME_CONSTANTS_S
+            Variant(effect.text, with_time_constant(effect, tau), len(constants), odds) for tau in constants
         ]
     odds = 1.0
     if isinstance(effect, ChainEffect) and isinstance(effect.shape, Compliance):
@@ -130,6 +149,25 @@ def _shortest_pitch(positions: Array) -> float:
     multiples = real / step
     on_grid = len(real) == len(steps) and np.all(np.abs(multiples - np.round(multiples)) < 0.02)
     return 2.0 * step if on_grid else 0.0
+
+
+def that_lag(effects: Iterable[MachineEffect], context: Context) -> list[ChainVariant]:
+    """The effects of axes that follow a temperature at once, following it late, where it changes within a run."""
+    variants = []
+    for effect in effects:
+        if isinstance(effect, ChainEffect) and (name := _can_lag(effect.driver_text, context)):
+            driven = replace(effect, driver=parse_driver(name), driver_text=name)
+            variants += variants_of(driven)
+    return variants
+
+
+def _can_lag(driver: str, context: Context) -> str | None:
+    """The driver that follows a temperature late; None for what is none, and for one that changes between runs only."""
+    values = context.columns.get(driver)
+    if values is None or not driver.endswith("_degC") or not np.all(np.isfinite(values)):
+        return None
+    runs = (values[context.run == run] for run in np.unique(context.run))
+    return f"lagged_{driver}" if any(np.ptp(of_run) > 0.0 for of_run in runs) else None
 
 
 def with_drivers(effect: MachineEffect, drivers: Iterable[str]) -> list[ChainVariant]:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from monitor.discovery.search.candidate import Candidate
+from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scene import CandidateT, Scene
 from monitor.records import Array
@@ -103,6 +103,19 @@ class Pool(Generic[CandidateT]):
         return np.array([candidate.variant.odds for candidate in self.candidates])
 
     @cached_property
+    def least(self) -> Array:
+        """The part (squared) of a direction of each candidate from which on it is determined beside others.
+
+        Below it a fit holds the direction: of the whole effect, what is free in every run included, less is left than
+        products of small errors leave.
+        """
+        shares = np.array([candidate.share for candidate in self.candidates])
+        least: Array = np.maximum(
+            (SMALLEST_SHARE / np.maximum(shares, SMALLEST_SHARE)) ** 2, SMALLEST_REMAINDER
+        )
+        return least
+
+    @cached_property
     def largest(self) -> Array:
         """The largest coefficients that are likely."""
         return np.array([candidate.largest for candidate in self.candidates])
@@ -146,7 +159,9 @@ def _weighed(
     large = np.zeros(len(pool.candidates))
     for size, (members, rows) in pool.by_size.items():
         gram = pool.grams[size] - overlap[rows] @ np.swapaxes(overlap[rows], -1, -2)
-        explained[members], rank[members], coefficients = explained_by(gram, onto[rows], total, dof)
+        explained[members], rank[members], coefficients = explained_by(
+            gram, onto[rows], total, dof, pool.least[members]
+        )
         large[members] = np.sqrt(np.sum((coefficients / pool.lengths[rows]) ** 2, axis=-1))
     rank[large > BEYOND * pool.largest] = 0
     weighed = evidence_of(pool, explained, rank, (total, dof), large > pool.largest)
@@ -164,12 +179,13 @@ def weigh_beside(
 
 
 def explained_by(
-    gram: Array, onto: Array, total: float = 0.0, dof: int = 1
+    gram: Array, onto: Array, total: float = 0.0, dof: int = 1, least: Array | None = None
 ) -> tuple[Array, npt.NDArray[np.int64], Array]:
     """Sum of squares (...) that columns with products ``gram`` (..., k, k) explain, their rank (...) and their
-    coefficients (..., k), as far as these stand out from the noise that ``total`` and ``dof`` show."""
+    coefficients (..., k), as far as these stand out from the noise that ``total`` and ``dof`` show. Directions with a
+    part (squared) of at most ``least`` (...) are held."""
     values, vectors = np.linalg.eigh(gram)
-    keep = values > SMALLEST_REMAINDER
+    keep = values > (SMALLEST_REMAINDER if least is None else least[..., None])
     along = np.einsum("...ij,...i->...j", vectors, onto)
     inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
     explained: Array = np.sum(along**2 * inverse, axis=-1)

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.search.candidate import Candidate
-from monitor.discovery.search.evidence import SMALLEST_REMAINDER, Evidence, Pool
+from monitor.discovery.search.evidence import Evidence, Pool
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scene import CandidateT, Scene
 from monitor.records import Array
@@ -85,7 +85,7 @@ def p_value_by_flips(
         part = overlap[rows] / pool.lengths[rows][..., None]
         gram = pool.grams[size] - part @ np.swapaxes(part, -1, -2)
         values, vectors = np.linalg.eigh(gram)
-        keep = values > SMALLEST_REMAINDER
+        keep = values > pool.least[members][:, None]
         price = keep.sum(axis=-1) * np.log(max(dof, 1)) + 2.0 * np.log(
             pool.tries[members] * pool.odds[members]
         )

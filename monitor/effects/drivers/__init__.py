@@ -1,22 +1,33 @@
 """The drivers, one a file; no driver means 1.
 
-``@warmup`` without a time constant has one that is searched; with one (``@warmup45min``) it is fixed. A driver of no
-other name is a recorded channel.
+``@warmup`` without a time constant has one that is searched; with one (``@warmup45min``) it is fixed, and so for
+``@lagged_x_axis_degC``. A driver of no other name is a recorded channel.
 """
 
 from __future__ import annotations
 
-from monitor.effects.driver import Driver
+from monitor.effects.driver import Driver, SettlingDriver
 from monitor.effects.drivers.always import Always
 from monitor.effects.drivers.channel import Channel
 from monitor.effects.drivers.each_run import EachRun
+from monitor.effects.drivers.lagged import LaggedTemperature
 from monitor.effects.drivers.run_time import RunTime
 from monitor.effects.drivers.warmup import WarmUp
 from monitor.effects.registry import parse, plug_in_patterns, plug_ins
 from monitor.exceptions import EffectError, did_you_mean
 from monitor.units import COLUMN_UNITS, column_unit
 
-__all__ = ["Always", "Channel", "Driver", "EachRun", "RunTime", "WarmUp", "parse_driver"]
+__all__ = [
+    "Always",
+    "Channel",
+    "Driver",
+    "EachRun",
+    "LaggedTemperature",
+    "RunTime",
+    "SettlingDriver",
+    "WarmUp",
+    "parse_driver",
+]
 
 
 def parse_driver(text: str) -> Driver:
@@ -31,7 +42,7 @@ def parse_driver(text: str) -> Driver:
         hint = did_you_mean(text, ("warmup", "run_time", "sequence", "gravity", "each_run"))
         raise EffectError(
             f"there is no driver '@{text}'; {hint}there are @warmup (or @warmup45min), @run_time, @sequence, @gravity, "
-            "@each_run and every recorded channel, whose name ends in a unit "
+            "@each_run, @lagged_ with a recorded temperature, and every recorded channel, whose name ends in a unit "
             f"({', '.join('_' + suffix for suffix in COLUMN_UNITS)}){plug_in_patterns('monitor.drivers')}"
         )
     return Channel(text)

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from monitor.effects.context import Context
-from monitor.effects.driver import HeatDriver
+from monitor.effects.driver import SettlingDriver
 from monitor.exceptions import EffectError
 from monitor.records import Array
 from monitor.units import MINUTE
@@ -20,10 +20,9 @@ TYPICAL_TIME_CONSTANT_S = 3600.0
 
 
 @dataclass(frozen=True)
-class WarmUp(HeatDriver):
+class WarmUp(SettlingDriver):
     """The driver 1 - exp(-t / tau), t since the first run of the day began."""
 
-    time_constant_s: float | None = None
     pattern: ClassVar[str] = r"warmup(?:(?P<minutes>\d+(?:\.\d+)?)min)?"
 
     @classmethod
@@ -33,7 +32,7 @@ class WarmUp(HeatDriver):
         minutes = float(groups["minutes"])
         if minutes == 0:
             raise EffectError("the time constant of @warmup must be above 0 min")
-        return cls(MINUTE.to_internal(minutes))
+        return cls(time_constant_s=MINUTE.to_internal(minutes))
 
     @property
     def phrase(self) -> str:

@@ -1,6 +1,6 @@
 """Added effects and their unknowns, shared by all runs; unknown time constants are unknowns of the fit like any other.
 
-An effect ``@warmup`` without a time constant has one more common unknown, the logarithm of that constant in
+An effect ``@warmup`` or ``@lagged_...`` without a time constant has one more common unknown, the logarithm of it in
 seconds, so that it stays positive. Its derivative is taken numerically: the basis is a smooth function of it.
 """
 
@@ -13,7 +13,7 @@ from itertools import accumulate, pairwise
 import numpy as np
 
 from monitor.effects import Basis, Context, Effect, ParsedEffect, with_time_constant
-from monitor.effects.drivers import WarmUp
+from monitor.effects.drivers import SettlingDriver
 from monitor.records import Array
 
 # Starts for the search: from the warm-up of a small spindle to that of a machine bed.
@@ -27,7 +27,7 @@ STEP = 1e-4
 def is_searched(effect: Effect) -> bool:
     """Whether the effect's time constant has to be estimated."""
     driver = effect.driver if isinstance(effect, ParsedEffect) else None
-    return isinstance(driver, WarmUp) and driver.time_constant_s is None
+    return isinstance(driver, SettlingDriver) and driver.time_constant_s is None
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from monitor.discovery import Explanation, Fit
 from monitor.effects import Basis, ChainEffect, ParsedEffect, parse_effect
-from monitor.effects.drivers import Channel, EachRun, RunTime, WarmUp
+from monitor.effects.context import REFERENCE_TEMPERATURE_DEGC
+from monitor.effects.drivers import Channel, EachRun, LaggedTemperature, RunTime, WarmUp
 from monitor.effects.shapes import Const, Cyclic, FormulaShape, Reversal
 from monitor.exceptions import InputError
 from monitor.records import Array
@@ -137,6 +138,13 @@ def _driver_columns(fit: Fit, effect: ParsedEffect) -> dict[str, Array]:
         return {
             f"{name} / {unit}": values,
             f"{name}, from its mean in the run / {unit}": _within_run(context.run, values),
+        }
+    if isinstance(driver, LaggedTemperature):
+        late = driver.columns(context, None)[:, 0] + REFERENCE_TEMPERATURE_DEGC
+        name = f"{driver.channel.rpartition('_')[0].replace('_', ' ')}, followed late"
+        return {
+            f"{name} / °C": late,
+            f"{name}, from its mean in the run / K": _within_run(context.run, late),
         }
     if isinstance(driver, WarmUp):
         warmth = driver.columns(context, None)[:, 0]

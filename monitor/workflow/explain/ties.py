@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -51,7 +52,8 @@ def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...]
     driver, other = _driver(effect.effect), _driver(rival)
     if driver not in OF_POSES or other not in OF_POSES:
         if driver != other:
-            return TieBreak.DRIVERS, tuple(name for name in (driver, other) if name not in OF_POSES), ()
+            columns = (_recorded(name) for name in (driver, other) if name not in OF_POSES)
+            return TieBreak.DRIVERS, tuple(dict.fromkeys(columns)), ()
         return TieBreak.INDEXATIONS, (driver,), tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
     if {effect.effect, rival} in [set(pair) for pair in effect.separation.together]:
         return TieBreak.NOTHING, (), ()
@@ -61,7 +63,12 @@ def _action(effect: ChainMissing, rival: str) -> tuple[TieBreak, tuple[str, ...]
 def _driver(text: str) -> str:
     name = text.rpartition("@")[2] if "@" in text else ""
     # A time constant that was searched (@warmup45min) is no other driver.
-    return "warmup" if name.startswith("warmup") else name
+    return re.sub(r"^(warmup|lagged)[\d.]+min", r"\1", name)
+
+
+def _recorded(driver: str) -> str:
+    """The column to vary: of what follows a temperature late that temperature, changed faster than it follows."""
+    return driver.removeprefix("lagged_")
 
 
 def _axis(text: str) -> str:
