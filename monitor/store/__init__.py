@@ -85,7 +85,7 @@ from monitor.store.models import (
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import StoredSelection, find_selection, list_selections, save_selection
-from monitor.store.sharing import SharedDatabase
+from monitor.store.sharing import SharedDatabase, one_at_a_time
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
 from monitor.store.turns import Holder, Patience
 from monitor.store.verification import Verification, verify_audit
@@ -183,6 +183,7 @@ __all__ = [
     "model_history",
     "next_version",
     "not_identified",
+    "one_at_a_time",
     "probing_counts",
     "record_event",
     "record_refusal",

@@ -31,6 +31,22 @@ _IDLE_READING_S, _IDLE_WRITING_S, _LOOK_S = 0.05, 0.02, 0.01
 _LONGEST_S = 0.5
 
 
+@contextmanager
+def one_at_a_time(db: Database, what: str) -> Iterator[None]:
+    """Let one process at a time into this block of a database; ``what`` names it. Others may use the database.
+
+    Where the system has no locks of files, or the folder cannot be written, nobody waits. Raises BusyError.
+    """
+    if db.path == ":memory:":
+        yield
+        return
+    name, patience = f"{db.path}.{what}", db.patience()
+    with turn_to_write(name, patience) as holder:
+        if holder is not None:
+            raise busy(name, holder, patience)
+        yield
+
+
 class SharedDatabase(Database):
     """A database file that others use, too; use it in a ``with`` statement.
 
@@ -76,7 +92,7 @@ class SharedDatabase(Database):
             finally:
                 self._blocks -= 1
 
-    def _patience(self) -> Patience:
+    def patience(self) -> Patience:
         return self._waiting
 
     def _open(self) -> None:
