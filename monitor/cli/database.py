@@ -71,6 +71,6 @@ def check_path(path: str, *, may_be_new: bool) -> None:
 def _user() -> str:
     try:
         return getpass.getuser()
-    except (OSError, KeyError):
-        # A container may run under a number that has no name.
+    except (OSError, KeyError, ImportError):
+        # A container may run under a number that has no name; Windows has no list of users to ask.
         return ""
