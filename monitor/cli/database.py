@@ -8,6 +8,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from monitor.cli.configuration import configuration
 from monitor.exceptions import InputError, NotFoundError
 
 if TYPE_CHECKING:
@@ -18,8 +19,11 @@ if TYPE_CHECKING:
 PATIENCE_S = 300.0
 
 
-def opened(options: Namespace, *, threads: int | None = None) -> Database:
-    """The open database, held only while it is read or written; the audit says who changed it. Raises StoreError."""
+def opened(options: Namespace, *, threads: int | None = None, judging: bool = False) -> Database:
+    """The open database, held only while it is read or written; the audit says who changed it.
+
+    ``judging``: with the tolerances by machine type of the configuration. Raises StoreError, InputError.
+    """
     # Loaded here: `monitor --help` answers without a database engine.
     from monitor.store import Holder, Patience, SharedDatabase
 
@@ -31,7 +35,10 @@ def opened(options: Namespace, *, threads: int | None = None) -> Database:
         )
 
     patience = Patience(options.wait, report)
-    return SharedDatabase(options.db, threads=threads, actor=_user(), patience=patience)
+    db = SharedDatabase(options.db, threads=threads, actor=_user(), patience=patience)
+    if judging:
+        db.type_tolerances = configuration().tolerances or {}
+    return db
 
 
 def seconds_to_wait(text: str) -> float:

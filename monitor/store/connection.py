@@ -57,6 +57,8 @@ class Database:
         self.read_only = read_only
         self.actor = actor
         self._threads = threads
+        #: Limits of absolute values by machine type and parameter, in display units (``type_tolerances``).
+        self.type_tolerances: Mapping[str, Mapping[str, float]] = {}
         self._lock = threading.RLock()
         self._one_writes = threading.RLock()  # of the sessions
         self._in_transaction = False

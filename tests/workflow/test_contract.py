@@ -119,6 +119,5 @@ def test_the_faces_ask_nothing_but_the_questions_of_the_contract() -> None:
         "explain.residual_vectors:residual_vectors",
         "history.values:values_of_machine",
         "kinematics:poses",
-        "query:machines",
         "query:readings",
     }

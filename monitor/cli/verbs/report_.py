@@ -75,7 +75,7 @@ def run(options: Namespace) -> int:
         ReportOptions(options.model, tuple(options.campaign), options.risk),
         options.workers,
     )
-    with opened(options, threads=1) as db:
+    with opened(options, threads=1, judging=True) as db:
         total = 1 if options.machine else len(machines(db).rows)
         with output.stepping("reporting", total) as progress:
             answer = replace(report(db, request, progress=progress), mailed_to=())

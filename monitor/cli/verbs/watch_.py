@@ -91,7 +91,7 @@ def _look(options: Namespace, request: WatchRequest) -> int:
     from monitor.workflow.watching.letter import lines_of
     from monitor.workflow.watching.watch import watch
 
-    with opened(options, threads=1) as db, output.working("taking in"):
+    with opened(options, threads=1, judging=True) as db, output.working("taking in"):
         answer = watch(db, request)
     if options.json:
         output.document(answer)
