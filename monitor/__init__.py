@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 # Their types stand in __init__.pyi: this file imports nothing.
 __all__ = ["Answer", "Campaign", "Database", "Machine", "Pictures", "open", "read", "simulate"]
 

@@ -11,6 +11,8 @@ from pathlib import Path
 LARGEST_SETTINGS = 1024**2
 #: Largest document that is read whole, in bytes; a certificate with its attachments has 0.2 MB.
 LARGEST_DOCUMENT = 256 * 1024**2
+#: Windows has neither flag, but tells text from bytes.
+_AT_ONCE = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 
 
 def read_bounded(path: Path, largest: int) -> bytes:
@@ -20,7 +22,7 @@ def read_bounded(path: Path, largest: int) -> bytes:
     """
     try:
         # Without O_NONBLOCK to open a pipe waits for somebody who writes into it.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = os.open(path, os.O_RDONLY | _AT_ONCE)
     except ValueError as error:
         raise OSError(errno.EINVAL, str(error), str(path)) from error
     with os.fdopen(descriptor, "rb") as file:

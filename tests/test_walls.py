@@ -39,7 +39,7 @@ ROOMS: dict[str, set[str]] = {
     # Opens the database and hands out answers as tables; it computes nothing.
     "api": {"workflow", "readers", "store"},
     # Opens the database, turns documents and forms into requests and answers into pages; it computes nothing.
-    "web": {"workflow", "store", "reporting"},
+    "web": {"readers", "workflow", "store", "reporting"},
     # Opens the database, reads files named by options, says with which key is signed, and starts the server; it
     # computes nothing.
     "cli": {"workflow", "readers", "store", "reporting", "web"},

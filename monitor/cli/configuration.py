@@ -6,16 +6,20 @@ configurations (``$XDG_CONFIG_HOME``, else ``~/.config``). An option that is typ
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import tomllib
 import zoneinfo
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from monitor.exceptions import InputError, did_you_mean
 
 NAME = "monitor.toml"
+#: Terms as ISO 230-1:2012, 3.4.16 spells them, of axes of any name.
+_TERM = re.compile(r"E[XYZABC]0?[A-Za-z][A-Za-z0-9]*")
 TEMPLATE = """# The configuration of monitor. Take the # away from what you need; `monitor config check` says
 # whether it can be read.
 # Paths without a leading / are counted from the folder of this file.
@@ -25,6 +29,13 @@ TEMPLATE = """# The configuration of monitor. Take the # away from what you need
 # language = "en"                  # of `certificate template`: en or de
 # mail = "mail.toml"               # what `report --mail` without a file sends by
 # time_zone = "Europe/Berlin"      # of moments that are typed without an offset from UTC; else that of this computer
+
+# Tolerances by machine type ([machine] model of campaign.toml; "*" for all others): limits of absolute values in µm,
+# µrad or µm/m for trend, fleet and report, where the machine's campaign states none of its own. A certificate states
+# conformity with the tolerances of its campaign alone.
+# [tolerances."HU40-T"]
+# EC0Y = 20.0
+# volumetric = 50.0
 """
 
 
@@ -38,6 +49,7 @@ class Configuration:
     language: str | None = None
     mail: Path | None = None
     time_zone: str | None = None
+    tolerances: Mapping[str, Mapping[str, float]] | None = None
 
 
 def place() -> Path | None:
@@ -74,17 +86,40 @@ def read(file: Path) -> Configuration:
         key: file.parent / document[key] for key in ("database", "laboratory", "mail") if key in document
     }
     texts = {key: document[key] for key in ("language", "time_zone") if key in document}
-    return Configuration(file, **paths, **texts)
+    return Configuration(file, **paths, **texts, tolerances=document.get("tolerances"))
 
 
 def _fault(key: str, value: object, file: Path) -> str | None:
     """What is wrong with a key; None where nothing is."""
+    if key == "tolerances":
+        return _tolerances(value)
     if key not in _CHECKS:
-        return f"there is no key {key}; {did_you_mean(key, _CHECKS)}there are {', '.join(_CHECKS)}"
+        keys = (*_CHECKS, "tolerances")
+        return f"there is no key {key}; {did_you_mean(key, keys)}there are {', '.join(keys)}"
     if not isinstance(value, str) or not value.strip():
         return f'{key} is a text in quotes, such as {key} = "..."'
     wrong = _CHECKS[key](value, file)
     return f"{key} = {value!r}: {wrong}" if wrong else None
+
+
+def _tolerances(value: object) -> str | None:
+    """What is wrong with the tolerances by machine type; None where nothing is."""
+    example = 'write [tolerances."TYPE"] and below it limits such as EC0Y = 20.0'
+    if not isinstance(value, dict) or not all(isinstance(limits, dict) for limits in value.values()):
+        return f"tolerances are tables, one a machine type; {example}"
+    for name, limits in value.items():
+        if not limits:
+            return f'[tolerances."{name}"] states no limit; {example}'
+        for term, limit in limits.items():
+            if term != "volumetric" and not _TERM.fullmatch(term):
+                return (
+                    f'[tolerances."{name}"] {term}: no name of a term; write it as in ISO 230-1, such as EC0Y or EXX, '
+                    "or volumetric"
+                )
+            number = isinstance(limit, (int, float)) and not isinstance(limit, bool)
+            if not number or not 0.0 < limit < math.inf:
+                return f'[tolerances."{name}"] {term} = {limit!r}: a number above 0 in µm, µrad or µm/m'
+    return None
 
 
 def _database(value: str, file: Path) -> str:

@@ -8,6 +8,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from monitor.cli.configuration import configuration
 from monitor.exceptions import InputError, NotFoundError
 
 if TYPE_CHECKING:
@@ -18,8 +19,11 @@ if TYPE_CHECKING:
 PATIENCE_S = 300.0
 
 
-def opened(options: Namespace, *, threads: int | None = None) -> Database:
-    """The open database, held only while it is read or written; the audit says who changed it. Raises StoreError."""
+def opened(options: Namespace, *, threads: int | None = None, judging: bool = False) -> Database:
+    """The open database, held only while it is read or written; the audit says who changed it.
+
+    ``judging``: with the tolerances by machine type of the configuration. Raises StoreError, InputError.
+    """
     # Loaded here: `monitor --help` answers without a database engine.
     from monitor.store import Holder, Patience, SharedDatabase
 
@@ -31,7 +35,10 @@ def opened(options: Namespace, *, threads: int | None = None) -> Database:
         )
 
     patience = Patience(options.wait, report)
-    return SharedDatabase(options.db, threads=threads, actor=_user(), patience=patience)
+    db = SharedDatabase(options.db, threads=threads, actor=_user(), patience=patience)
+    if judging:
+        db.type_tolerances = configuration().tolerances or {}
+    return db
 
 
 def seconds_to_wait(text: str) -> float:
@@ -61,11 +68,16 @@ def check_path(path: str, *, may_be_new: bool) -> None:
         check_database_name(path)
     if not may_be_new and Path(path).parent.is_dir() and not Path(path).exists():
         raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
+    if not may_be_new and Path(path).is_file() and Path(path).stat().st_size == 0:
+        raise NotFoundError(
+            f"{path} is an empty file, as a full disk leaves one: restore a backup with `monitor --db OTHER restore "
+            f"BACKUP`; where there was no database yet, `monitor --db {path} import FOLDER` makes one"
+        )
 
 
 def _user() -> str:
     try:
         return getpass.getuser()
-    except (OSError, KeyError):
-        # A container may run under a number that has no name.
+    except (OSError, KeyError, ImportError):
+        # A container may run under a number that has no name; Windows has no list of users to ask.
         return ""

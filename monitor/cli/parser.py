@@ -37,6 +37,7 @@ VERBS = {
     "simulate": "a virtual campaign folder, to rehearse",
     "report": "weekly health report of the fleet, HTML and PDF",
     "certificate": "calibration certificates: issue, show, verify, amend, withdraw, template",
+    "watch": "a folder: campaigns that come are imported, identified, reported and told",
     "event": "record what happened to a machine (crash, repair, compensation)",
     "serve": "pages in a browser and the HTTP interface",
     "verify": "whether the database is as it was written",
@@ -50,7 +51,17 @@ VERBS = {
 }
 DEFAULT_DATABASE = "monitor.duckdb"
 #: Verbs that make a database where there is none, or need none; for all others a missing file is a mistyped name.
-WITHOUT_DATABASE = ("demo", "import", "restore", "effects", "serve", "simulate", "config", "completion")
+WITHOUT_DATABASE = (
+    "demo",
+    "import",
+    "watch",
+    "restore",
+    "effects",
+    "serve",
+    "simulate",
+    "config",
+    "completion",
+)
 
 SUBVERBS_WITHOUT_DATABASE = ("template",)
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from monitor.records import Array
 from monitor.statistics.checks import as_probability
 from monitor.statistics.sums import GroupedSums, grouped_sums
+from monitor.statistics.tails import chi_square_quantile, f_quantile, f_tail
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class VarianceComponents:
 
 def _difference(s1: Array, n1: int, s2: Array, n2: int, tail: float) -> tuple[Array, Array]:
     """Bounds of E(s1) - E(s2) for two independent mean squares (Ting, Burdick, Graybill et al. 1990)."""
-    upper, lower = scipy.stats.f.isf(tail, n1, n2), scipy.stats.f.isf(1.0 - tail, n1, n2)
-    g1, g2 = (1.0 - n / scipy.stats.chi2.isf(tail, n) for n in (n1, n2))
-    h1, h2 = (n / scipy.stats.chi2.isf(1.0 - tail, n) - 1.0 for n in (n1, n2))
+    upper, lower = f_quantile(tail, n1, n2), f_quantile(1.0 - tail, n1, n2)
+    g1, g2 = (1.0 - n / chi_square_quantile(tail, n) for n in (n1, n2))
+    h1, h2 = (n / chi_square_quantile(1.0 - tail, n) - 1.0 for n in (n1, n2))
     g12 = ((upper - 1.0) ** 2 - (g1 * upper) ** 2 - h2**2) / upper
     h12 = ((1.0 - lower) ** 2 - (h1 * lower) ** 2 - g2**2) / lower
     below = (g1 * s1) ** 2 + (h2 * s2) ** 2 + g12 * s1 * s2
@@ -58,8 +58,8 @@ def _difference(s1: Array, n1: int, s2: Array, n2: int, tail: float) -> tuple[Ar
 
 def _sum(parts: list[tuple[Array, int]], tail: float) -> tuple[Array, Array]:
     """Bounds of the sum of expected mean squares (Graybill and Wang 1980)."""
-    below = sum((1.0 - n / scipy.stats.chi2.isf(tail, n)) ** 2 * s**2 for s, n in parts)
-    above = sum((n / scipy.stats.chi2.isf(1.0 - tail, n) - 1.0) ** 2 * s**2 for s, n in parts)
+    below = sum((1.0 - n / chi_square_quantile(tail, n)) ** 2 * s**2 for s, n in parts)
+    above = sum((n / chi_square_quantile(1.0 - tail, n) - 1.0) ** 2 * s**2 for s, n in parts)
     total = sum(s for s, _ in parts)
     return np.asarray(total - np.sqrt(below)), np.asarray(total + np.sqrt(above))
 
@@ -89,7 +89,7 @@ def variance_components(
     estimate = (s1 - s2) / size
     low, high = _difference(s1, n1, s2, n2, tail)
     within = np.column_stack(
-        [n2 * s2 / scipy.stats.chi2.isf(tail, n2), n2 * s2 / scipy.stats.chi2.isf(1.0 - tail, n2)]
+        [n2 * s2 / chi_square_quantile(tail, n2), n2 * s2 / chi_square_quantile(1.0 - tail, n2)]
     )
     parts = [(s1 / size, n1), (s2 * (1.0 - 1.0 / size), n2)]
     run_low, run_high = _sum(parts, tail)
@@ -98,7 +98,7 @@ def variance_components(
     dof_run = np.full_like(run, np.nan)
     np.divide(run**2, fractions, out=dof_run, where=fractions > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        p_value = scipy.stats.f.sf(sums.ms_between / s2, n1, n2)
+        p_value = f_tail(sums.ms_between / s2, n1, n2)
     return VarianceComponents(
         labels=sums.labels,
         level=level,

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from monitor.exceptions import DataError
 from monitor.statistics.sums import GroupedSums, grouped_sums
+from monitor.statistics.tails import f_tail
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def manova(values: npt.ArrayLike, groups: npt.ArrayLike) -> VectorTest:
     root = wilks ** (1.0 / s)
     f = float((1.0 - root) / root * dof2 / dof)
     name = "Hotelling T²" if k == 2 else "MANOVA (Wilks)"
-    return VectorTest(name, sums.labels, wilks, f, dof, dof2, float(scipy.stats.f.sf(f, dof, dof2)))
+    return VectorTest(name, sums.labels, wilks, f, dof, dof2, float(f_tail(f, dof, dof2)))
 
 
 def box_m(values: npt.ArrayLike, groups: npt.ArrayLike) -> VectorTest:
@@ -89,9 +89,7 @@ def box_m(values: npt.ArrayLike, groups: npt.ArrayLike) -> VectorTest:
     else:
         b = dof2 / (1.0 - c1 + 2.0 / dof2)
         f = dof2 * m / (dof1 * (b - m)) if m < b else np.inf
-    return VectorTest(
-        "Box's M", sums.labels, float(m), float(f), dof1, dof2, float(scipy.stats.f.sf(f, dof1, dof2))
-    )
+    return VectorTest("Box's M", sums.labels, float(m), float(f), dof1, dof2, float(f_tail(f, dof1, dof2)))
 
 
 @dataclass(frozen=True)

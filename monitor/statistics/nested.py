@@ -18,6 +18,7 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.components import variance_components
+from monitor.statistics.tails import chi_square_quantile
 
 
 class NotKnown(StrEnum):
@@ -139,7 +140,7 @@ def _one_run_a_day(plain: DayComponents, values: Array) -> DayComponents:
     total = values.var(axis=0, ddof=1)
     added = total - plain.within_run**2
     tail = (1.0 - plain.level) / 2.0
-    bounds = [dof * total / scipy.stats.chi2.isf(side, dof) for side in (tail, 1.0 - tail)]
+    bounds = [dof * total / chi_square_quantile(side, dof) for side in (tail, 1.0 - tail)]
     interval = np.column_stack([np.sqrt(np.maximum(b - plain.within_run**2, 0.0)) for b in bounds])
     covariance = None
     if len(values) >= 3:

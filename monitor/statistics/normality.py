@@ -30,7 +30,7 @@ class Normality:
 def _shapiro_francia(residual: Array) -> Array:
     """Squared correlation of each sorted column with Blom's approximate normal order statistics."""
     n = len(residual)
-    scores = scipy.stats.norm.ppf((np.arange(1, n + 1) - 0.375) / (n + 0.25))
+    scores = scipy.special.ndtri((np.arange(1, n + 1) - 0.375) / (n + 0.25))
     ordered = np.sort(residual, axis=0)
     ordered -= ordered.mean(axis=0)
     total = (ordered * ordered).sum(axis=0)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_vector
 from monitor.statistics.fdr import control_false_discoveries
 from monitor.statistics.sums import label_groups
+from monitor.statistics.tails import chi_square_tail, student_tail
 
 #: Below this p-value of Bartlett's test the scatters are no common multiple of what is stated. Low, because a wrong
 #: "not common" costs nearly all power with few runs, a wrong "common" little: the drifting one scatters more, too.
@@ -92,7 +92,7 @@ def run_drift(
     error = scale * u / np.sqrt(square)
     with np.errstate(divide="ignore", invalid="ignore"):
         statistic = np.where(error > 0.0, np.abs(slope) / error, np.where(slope == 0.0, 0.0, np.inf))
-    p = np.asarray(2.0 * scipy.stats.t.sf(statistic, dof))
+    p = 2.0 * student_tail(statistic, dof)
     return RunDrift(slope, error, dof, p, control_false_discoveries(p).q_value, scale, common)
 
 
@@ -110,4 +110,4 @@ def _alike(variances: Array, dof: int) -> bool:
         return False
     statistic = dof * (k * np.log(variances.mean()) - np.sum(np.log(variances)))
     correction = 1.0 + (k + 1.0) / (3.0 * k * dof)
-    return bool(scipy.stats.chi2.sf(statistic / correction, k - 1) >= NOT_COMMON)
+    return bool(chi_square_tail(statistic / correction, k - 1) >= NOT_COMMON)

@@ -14,6 +14,7 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.block_lines import Blocks, block_lines
+from monitor.statistics.tails import chi_square_tail, f_tail, student_tail
 
 
 @dataclass(frozen=True)
@@ -118,9 +119,9 @@ def cells_from_sums(sums: GroupSums) -> CellTests:
         dof_within=dof2,
         ss_between=ss,
         anova_f=f,
-        anova_p=np.asarray(scipy.stats.f.sf(f, np.maximum(dof1, 1.0), np.maximum(dof2, 1.0))),
+        anova_p=f_tail(f, np.maximum(dof1, 1.0), np.maximum(dof2, 1.0)),
         bartlett=np.asarray(bartlett),
-        bartlett_p=np.asarray(scipy.stats.chi2.sf(bartlett, np.where(np.isnan(b), 1.0, b))),
+        bartlett_p=chi_square_tail(bartlett, np.where(np.isnan(b), 1.0, b)),
     )
 
 
@@ -145,7 +146,7 @@ def drift_from_sums(
     slope = _quotient(stm, np.where(enough, stt, np.nan))
     dof = np.where(enough, k - 2.0, 1.0)
     u = np.sqrt(_quotient(np.maximum(smm - slope * stm, 0.0) / dof, np.where(enough, stt, np.nan)))
-    p_value = np.asarray(2.0 * scipy.stats.t.sf(np.abs(_quotient(slope, u)), dof))
+    p_value = 2.0 * student_tail(np.abs(_quotient(slope, u)), dof)
     return CellDrift(slope, u, p_value, np.full(count, np.nan))
 
 

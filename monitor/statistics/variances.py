@@ -10,12 +10,12 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.means import GroupTest, anova, divide
 from monitor.statistics.sums import GroupedSums, grouped_sums
+from monitor.statistics.tails import chi_square_tail
 
 
 def bartlett_from_sums(sums: GroupedSums) -> GroupTest:
@@ -27,7 +27,7 @@ def bartlett_from_sums(sums: GroupedSums) -> GroupTest:
         numerator = -(dof * np.log(sums.ss_by_group / dof / sums.ms_within)).sum(axis=0)
     correction = 1.0 + ((1.0 / dof).sum() - 1.0 / within) / (3.0 * (sums.k - 1))
     statistic = np.maximum(numerator / correction, 0.0)
-    p_value = np.asarray(scipy.stats.chi2.sf(statistic, sums.k - 1))
+    p_value = chi_square_tail(statistic, sums.k - 1)
     return GroupTest("Bartlett", sums.labels, statistic, sums.k - 1, np.full_like(statistic, np.inf), p_value)
 
 

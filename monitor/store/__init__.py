@@ -42,7 +42,7 @@ from monitor.store.database_name import check_database_name
 from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
 from monitor.store.export import export_tables
 from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
-from monitor.store.history import MachineHistory, latest_tolerances, machine_history
+from monitor.store.history import MachineHistory, latest_tolerances, machine_history, tolerance_types
 from monitor.store.identifications import (
     identification_by_number,
     identification_numbers,
@@ -88,9 +88,10 @@ from monitor.store.selections import (
     list_selections,
     save_selection,
 )
-from monitor.store.sharing import SharedDatabase
+from monitor.store.sharing import SharedDatabase, one_at_a_time
 from monitor.store.sql import QueryResult, campaign_readings, column_comments, list_machines, run_query
 from monitor.store.turns import Holder, Patience
+from monitor.store.type_tolerances import type_in_use
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 from monitor.store.workbook import export_workbook
@@ -185,6 +186,7 @@ __all__ = [
     "model_history",
     "next_version",
     "not_identified",
+    "one_at_a_time",
     "probing_counts",
     "record_event",
     "record_refusal",
@@ -201,6 +203,8 @@ __all__ = [
     "snapshot",
     "stored_analyses",
     "take_backup",
+    "tolerance_types",
+    "type_in_use",
     "verify_audit",
     "withdraw_campaign",
 ]

@@ -19,16 +19,18 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import duckdb
-import pandas as pd
 
 from monitor.exceptions import StoreError
 from monitor.store import migrations
 from monitor.store.database_name import check_database_name
 from monitor.store.opening import connect, damaged, is_missing, make
 from monitor.store.turns import Patience
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Parameters = Sequence[Any] | Mapping[str, Any]
 Record = TypeVar("Record")
@@ -55,6 +57,8 @@ class Database:
         self.read_only = read_only
         self.actor = actor
         self._threads = threads
+        #: Limits of absolute values by machine type and parameter, in display units (``type_tolerances``).
+        self.type_tolerances: Mapping[str, Mapping[str, float]] = {}
         self._lock = threading.RLock()
         self._one_writes = threading.RLock()  # of the sessions
         self._in_transaction = False
@@ -62,7 +66,7 @@ class Database:
         self._available = migrations.available()
         self._connection: duckdb.DuckDBPyConnection | None = None
         if not self.read_only and self.path != ":memory:" and is_missing(self.path):
-            make(self.path, self._patience())
+            make(self.path, self.patience())
         self._open()
 
     def __enter__(self) -> Database:
@@ -80,7 +84,7 @@ class Database:
                 with _as_private_as(self.path):
                     self._connection.close()
 
-    def _patience(self) -> Patience:
+    def patience(self) -> Patience:
         """How long another process is waited for."""
         return Patience()
 
@@ -171,6 +175,9 @@ class Database:
         self, sql: str, incoming: Mapping[str, Any] | pd.DataFrame, parameters: Parameters = ()
     ) -> None:
         """Run an INSERT that selects from ``incoming``, columns by name: 50 times as quick as row by row."""
+        # Loaded where something is written: whoever only reads does not wait for it.
+        import pandas as pd
+
         with self._used() as connection:
             connection.register("incoming", pd.DataFrame(incoming))
             try:

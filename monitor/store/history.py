@@ -21,6 +21,7 @@ from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
 from monitor.store.identified_values import IdentifiedValues, values_of
 from monitor.store.machine_runs import RecordedRun, runs_of_campaigns
+from monitor.store.type_tolerances import types_in_use
 
 # Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the heads, which are long.
 _IDENTIFICATIONS = """
@@ -278,10 +279,23 @@ def _conditions(db: Database, runs: list[RecordedRun]) -> dict[str, Array]:
 
 def latest_tolerances(db: Database) -> dict[tuple[str, str], float]:
     """Limits of the absolute value by machine and parameter, in display units, as each latest campaign states them."""
-    rows = db.rows(_TOLERANCES.format(latest=f"SELECT campaign_id FROM ({_LATEST})"))
-    return {(machine, parameter): float(limit) for machine, parameter, limit in rows}
+    latest = f"SELECT campaign_id FROM ({_LATEST})"
+    rows = db.rows(_TOLERANCES.format(latest=latest))
+    stated = {(machine, parameter): float(limit) for machine, parameter, limit in rows}
+    for machine, of_type in types_in_use(db, latest).items():
+        stated |= {(machine, parameter): limit for parameter, limit in of_type.limits.items()}
+    return stated
+
+
+def tolerance_types(db: Database) -> dict[str, str]:
+    """The machine type by machine, of those whose latest campaign states no tolerances and whose type has some."""
+    types = types_in_use(db, f"SELECT campaign_id FROM ({_LATEST})")
+    return {machine: types[machine].name for machine in sorted(types)}
 
 
 def _tolerances_of(db: Database, campaign: int) -> dict[str, float]:
     rows = db.rows(_TOLERANCES.format(latest="?"), [campaign])
-    return {parameter: float(limit) for _, parameter, limit in rows}
+    stated = {parameter: float(limit) for _, parameter, limit in rows}
+    for of_type in types_in_use(db, "?", [campaign]).values():
+        stated |= of_type.limits
+    return stated

@@ -10,6 +10,7 @@ from monitor.exceptions import NotFoundError, did_you_mean
 from monitor.store.campaign_runs import run_rows
 from monitor.store.catalogue import campaigns_of_machine
 from monitor.store.connection import Database
+from monitor.store.type_tolerances import type_in_use
 
 
 @dataclass(frozen=True)
@@ -101,12 +102,17 @@ def check_campaigns(db: Database, campaigns: tuple[str, ...]) -> None:
 
 
 def campaign_tolerances(db: Database, campaign: str) -> dict[str, float]:
-    """Limits of the absolute value that a campaign states of its machine's parameters, in display units."""
+    """Limits of the absolute value of a machine's parameters, in display units.
+
+    Those that the campaign states; where it states none, those of the machine's type.
+    """
     rows = db.rows(
         "SELECT parameter, tolerance FROM v_tolerances WHERE campaign = ? AND tolerance IS NOT NULL",
         [campaign],
     )
-    return {str(parameter): float(tolerance) for parameter, tolerance in rows}
+    stated = {str(parameter): float(tolerance) for parameter, tolerance in rows}
+    of_type = type_in_use(db, campaign)
+    return stated if of_type is None else dict(of_type.limits)
 
 
 def probing_counts(db: Database, campaign: str) -> dict[int, int]:

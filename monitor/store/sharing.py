@@ -38,6 +38,22 @@ _LAST_QUESTION_S = 10.0
 _OPEN: weakref.WeakSet[SharedDatabase] = weakref.WeakSet()
 
 
+@contextmanager
+def one_at_a_time(db: Database, what: str) -> Iterator[None]:
+    """Let one process at a time into this block of a database; ``what`` names it. Others may use the database.
+
+    Where the system has no locks of files, or the folder cannot be written, nobody waits. Raises BusyError.
+    """
+    if db.path == ":memory:":
+        yield
+        return
+    name, patience = f"{db.path}.{what}", db.patience()
+    with turn_to_write(name, patience) as holder:
+        if holder is not None:
+            raise busy(name, holder, patience)
+        yield
+
+
 class SharedDatabase(Database):
     """A database file that others use, too; use it in a ``with`` statement.
 
@@ -84,7 +100,7 @@ class SharedDatabase(Database):
             finally:
                 self._blocks -= 1
 
-    def _patience(self) -> Patience:
+    def patience(self) -> Patience:
         return self._waiting
 
     def _open(self) -> None:

@@ -10,7 +10,6 @@ cannot be made or read, as in a folder that is not writable, the lock of DuckDB 
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import random
 import re
@@ -20,6 +19,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # Windows has no such locks: that of DuckDB decides alone
+    _LOCKS = False
+else:
+    _LOCKS = True
 
 #: The file beside the database that a turn is a lock on; it holds the number of the last process that wrote.
 LOCK_ENDING = ".lock"
@@ -123,6 +129,8 @@ def _lock_file(path: str, *, make: bool) -> Iterator[int | None]:
 
 
 def _opened(path: str, make: bool) -> int | None:
+    if not _LOCKS:
+        return None
     name = path + LOCK_ENDING
     # A link that somebody planted is not followed, and nothing is written into a file that has another name.
     ways = (os.O_RDWR | os.O_CREAT, os.O_RDWR, os.O_RDONLY) if make else (os.O_RDONLY,)

@@ -11,9 +11,9 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.requests import Request
 
 from monitor.exceptions import InputError
+from monitor.readers.archive import UploadedFile
 from monitor.web.asking import ForbiddenError
 from monitor.web.sessions import Sessions
-from monitor.web.uploads import UploadedFile
 
 PROOF = "proof"
 

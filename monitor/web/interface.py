@@ -24,11 +24,11 @@ from starlette.responses import JSONResponse, Response
 from monitor import __version__
 from monitor.documents import to_document
 from monitor.exceptions import InputError, MonitorError
+from monitor.readers.archive import UploadedFile, unpack
 from monitor.web.access import FILES, offered, role_needed, taken_fields
 from monitor.web.asking import Asker, check_role, download_path
 from monitor.web.faults import refusal_of
 from monitor.web.schemas import Schemas
-from monitor.web.uploads import UploadedFile, unpack
 from monitor.web.users import User
 from monitor.workflow.contract import QUESTIONS
 

@@ -99,6 +99,7 @@ QUESTIONS = {
         "values": "history.values:values_of_machine",
         "verify": "keeping:verify",
         "verify certificate": "certificate.verification:verify_file",
+        "watch": "watching.watch:watch",
         "withdraw campaign": "intake.withdrawals:withdraw",
         "withdraw certificate": "certificate.issue:withdraw",
     }.items()

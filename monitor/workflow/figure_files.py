@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from monitor.exceptions import InputError
-from monitor.reporting.figures.style import Figure, save
+
+if TYPE_CHECKING:
+    from monitor.reporting.figures.style import Figure
 
 ENDINGS = (".svg", ".png")
 
@@ -21,4 +24,7 @@ def make_folder(folder: Path) -> Path:
 
 def save_figure(figure: Figure, folder: Path, name: str) -> list[str]:
     """Write a figure under a name with every ending; return the names of the files."""
+    # Loaded where a figure is drawn: the drawing library takes longer to load than most verbs to answer.
+    from monitor.reporting.figures.style import save
+
     return [str(save(figure, folder / f"{name}{ending}")) for ending in ENDINGS]

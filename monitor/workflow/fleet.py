@@ -31,6 +31,7 @@ from monitor.store import (
     latest_maps,
     latest_tolerances,
     not_identified,
+    tolerance_types,
 )
 from monitor.units import MICROMETRE
 from monitor.workflow.history.calendar import DAYS_PER_YEAR
@@ -125,7 +126,7 @@ class FleetAnswer:
     """The most urgent rows of ``rows``, and how many of all need attention, by kind.
 
     ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
-    part in it.
+    part in it. ``tolerances_of_type`` names the machine type by machine, where its campaign states no tolerances.
     """
 
     machines: int
@@ -136,6 +137,7 @@ class FleetAnswer:
     not_identified: tuple[str, ...]
     table: tuple[FleetTableRow, ...]
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
+    tolerances_of_type: Mapping[str, str] | None = field(default=None, metadata=OMITTED)
 
 
 def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
@@ -307,6 +309,7 @@ def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
             replace(row, rank=rank) for rank, row in enumerate(ranked[: request.top or None], start=1)
         ),
         weekly_looks=weekly_notices(db) if request.weekly_looks else None,
+        tolerances_of_type=tolerance_types(db) or None,
     )
 
 

@@ -102,3 +102,42 @@ def test_the_shell_completes_every_verb(typed: Any) -> None:
         assert {"explain", "export"} <= set(told.stdout.split())
     assert "complete -c monitor" in typed("completion", "fish").out
     assert "#compdef monitor" in typed("completion", "zsh").out
+
+
+def test_tolerances_of_the_machine_type_hold_where_the_campaign_states_none(typed: Any, db: Path) -> None:
+    assert "machine type" not in typed("trend", "HU40-T", db=db).out
+    configured('[tolerances."hu40-t"]\nEB0C = 0.001\n[tolerances."*"]\nEA0B = 5\n')
+    trend = typed("trend", "HU40-T", "--parameter", "EB0C", "--json", db=db).document
+    assert "limits are those of the machine type 'hu40-t'" in trend["notes"][-1]
+    fleet = typed("fleet", "--json", db=db).document
+    assert fleet["tolerances_of_type"] == {"HU40-T": "hu40-t"}
+    limits = {row["parameter"]: row["limit"] for row in fleet["table"]}
+    assert (limits["EB0C"], limits["EA0B"]) == (0.001, None)
+    assert "limits of HU40-T are those of the machine type 'hu40-t'" in typed("fleet", db=db).out
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("tolerances = 5", "tolerances are tables, one a machine type"),
+        ("[tolerances.x]", "states no limit"),
+        ("[tolerances.x]\nEC0Y = -1", "EC0Y = -1: a number above 0"),
+        ("[tolerances.x]\nEC0Y = true", "EC0Y = True: a number above 0"),
+        ("[tolerances.x]\nEC0Y = inf", "EC0Y = inf: a number above 0"),
+        ("[tolerances.x]\nsquareness = 1", "squareness: no name of a term"),
+        ("[tolerance.x]\nEC0Y = 1", "did you mean 'tolerances'?"),
+    ],
+)
+def test_faults_of_tolerances_are_named(typed: Any, text: str, message: str) -> None:
+    configured(text)
+    answer = typed("config", "check")
+    assert (answer.status, answer.out) == (2, "")
+    assert message in answer.err
+
+
+def test_an_empty_file_is_no_database_for_a_verb_that_reads(typed: Any) -> None:
+    Path("full.duckdb").write_bytes(b"")
+    answer = typed("--db", "full.duckdb", "campaigns")
+    assert (answer.status, answer.out) == (2, "")
+    assert "full.duckdb is an empty file, as a full disk leaves one" in answer.err
+    assert Path("full.duckdb").stat().st_size == 0

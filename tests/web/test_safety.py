@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 from monitor.exceptions import InputError
-from monitor.web import uploads
+from monitor.readers import archive
+from monitor.readers.archive import UploadedFile, unpack
 from monitor.web.gate import DOCUMENT_BYTES
 from monitor.web.sessions import Sessions
 from monitor.web.settings import ServerSettings
-from monitor.web.uploads import UploadedFile, unpack
 from monitor.web.users import Role, User, add_user, read_users
 
 
@@ -239,7 +239,7 @@ def test_a_zip_stays_in_its_folder(tmp_path: Path, name: str) -> None:
 def test_a_bomb_a_link_and_half_a_zip_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="a link or a device"):
         unpack([UploadedFile("x.zip", _zip(link="c/campaign.toml"))], tmp_path / "link")
-    monkeypatch.setattr(uploads, "UNPACKED_BYTES", 2**20)
+    monkeypatch.setattr(archive, "UNPACKED_BYTES", 2**20)
     bomb = _zip(("c/campaign.toml", b"0" * 2**22))
     assert len(bomb.getvalue()) < 2**14
     with pytest.raises(InputError, match="unpacks to more than 1 MiB"):
@@ -251,7 +251,7 @@ def test_a_bomb_a_link_and_half_a_zip_are_refused(tmp_path: Path, monkeypatch: p
         )  # the size that the directory of the zip states
     with pytest.raises(InputError, match=r"cannot be unpacked|more than 1 MiB"):
         unpack([UploadedFile("x.zip", io.BytesIO(bytes(liar)))], tmp_path / "liar")
-    monkeypatch.setattr(uploads, "MOST_FILES", 3)
+    monkeypatch.setattr(archive, "MOST_FILES", 3)
     with pytest.raises(InputError, match="more than 3 files"):
         unpack([UploadedFile("x.zip", _zip(*((f"c/{n}", b"") for n in range(4))))], tmp_path / "many")
     half = io.BytesIO(_zip(("c/campaign.toml", b"x" * 1000)).getvalue()[10:])

@@ -18,8 +18,6 @@ from monitor.workflow.certificate.answer import (
     CertificatesAnswer,
     CertificateShowAnswer,
 )
-from monitor.workflow.certificate.issue import amend, issue, withdraw
-from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import (
     AmendmentRequest,
     CertificateFileRequest,
@@ -37,7 +35,6 @@ from monitor.workflow.certificate.states import (
     write_issued,
 )
 from monitor.workflow.certificate.template import TemplateRequest, write_template
-from monitor.workflow.certificate.verification import verify_file
 
 EXAMPLE = "monitor certificate issue five-days --run 20 --laboratory examples/laboratory.toml"
 
@@ -141,6 +138,9 @@ def _issue(options: Namespace) -> int:
         options.campaign, options.number_of_run, options.replaces, options.reason, draft=options.draft,
         **issuing(options),
     )  # fmt: skip
+    # What lays out pages takes longer to load than a list of certificates to read.
+    from monitor.workflow.certificate.issue import issue
+
     with opened(options, threads=1) as db, output.working("issuing"):
         answer = issue(db, request)
     return _issued(answer, options.json)
@@ -150,6 +150,8 @@ def _amend(options: Namespace) -> int:
     request = AmendmentRequest(
         options.replaces, options.reason, options.campaign, options.number_of_run, **issuing(options)
     )
+    from monitor.workflow.certificate.issue import amend
+
     with opened(options, threads=1) as db, output.working("issuing"):
         answer = amend(db, request)
     return _issued(answer, options.json)
@@ -194,6 +196,8 @@ def _show(options: Namespace) -> int:
 
 def _remake(options: Namespace) -> int:
     request = RemakeRequest(options.number, options.remake, tuple(options.font))
+    from monitor.workflow.certificate.remaking import remake
+
     with opened(options) as db, output.working("making it again"):
         answer = remake(db, request)
     if options.json:
@@ -207,6 +211,8 @@ def _remake(options: Namespace) -> int:
 
 
 def _verify(options: Namespace) -> int:
+    from monitor.workflow.certificate.verification import verify_file
+
     with opened(options) as db, output.working("verifying"):
         answer = verify_file(db, VerificationRequest(options.file, options.trust, options.expect))
     if options.json:
@@ -247,6 +253,8 @@ def _template(options: Namespace) -> int:
 
 
 def _withdraw(options: Namespace) -> int:
+    from monitor.workflow.certificate.issue import withdraw
+
     with opened(options) as db:
         answer = withdraw(db, WithdrawalRequest(options.number, options.reason))
     if options.json:

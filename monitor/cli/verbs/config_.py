@@ -57,6 +57,11 @@ def _said(answer: Configuration, as_json: bool) -> int:
         output.document(answer)
         return 0
     for key, value in asdict(answer).items():
+        if key == "tolerances" and value is not None:
+            for name, limits in value.items():
+                stated = ", ".join(f"{term} {limit:g}" for term, limit in limits.items())
+                output.say(f"{key:<12} {name}: {stated}")
+            continue
         output.say(f"{key:<12} {'-' if value is None else value}")
     return 0
 

@@ -39,7 +39,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     request = FleetRequest(options.model, options.top, options.weekly_looks)
-    with opened(options) as db, output.working("summing"):
+    with opened(options, judging=True) as db, output.working("summing"):
         answer = fleet(db, request)
     if options.json:
         output.document(answer)
@@ -60,6 +60,8 @@ def run(options: Namespace) -> int:
             "slopes allow for days that resemble each other: their intervals are up to "
             f"{widest:.2g} times as wide as with independent days"
         )
+    for machine, name in (answer.tolerances_of_type or {}).items():
+        output.say(f"limits of {machine} are those of the machine type '{name}' in the configuration")
     if answer.weekly_looks is not None:
         for line in weekly_lines(answer.weekly_looks, machines=True):
             output.say(line)

@@ -13,6 +13,7 @@ from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest, StepwiseRequest
 from monitor.workflow.identify.stepwise import identify_stepwise
+from monitor.workflow.intake.campaigns import campaigns
 
 EXAMPLE = "monitor identify five-days"
 
@@ -51,8 +52,10 @@ def _all(options: Namespace) -> int:
     """Identify every campaign; exit status 2 where one could not be."""
     if options.number is not None:
         raise InputError(f"--run {options.number} is a run of one campaign: name it")
-    with opened(options) as db, output.working("identifying"):
-        answer = identify_all(db, IdentifyAllRequest(options.model))
+    with opened(options) as db:
+        total = len(campaigns(db).campaigns)
+        with output.stepping("identifying", total) as progress:
+            answer = identify_all(db, IdentifyAllRequest(options.model), progress=progress)
     if options.json:
         output.document(answer)
     else:

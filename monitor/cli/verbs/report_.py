@@ -17,6 +17,7 @@ from monitor.exceptions import InputError
 from monitor.workflow.health.mail import mail_report, read_mail_settings
 from monitor.workflow.health.report import report
 from monitor.workflow.health.request import ReportAnswer, ReportOptions, ReportRequest
+from monitor.workflow.query import machines
 
 #: What stands for --mail without a file.
 _CONFIGURED = Path()
@@ -74,8 +75,10 @@ def run(options: Namespace) -> int:
         ReportOptions(options.model, tuple(options.campaign), options.risk),
         options.workers,
     )
-    with opened(options, threads=1) as db, output.working("reporting"):
-        answer = replace(report(db, request), mailed_to=())
+    with opened(options, threads=1, judging=True) as db:
+        total = 1 if options.machine else len(machines(db).rows)
+        with output.stepping("reporting", total) as progress:
+            answer = replace(report(db, request, progress=progress), mailed_to=())
     unsent = None
     try:
         if options.mail is not None:

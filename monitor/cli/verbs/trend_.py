@@ -76,7 +76,7 @@ def run(options: Namespace) -> int:
         figures=options.figures,
         weekly_looks=options.weekly_looks,
     )
-    with opened(options) as db, output.working("following"):
+    with opened(options, judging=True) as db, output.working("following"):
         answer = trend(db, request)
     if options.json:
         output.document(answer)

@@ -10,11 +10,11 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from monitor.exceptions import MonitorError
+from monitor.readers.archive import unpack
 from monitor.web.asking import Asker, check_role
 from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form
 from monitor.web.rendering import page
-from monitor.web.uploads import unpack
 from monitor.web.users import User
 from monitor.workflow.intake.importing import ImportAnswer
 

@@ -16,6 +16,7 @@ from monitor.store import (
     machine_history,
     machine_runs,
     stored_analyses,
+    type_in_use,
 )
 from monitor.workflow.health.facts import (
     Judgement,
@@ -125,6 +126,12 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     history = only_runs(history, past.runs)
     parameter_pasts = machine_past(history, splitting_events(past.events))
     limits = campaign_tolerances(db, last.campaign)
+    of_type = type_in_use(db, last.campaign)
+    if of_type is not None:
+        remarks.append(
+            f"its tolerances are those of the machine type '{of_type.name}' in the configuration: campaign "
+            f"{last.campaign} states none"
+        )
     limit_um, beyond = limits.get(VOLUMETRIC), None
     if limit_um is not None and results.map is not None:
         beyond = probability_beyond(results.map, limit_um)

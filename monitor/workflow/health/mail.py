@@ -145,15 +145,10 @@ def _faults_of_password(table: Table) -> list[str]:
 def message_of(settings: MailSettings, report: ReportAnswer) -> EmailMessage:
     """The e-mail of a report's document: the fleet table as text, the PDF files attached."""
     alarms = report.alarms
-    message = EmailMessage()
     quiet = "no alarm" if report.measured else "no machine was measured"
-    message["Subject"] = f"Machine health {report.week}: " + (
+    subject = f"Machine health {report.week}: " + (
         f"{len(alarms)} alarm{'s' if len(alarms) != 1 else ''}" if alarms else quiet
     )
-    message["From"] = settings.sender
-    message["To"] = ", ".join(settings.recipients)
-    message["Date"] = formatdate()
-    message["Message-ID"] = make_msgid(domain=settings.sender.rpartition("@")[2].rstrip(">") or None)
     lines = [f"Week {report.week}, {report.from_} to {report.to}", ""]
     for row in report.machines:
         p = row.probability_out
@@ -161,9 +156,23 @@ def message_of(settings: MailSettings, report: ReportAnswer) -> EmailMessage:
         lines += [f"{row.machine}: {row.state}{out}", f"  {row.changed}; next check {row.next_check}"]
     if report.message:
         lines += ["", report.message]
+    return composed(settings, subject, lines, report.files)
+
+
+def composed(
+    settings: MailSettings, subject: str, lines: Sequence[str], files: Sequence[str]
+) -> EmailMessage:
+    """An e-mail of lines of text with the PDF files among ``files`` attached, as far as servers take them."""
+    message = EmailMessage()
+    lines = list(lines)
+    message["Subject"] = subject
+    message["From"] = settings.sender
+    message["To"] = ", ".join(settings.recipients)
+    message["Date"] = formatdate()
+    message["Message-ID"] = make_msgid(domain=settings.sender.rpartition("@")[2].rstrip(">") or None)
     room = LARGEST_BYTES
     attached: list[tuple[str, bytes]] = []
-    for file in (Path(name) for name in report.files if name.endswith(".pdf")):
+    for file in (Path(name) for name in files if name.endswith(".pdf")):
         size = file.stat().st_size
         if size <= room:
             room -= size

@@ -57,6 +57,11 @@ def week_named(text: str) -> Week:
         ) from None
 
 
+def week_of(day: date) -> Week:
+    """The week that a day lies in."""
+    return Week(day - timedelta(days=day.isocalendar().weekday - 1))
+
+
 def week_before(day: date) -> Week:
     """The last week that had ended on ``day``: what a timer on Monday morning reports."""
     return Week(day - timedelta(days=day.isocalendar().weekday - 1 + 7))

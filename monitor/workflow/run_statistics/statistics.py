@@ -23,8 +23,6 @@ from monitor.store import (
 )
 from monitor.units import Unit
 from monitor.workflow.figure_files import make_folder
-from monitor.workflow.identify.identify import identify
-from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.measured import machine_campaign
 from monitor.workflow.models import resolve_for
 from monitor.workflow.run_statistics.answer import (
@@ -123,6 +121,10 @@ def _identified(db: Database, campaign: Campaign, model: str | None) -> StoredId
             return identification
     except NotFoundError:
         pass
+    # Loaded where something is identified: the solvers of all methods take longer to load than statistics.
+    from monitor.workflow.identify.identify import identify
+    from monitor.workflow.identify.request import IdentifyRequest
+
     identify(db, IdentifyRequest(campaign.name, model))
     return load_identification(db, campaign.name, stored.name, stored.version)
 

@@ -21,6 +21,7 @@ from monitor.store import (
     machine_events,
     machine_history,
     save_analysis,
+    tolerance_types,
 )
 from monitor.workflow.history.agreement import agreement
 from monitor.workflow.history.calendar import SECONDS_PER_DAY, date, days_since_1970
@@ -134,7 +135,7 @@ def _answer(
             RecordedEvent(event.at.astimezone(UTC).isoformat(), event.kind, event.description)
             for event in events
         ),
-        notes=(*same_hours(history), *_not_followed(history)),
+        notes=(*same_hours(history), *_not_followed(history), *_limits_of_type(db, history)),
         false_alarm=FALSE_ALARM,
         seed=SEED,
         why=None if past else _why_none(request),
@@ -166,6 +167,16 @@ def _answer(
         control=control,
         parameters=parameters,
         volumetric_error=volumetric,
+    )
+
+
+def _limits_of_type(db: Database, history: MachineHistory) -> tuple[str, ...]:
+    """Where the limits come from, where they are not the campaign's own."""
+    name = tolerance_types(db).get(history.machine)
+    if name is None:
+        return ()
+    return (
+        f"limits are those of the machine type '{name}' in the configuration: the latest campaign states none",
     )
 
 

@@ -1,4 +1,4 @@
-"""Unpacks uploads into a folder of their own: no path out of it, no link, no bomb, no more than a campaign can need.
+"""Unpacks uploads and zips into a folder of their own: no path out of it, no link, no bomb, no more than needed.
 
 A campaign comes as a zip of its folder, or as its files one by one; a zip may hold several folders.
 """
@@ -13,10 +13,9 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from monitor.exceptions import InputError
-from monitor.web.settings import UPLOAD_BYTES
 
 #: Unpacked, all files together; text packs to a tenth, and what unpacks to a thousand times its size is an attack.
-UNPACKED_BYTES = 8 * UPLOAD_BYTES
+UNPACKED_BYTES = 512 * 2**20
 MOST_FILES = 2000
 LONGEST_NAME = 200
 _CHUNK = 2**20
