@@ -6,7 +6,8 @@ days of both sides and, where these are few, from other days of the same machine
 tell a change from days that differ, however many runs there are: then nothing is decided. Judged by E_n with the
 expanded uncertainty at 95 % for the degrees of freedom that there are, so that of machines that did not change one in
 twenty is said to have. Days of a campaign may also resemble those before them, which few days do not show: what is
-beyond independent days but not beyond such (``following_days``) is not decided either. Compare results of different
+beyond independent days but not beyond such (``following_days``), or beyond days of one scatter but not beyond two sides
+that scatter differently, is not decided either. Compare results of different
 methods, which share less, with ``normalised_error``.
 """
 
@@ -57,8 +58,9 @@ class BeforeAfter:
     their runs, None where no two days are alike: then the difference of the machine and that of two days are one, ``u``
     is of runs alone, and nothing is ``decided``. ``other_days`` of the machine took part in the estimate; of so many
     ``other_campaigns`` the means differ by more than that, and ``u``, ``dof`` and ``k`` are theirs (0: they do not).
-    ``following`` is the expanded uncertainty for days that resemble those before them by ``correlation``, as far as the
-    days leave it likely; None where other campaigns say how campaigns differ, or nothing is known of the days.
+    ``cautious`` is the largest expanded uncertainty that the days do not exclude: for days that resemble those before
+    them by ``correlation``, and for sides of different scatter (Welch; where no other days took part and both have
+    two); None where other campaigns say how campaigns differ, or nothing is known of the days.
     """
 
     before: float
@@ -72,7 +74,7 @@ class BeforeAfter:
     between: float | None
     other_days: int
     other_campaigns: int = 0
-    following: float | None = None
+    cautious: float | None = None
     correlation: float | None = None
 
     @property
@@ -93,12 +95,12 @@ class BeforeAfter:
     @property
     def agree(self) -> bool | None:
         """Whether the difference is no larger than its expanded uncertainty; None where nothing is decided: nothing is
-        known of the days, or it is larger for independent days only."""
+        known of the days, or it is larger for independent days of one scatter only."""
         if self.e_n is None:
             return None
         if abs(self.e_n) <= 1.0:
             return True
-        return None if self.following is not None and abs(self.difference) <= self.following else False
+        return None if self.cautious is not None and abs(self.difference) <= self.cautious else False
 
 
 @dataclass(frozen=True)
@@ -190,7 +192,7 @@ def _beside_campaigns(result: BeforeAfter, others: OtherDays) -> BeforeAfter:
     if dof < CAMPAIGNS_THAT_SAY:
         return result
     # Days that follow each other make campaigns differ, and that is known.
-    result = replace(result, following=None, correlation=None)
+    result = replace(result, cautious=None, correlation=None)
     squares = sum(
         float(((means[stretch == i] - means[stretch == i].mean()) ** 2).sum()) for i in set(stretch)
     )
@@ -246,12 +248,11 @@ def _judged(own: _Means, means: _Means, other_days: int) -> BeforeAfter:
     u = float(np.sqrt(variances.sum()))
     if u == 0.0:
         raise DataError("no day differs from the others of its side; the difference has no uncertainty.")
-    following = None
+    cautious = None
     if follow is not None:
         of_following = _satterthwaite((follow.u**2, follow.dof), by_runs)
-        following = max(
-            _factor(of_following) * float(np.hypot(follow.u, np.sqrt(by_runs[0]))), _factor(dof) * u
-        )
+        following = _factor(of_following) * float(np.hypot(follow.u, np.sqrt(by_runs[0])))
+        cautious = max(following, 0.0 if other_days else _unequal(own, sides), _factor(dof) * u)
     return BeforeAfter(
         before=first,
         after=second,
@@ -263,9 +264,20 @@ def _judged(own: _Means, means: _Means, other_days: int) -> BeforeAfter:
         k=_factor(dof),
         between=between,
         other_days=other_days,
-        following=following,
+        cautious=cautious,
         correlation=None if follow is None else follow.correlation,
     )
+
+
+def _unequal(own: _Means, sides: list[npt.NDArray[np.bool_]]) -> float:
+    """Expanded uncertainty of the difference with the scatter of each side by its own days, 0 where one has one day.
+
+    Source: B. L. Welch, Biometrika 29 (1938) 350.
+    """
+    if min(int(side.sum()) for side in sides) < 2:
+        return 0.0
+    parts = [(float(own.mean[side].var(ddof=1) / side.sum()), float(side.sum()) - 1.0) for side in sides]
+    return _factor(_satterthwaite(*parts)) * float(np.sqrt(sum(variance for variance, _ in parts)))
 
 
 def _satterthwaite(*parts: tuple[float, float]) -> float:
