@@ -74,13 +74,19 @@ def _likelihoods(stretches: list[list[Array]], dof: int) -> Array:
 
 
 def following_days(
-    means: Array, stretch: npt.NDArray[np.intp], block: npt.NDArray[np.intp], sides: tuple[int, int]
+    means: Array,
+    stretch: npt.NDArray[np.intp],
+    block: npt.NDArray[np.intp],
+    sides: tuple[int, int],
+    refuted: float = REFUTED,
 ) -> FollowingDays | None:
     """The difference of two sides by the means (d,) of days in the order of time.
 
     ``stretch`` (d,) are the pieces that scatter about a mean of their own, ``sides`` the two of them that are compared;
     ``block`` (d,) are campaigns, far apart from each other: a day resembles that before it in the same block only.
-    Days of a block count as one after the other, whatever the time between. None where no stretch has two days.
+    Days of a block count as one after the other, whatever the time between. ``refuted`` is how far the logarithm of a
+    correlation's likelihood lies below the highest where it is left out: more where a lower level is asked for. None
+    where no stretch has two days.
     """
     dof = len(means) - len(np.unique(stretch))
     if dof == 0:
@@ -90,7 +96,7 @@ def following_days(
         for piece in np.unique(stretch)
     ]
     likelihood = _likelihoods(stretches, dof)
-    r = float(GRID[likelihood >= likelihood.max() - REFUTED].max())
+    r = float(GRID[likelihood >= likelihood.max() - refuted].max())
     trace, square = _scatter([[len(days) for days in blocks] for blocks in stretches], r)
     squares = sum(float(((days - days.mean()) ** 2).sum()) for days in map(np.concatenate, stretches))
     variance = 0.0
