@@ -242,7 +242,7 @@ def charts(rng: np.random.Generator) -> None:
 
 
 #: Histories of 20 day means of a cell; of 52 half, of 104 a quarter.
-HISTORIES = 2000
+HISTORIES = 800
 
 
 def changes(rng: np.random.Generator) -> None:
@@ -294,7 +294,7 @@ def _called(
 
 
 #: Machines of a cell of that table.
-MACHINES = 1000
+MACHINES = 600
 #: Days of runs before and after, and those of the machine's other campaigns.
 EVENTS = (
     ((4,), (4,), ()),
