@@ -22,7 +22,7 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_vector
-from monitor.statistics.following_days import following_days
+from monitor.statistics.following_days import REFUTED, FollowingDays, following_days
 from monitor.statistics.sums import label_groups
 
 #: Probability with which the expanded uncertainty holds the difference of a machine that did not change.
@@ -60,7 +60,8 @@ class BeforeAfter:
     ``other_campaigns`` the means differ by more than that, and ``u``, ``dof`` and ``k`` are theirs (0: they do not).
     ``cautious`` is the largest expanded uncertainty that the days do not exclude: for days that resemble those before
     them by ``correlation``, and for sides of different scatter (Welch; where no other days took part and both have
-    two); None where other campaigns say how campaigns differ, or nothing is known of the days.
+    two); None where other campaigns say how campaigns differ, or nothing is known of the days. ``following`` is the
+    first of the two.
     """
 
     before: float
@@ -75,6 +76,7 @@ class BeforeAfter:
     other_days: int
     other_campaigns: int = 0
     cautious: float | None = None
+    following: FollowingDays | None = None
     correlation: float | None = None
 
     @property
@@ -154,6 +156,7 @@ def before_after(
     days_before: npt.ArrayLike,
     days_after: npt.ArrayLike,
     others: OtherDays | None = None,
+    refuted: float = REFUTED,
 ) -> BeforeAfter:
     """Compare runs (n,) before with runs (m,) after an event, of the days (n,) and (m,), every day alike.
 
@@ -161,6 +164,7 @@ def before_after(
     for independent normal days of as many runs, whatever the day component; with unequal numbers of runs the scatter of
     the runs makes up what the means of a side scatter more than those of the others (Satterthwaite). A day that the
     event cuts in two counts on both sides: its two halves share what is of the day only in part, which is neglected.
+    ``refuted`` is that of ``following_days``.
     Raises ``DataError`` for fewer than three runs, or where nothing scatters. Measured: docs/trials-statistics.md.
     """
     x, y = as_vector(before, "before"), as_vector(after, "after")
@@ -181,7 +185,7 @@ def before_after(
             means, other_days = every, len(every.mean) - len(own.mean)
     if np.ptp(x) == 0.0 and np.ptp(y) == 0.0:
         raise DataError("no run differs from the others of its side; the difference has no uncertainty.")
-    result = _judged(own, means, other_days)
+    result = _judged(own, means, other_days, refuted)
     return result if others is None else _beside_campaigns(result, others)
 
 
@@ -192,7 +196,7 @@ def _beside_campaigns(result: BeforeAfter, others: OtherDays) -> BeforeAfter:
     if dof < CAMPAIGNS_THAT_SAY:
         return result
     # Days that follow each other make campaigns differ, and that is known.
-    result = replace(result, cautious=None, correlation=None)
+    result = replace(result, cautious=None, correlation=None, following=None)
     squares = sum(
         float(((means[stretch == i] - means[stretch == i].mean()) ** 2).sum()) for i in set(stretch)
     )
@@ -227,7 +231,7 @@ def _factor(dof: float) -> float:
     return -float(scipy.special.stdtrit(dof, (1.0 - LEVEL) / 2.0))
 
 
-def _judged(own: _Means, means: _Means, other_days: int) -> BeforeAfter:
+def _judged(own: _Means, means: _Means, other_days: int, refuted: float) -> BeforeAfter:
     """The difference of the two sides of ``own`` by the scatter of the days of ``means``."""
     sides = [own.stretch == side for side in (0, 1)]
     first, second = (float(own.mean[side].mean()) for side in sides)
@@ -244,15 +248,19 @@ def _judged(own: _Means, means: _Means, other_days: int) -> BeforeAfter:
         dof = _satterthwaite((of_days * float((1.0 / days).sum()), means.dof_days), by_runs)
         variances = (of_days + of_runs * np.maximum(share - expected, 0.0)) / days
         between = float(np.sqrt(max(of_days - of_runs * expected, 0.0)))
-        follow = following_days(means.mean, means.stretch, means.campaign, (0, 1))
+        follow = following_days(means.mean, means.stretch, means.campaign, (0, 1), refuted)
     u = float(np.sqrt(variances.sum()))
     if u == 0.0:
         raise DataError("no day differs from the others of its side; the difference has no uncertainty.")
-    cautious = None
+    cautious = following = None
     if follow is not None:
-        of_following = _satterthwaite((follow.u**2, follow.dof), by_runs)
-        following = _factor(of_following) * float(np.hypot(follow.u, np.sqrt(by_runs[0])))
-        cautious = max(following, 0.0 if other_days else _unequal(own, sides), _factor(dof) * u)
+        following = FollowingDays(
+            float(np.hypot(follow.u, np.sqrt(by_runs[0]))),
+            _satterthwaite((follow.u**2, follow.dof), by_runs),
+            follow.correlation,
+        )
+        unequal = 0.0 if other_days else _unequal(own, sides)
+        cautious = max(_factor(following.dof) * following.u, unequal, _factor(dof) * u)
     return BeforeAfter(
         before=first,
         after=second,
@@ -266,6 +274,7 @@ def _judged(own: _Means, means: _Means, other_days: int) -> BeforeAfter:
         other_days=other_days,
         cautious=cautious,
         correlation=None if follow is None else follow.correlation,
+        following=following,
     )
 
 

@@ -10,10 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
+from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.following_days import following_days
+from monitor.statistics.before_after import BeforeAfter, OtherDays, before_after
 from monitor.store import NOTE, MachineEvent
 from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.past import ParameterPast
@@ -102,49 +104,55 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
         later = ends[np.searchsorted(steady.t, ends) > first].min(initial=np.inf)
         before = steady.part((steady.t >= earlier) & (steady.t < at))
         after = steady.part((steady.t >= at) & (steady.t < later))
-        means = _means(before), _means(after)
         others = (steady.t < earlier) | (steady.t >= later)
-        rest = [_means(steady.part(others & (pieces == piece))) for piece in np.unique(pieces[others])]
-        days, runs = _student(*means, rest), _student(before.values, after.values)
+        days = _by_days(before, after, steady.part(others), pieces[others])
+        runs = _student(before.values, after.values)
         if runs is None and days is None:
             continue
-        size = float(means[1].mean() - means[0].mean()) if min(map(len, means)) else 0.0
-        u, p_value = days or runs or (np.nan, 1.0)
+        size = days.difference if days is not None else _difference_of_days(before, after)
+        u, p_value = (days.u, _p_value(size, days.u, days.dof)) if days is not None else runs or (np.nan, 1.0)
+        step = EventStep(steady.name, steady.unit, event, at, size, u, p_value, days is not None)
+        follow = None if days is None else days.following
         pairs[first] = _Compared(
-            EventStep(steady.name, steady.unit, event, at, size, u, p_value, days is not None), runs,
-            max(p_value, _following(size, [*means, *rest])),
-        )  # fmt: skip
+            step, runs, 1.0 if follow is None else max(p_value, _p_value(size, follow.u, follow.dof))
+        )
     return list(pairs.values())
 
 
-def _student(first: Array, second: Array, rest: Sequence[Array] = ()) -> tuple[float, float] | None:
-    """Standard uncertainty of the difference of two means and its p-value, with the scatter common to them and to the
-    groups of the ``rest`` about their means; None without one."""
-    groups = [first, second, *rest]
-    freedom = sum(len(group) - 1 for group in groups)
+def _p_value(size: float, u: float, dof: float) -> float:
+    return float(2.0 * scipy.special.stdtr(dof, -abs(size) / u))
+
+
+def _by_days(before: Series, after: Series, rest: Series, pieces: npt.NDArray[np.intp]) -> BeforeAfter | None:
+    """The comparison by the scatter of the means of days, each with its number of runs; None where nothing says it."""
+    if min(len(before.values), len(after.values)) == 0:
+        return None
+    others = OtherDays(rest.values, rest.days, pieces, pieces)
+    try:
+        result = before_after(before.values, after.values, before.days, after.days, others, refuted=REFUTED)
+    except DataError:
+        return None
+    return result if result.decided else None
+
+
+def _student(first: Array, second: Array) -> tuple[float, float] | None:
+    """Standard uncertainty of the difference of the means of two groups of runs and its p-value, with the scatter
+    common to them; None without one."""
+    freedom = len(first) + len(second) - 2
     if min(len(first), len(second)) < 1 or freedom < 1:
         return None
-    squares = sum(float(np.sum((group - group.mean()) ** 2)) for group in groups)
+    squares = sum(float(np.sum((group - group.mean()) ** 2)) for group in (first, second))
     u = float(np.sqrt(squares / freedom * (1.0 / len(first) + 1.0 / len(second))))
-    if u <= 0.0:
-        return None
-    return u, float(2.0 * scipy.special.stdtr(freedom, -abs(second.mean() - first.mean()) / u))
+    return None if u <= 0.0 else (u, _p_value(float(second.mean() - first.mean()), u, freedom))
 
 
-def _following(size: float, groups: Sequence[Array]) -> float:
-    """The p-value of a difference of the first two groups of days if every day resembles the one before it."""
-    stretch = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
-    if min(len(groups[0]), len(groups[1])) < 1:
-        return 1.0
-    result = following_days(np.concatenate(groups), stretch, stretch, (0, 1), refuted=REFUTED)
-    if result is None or result.u <= 0.0:
-        return 1.0
-    return float(2.0 * scipy.special.stdtr(result.dof, -abs(size) / result.u))
-
-
-def _means(series: Series) -> Array:
-    """Means of the days of a part of the history; none of an empty one."""
-    if not len(series.days):
-        return np.empty(0)
-    _, index = np.unique(series.days, return_inverse=True)
-    return np.asarray(np.bincount(index, series.values) / np.bincount(index))
+def _difference_of_days(before: Series, after: Series) -> float:
+    """Mean of the means of the days after less that before; 0 where a side has none."""
+    if min(len(before.values), len(after.values)) == 0:
+        return 0.0
+    first, second = (
+        np.bincount(index, side.values) / np.bincount(index)
+        for side in (before, after)
+        for index in [np.unique(side.days, return_inverse=True)[1]]
+    )
+    return float(second.mean() - first.mean())
