@@ -8,6 +8,8 @@ have, and the angles at which people index. What a fit has to see is told by `id
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from datetime import datetime, timedelta
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +47,8 @@ LARGEST_BAR_DIFFERENCE = 0.5
 PROBE_RANGE = (1e-5, 1.0)
 #: °C of shops and measuring rooms; spindles and motors are hotter, and not asked. 20 °C in kelvin are 293.
 AIR_RANGE = (-40.0, 60.0)
+#: Two days begin at least so far apart: two shifts of one date do not.
+APART = timedelta(hours=12)
 #: What a recorded temperature that says how long the bar was is called.
 AIR_NAMES = ("ambient", "air", "bar", "artefact", "artifact", "workpiece")
 #: Diameters of calibrated balls in mm.
@@ -55,7 +59,7 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
     """Sentences on what to look at, each with the numbers that it rests on; empty for most campaigns."""
     return tuple(
         sentence
-        for check in (_short_runs, _travel, _angles, _places, _statements, _temperatures)
+        for check in (_short_runs, _travel, _angles, _places, _statements, _temperatures, _days)
         for sentence in check(campaign)
     )
 
@@ -225,6 +229,26 @@ def _temperatures(campaign: Campaign) -> Iterator[str]:
         yield (
             f"{name} is {value:g} in run {run_number} ({len(values)} of {len(campaign.runs)} runs lie outside "
             f"{AIR_RANGE[0]:g} to {AIR_RANGE[1]:g} °C): is the unit °C?"
+        )
+
+
+def _days(campaign: Campaign) -> Iterator[str]:
+    """Days that are none: several numbers on one date, which an uncertainty over days would rest on."""
+    first: dict[int, datetime] = {}
+    for run in sorted(campaign.runs, key=lambda run: run.started_at):
+        first.setdefault(run.day, run.started_at)
+    began = sorted(first.items(), key=lambda entry: entry[1])
+    close = [
+        (day, later)
+        for (day, at), (later, after) in pairwise(began)
+        if at.date() == after.date() and after - at < APART
+    ]
+    if close:
+        day, later = close[0]
+        yield (
+            f"days {day} and {later} began on {first[day]:%Y-%m-%d} less than {APART.total_seconds() / 3600.0:g} hours "
+            f"apart ({len(close)} of {len(began) - 1} such): are the numbers in the column day those of days? What "
+            "days differ by is estimated from them"
         )
 
 

@@ -87,13 +87,12 @@ def test_the_workbook_says_it_in_both_sheets(identified_examples: Path, tmp_path
     book = openpyxl.load_workbook(path)
     heads = [cell.value for cell in next(book["parameters long"].iter_rows(max_row=1))]
     assert any(head.startswith("refers_to") for head in heads)
-    wide = next(book["parameters"].iter_rows(max_row=1))
-    notes = {cell.value: cell.comment.text for cell in wide if cell.comment is not None}
+    meanings = {
+        row[1].value: row[2].value for row in book["about"].iter_rows() if row[0].value == "parameters"
+    }
     # On `w C B X b` B hangs on X, C on B; on `w C A Y b` C hangs on A, on `w C B b` and `w C A b` too.
-    assert "refers to: axis X" in next(text for head, text in notes.items() if head.startswith("EA0B"))
-    assert "refers to: axis A or axis B" in next(
-        text for head, text in notes.items() if head.startswith("EB0C")
-    )
+    assert meanings["EA0B / µrad"].endswith("refers to: axis X")
+    assert meanings["EB0C / µrad"].endswith("refers to: axis A or axis B")
 
 
 @pytest.mark.parametrize("name", NAMES)
