@@ -190,16 +190,26 @@ def test_the_ranking_and_the_recommended_interval_rest_on_days_that_follow_each_
     assert soon < 0.7 * late
 
 
-def test_one_check_run_after_days_of_many_does_not_stand_out(tmp_path: Path) -> None:
+def test_one_check_run_after_days_of_many_does_not_stand_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rng = np.random.default_rng(5)
+    gather_values, gather_runs = synthetic.gather_values, synthetic.gather_runs
+    monkeypatch.setattr(synthetic, "gather_values", lambda db: None)
+    monkeypatch.setattr(synthetic, "gather_runs", lambda db: None)
     with Database(tmp_path / "check.duckdb") as db:
-        for i in range(4):
+        for i in range(12):
             values = {name: rng.normal(size=(9, 10)) for name in ("EXX", "EYY", "EZZ")}
-            for matrix in values.values():
-                matrix[-1, 1:] = np.nan
             synthetic.add_machine(db, f"M{i}", values)
-        db.execute("DELETE FROM parameter_value WHERE isnan(value)")
+        # Of the last campaign of each machine one run is left.
+        last = "(SELECT max(campaign_id) FROM imported_campaign GROUP BY machine)"
+        db.execute(f"DELETE FROM parameter_value WHERE identification_id IN {last} AND run > 1")
+        db.execute(f"DELETE FROM run WHERE campaign_id IN {last} AND run > 1")
+        db.execute(f"UPDATE identification SET run_count = 1 WHERE identification_id IN {last}")
+        gather_values(db)
+        gather_runs(db)
         rows = fleet(db, FleetRequest(top=0)).table
+    assert len(rows) == 36
     assert sum(row.attention == "the latest day stands out" for row in rows) <= 1
 
 
