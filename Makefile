@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: challenge concurrency kills pages real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
+.PHONY: supply challenge concurrency kills pages real-data help setup demo test check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -83,6 +83,10 @@ wheel: setup  ## build the wheel and run the tests against it, away from the che
 # What a wheel can lack shows in these: files of the package, migrations, texts and fonts, the command.
 wheel-parts: setup
 	@$(RUN) tests/setup/installed_wheel.py tests/cli tests/readers tests/store tests/reporting tests/test_wheel.py $(PARALLEL) $(ARGS)
+
+supply: setup  ## wheel with its bill of materials in dist/, docs/licences.md, the hashes of all pins
+	@$(RUN) -m pip install --quiet --constraint constraints.txt 'cyclonedx-bom>=7' 'pip-licenses>=5' 'uv>=0.9'
+	@$(RUN) tests/setup/supply.py
 
 clean:  ## remove what the others left, except the virtual environment
 	@rm -rf demo-output pages-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info

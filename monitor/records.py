@@ -44,6 +44,17 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
+class AuditAnchor:
+    """The last entry of a database's audit chain at a moment: its number and its SHA-256, hexadecimal.
+
+    Kept outside of the database, on a certificate or a report, it shows later that nothing before it was rewritten.
+    """
+
+    entry: int
+    sha256: str
+
+
+@dataclass(frozen=True)
 class AxisSettings:
     """What the machine file says of one axis; None where it says nothing.
 

@@ -16,7 +16,7 @@ from monitor.store.analyses import (
     save_analysis,
     stored_analyses,
 )
-from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_entries
+from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_anchor, last_entries
 from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
@@ -149,6 +149,7 @@ __all__ = [
     "import_campaign",
     "import_curve",
     "is_curve",
+    "last_anchor",
     "last_entries",
     "last_used_campaign",
     "latest_documents",

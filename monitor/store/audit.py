@@ -14,6 +14,7 @@ from typing import Any
 
 from monitor import __version__
 from monitor.documents import IN_UTC
+from monitor.records import AuditAnchor
 from monitor.store.connection import Database, utc_now
 
 #: What stands in the first entry for the hash of the entry before.
@@ -48,12 +49,27 @@ def digest(*values: Any) -> str:
 
 def record(db: Database, action: str, subject: str, key: str, content_sha256: str) -> None:
     """Add an entry, inside the transaction of the change that it records."""
-    last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
-    number, previous = last[0] if last else (0, NO_ENTRY_BEFORE)
-    values = [number + 1, utc_now(), db.actor, action, subject, key, content_sha256, __version__, previous]
+    last = last_anchor(db)
+    values = [
+        last.entry + 1,
+        utc_now(),
+        db.actor,
+        action,
+        subject,
+        key,
+        content_sha256,
+        __version__,
+        last.sha256,
+    ]
     db.execute(
         f"INSERT INTO audit ({_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", [*values, digest(*values)]
     )
+
+
+def last_anchor(db: Database) -> AuditAnchor:
+    """Return number and hash of the last entry; entry 0 and zeros where there is none."""
+    last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
+    return AuditAnchor(*last[0]) if last else AuditAnchor(0, NO_ENTRY_BEFORE)
 
 
 def last_entries(db: Database, count: int) -> tuple[AuditEntry, ...]:

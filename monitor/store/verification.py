@@ -73,9 +73,8 @@ def verify_audit(db: Database) -> Verification:
             faults.append(f"{name} is in the database, but not in the audit")
         elif audited[subject, key] not in stored[subject, key].hashes(db):
             faults.append(f"{name} was altered after it was stored")
-    last = db.rows("SELECT entry, entry_sha256 FROM audit ORDER BY entry DESC LIMIT 1")
-    entries, last_sha256 = last[0] if last else (0, audit.NO_ENTRY_BEFORE)
-    return Verification(entries, last_sha256, tuple(faults))
+    last = audit.last_anchor(db)
+    return Verification(last.entry, last.sha256, tuple(faults))
 
 
 @dataclass(frozen=True)

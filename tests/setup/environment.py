@@ -19,6 +19,8 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 VENV = CHECKOUT / ".venv"
 PYTHON = VENV / "bin" / "python"
 EXTRAS = "dev,sign,token,web,cluster"
+# Every file of every pinned version with its SHA-256; made by `make supply` from constraints.txt.
+HASHES = CHECKOUT / "tests" / "setup" / "hashes.txt"
 
 # What WeasyPrint opens at run time, and the Debian and Ubuntu package that holds it.
 LIBRARIES = {
@@ -126,12 +128,14 @@ def make_virtual_environment() -> None:
 
 
 def install_packages() -> None:
-    """Install the pinned packages and the project; the build tool first, so that the pinned one builds."""
+    """Install what is pinned, each file compared with its hash, then the project; nothing else may be missing."""
     say("packages, as pinned in constraints.txt (a minute or two, the first time)")
-    constraints = CHECKOUT / "constraints.txt"
-    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "-q", "install", "-c", constraints)
-    project = f"{CHECKOUT}[{EXTRAS}]"
-    if not (succeeds(*pip, "setuptools") and succeeds(*pip, "--no-build-isolation", "--editable", project)):
+    pip = (PYTHON, "-m", "pip", "--disable-pip-version-check", "-q")
+    offline = ("--no-index", "--no-build-isolation", "--editable", f"{CHECKOUT}[{EXTRAS}]")
+    if not (
+        succeeds(*pip, "install", "--require-hashes", "--no-deps", "-r", HASHES)
+        and succeeds(*pip, "install", *offline)
+    ):
         raise SetupStoppedError(
             "pip could not install the packages; its words are above. Calling make again goes on."
         )

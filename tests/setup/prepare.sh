@@ -8,7 +8,7 @@ cd "$(dirname "$0")/../.."
 state() {
     {
         pwd -P
-        cat pyproject.toml constraints.txt tests/setup/prepare.sh tests/setup/environment.py
+        cat pyproject.toml constraints.txt tests/setup/hashes.txt tests/setup/prepare.sh tests/setup/environment.py
         grep '^__version__' monitor/__init__.py
     } | sha256sum
 }

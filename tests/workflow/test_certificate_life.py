@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import UTC, date, datetime, timedelta
@@ -18,7 +19,7 @@ from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.dcc_results import DCC
-from monitor.reporting.certificate.record import CertificateRecord, Replaced
+from monitor.reporting.certificate.record import CertificateRecord, Replaced, Signer
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signature import SignatureFinding, check_signature
 from monitor.reporting.signature.signing import FileKey, sign
@@ -36,6 +37,7 @@ from monitor.workflow.certificate.request import (
 )
 from monitor.workflow.certificate.states import write_issued
 from monitor.workflow.certificate.verification import verify_file
+from monitor.workflow.keeping import VerifyRequest, verify
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 LABORATORY = EXAMPLES / "laboratory.toml"
@@ -52,6 +54,16 @@ def db(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
     with Database(tmp_path_factory.mktemp("life") / "c.duckdb", threads=1) as opened:
         import_campaign(opened, read_campaign(EXAMPLES / "five-days"))
         yield opened
+
+
+def fingerprint_of(key: FileKey) -> str:
+    """The SHA-256 of the signer's certificate in an open PKCS#12 file, by another library than the product's."""
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.serialization import pkcs12
+
+    _, certificate, _ = pkcs12.load_key_and_certificates(key.path.read_bytes(), None)
+    assert certificate is not None
+    return certificate.fingerprint(hashes.SHA256()).hex()
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +118,21 @@ def test_one_byte_changed_at_200_random_places_is_found_by_the_hash_and_by_the_s
         assert any("altered" in fault or "does not" in fault for fault in found.faults[1:]), where
 
 
+def test_a_certificate_that_another_signs_than_it_states_is_not_confirmed(
+    db: Database, key: FileKey, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certificates, "signer_of", lambda _: Signer("Common Name: Somebody", "ab" * 32))
+    issued = issue(
+        db,
+        CertificateRequest(
+            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="S-2", issued_on=DAY, key=key
+        ),
+    )
+    answer = verify_file(db, VerificationRequest(Path(issued.file)))
+    assert answer.checks == CertificateChecks(hash=True, chain=True, signature=False, database=True)
+    assert any("states that Common Name: Somebody" in fault for fault in answer.faults)
+
+
 def test_a_signed_certificate_is_verified_check_by_check(db: Database, key: FileKey, tmp_path: Path) -> None:
     made = issue(
         db,
@@ -118,6 +145,14 @@ def test_a_signed_certificate_is_verified_check_by_check(db: Database, key: File
     assert good.ok is True
     assert good.checks == CertificateChecks(hash=True, chain=True, signature=True, database=True)
     assert good.signer == "Common Name: Made-up Laboratory"
+    # Who checks in years: the signer's certificate, and an entry of the audit that was the last one then, both on
+    # paper.
+    fingerprint = fingerprint_of(key)
+    assert good.signer_sha256 == fingerprint
+    page = "".join(pypdf.PdfReader(file).pages[-1].extract_text().split())
+    assert fingerprint in page
+    (anchor,) = re.findall(r"isnumber\d+;itsSHA-256is([0-9a-f]{64})", page)
+    assert verify(db, VerifyRequest(anchor, recompute=0)).anchored_entry is not None
     assert remake(db, RemakeRequest("S-1")).identical is True
     whole = file.read_bytes()
     altered = bytearray(whole)

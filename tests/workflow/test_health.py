@@ -22,6 +22,7 @@ from monitor.cli import main
 from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
+from monitor.records import AuditAnchor
 from monitor.reporting.health.records import STATES, Change, MachineHealth
 from monitor.reporting.health.render import health_html, health_pdf
 from monitor.reporting.health.words import in_words
@@ -35,6 +36,7 @@ from monitor.workflow.history.changes import FALSE_ALARM, search_changes
 from monitor.workflow.history.drift import PieceDrift
 from monitor.workflow.history.past import machine_past
 from monitor.workflow.history.series import Series
+from monitor.workflow.keeping import VerifyRequest, verify
 from monitor.workflow.uncertainty.evaluation import uncertainty
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.volumetric.request import VolumetricRequest
@@ -223,7 +225,15 @@ def test_a_week_to_come_is_refused_and_one_that_runs_says_so(fleet: Database, tm
     assert "has not ended" not in text_of(ended["files"][1])[0]
 
 
-def test_the_same_records_give_the_same_bytes(fleet: Database, week10: dict, tmp_path: Path) -> None:
+def test_the_same_records_give_the_same_bytes_and_the_entry_of_the_audit_that_was_the_last(
+    fleet: Database, week10: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = next(Path(name) for name in week10["files"] if name.endswith(".html")).read_text("utf-8")
+    ((number, sha256),) = re.findall(r"audit then, number (\d+), has the SHA-256 ([0-9a-f]{64})", page)
+    assert verify(fleet, VerifyRequest(sha256, recompute=0)).anchored_entry == int(number)
+    monkeypatch.setattr(
+        "monitor.workflow.health.report.last_anchor", lambda db: AuditAnchor(int(number), sha256)
+    )
     again = report(fleet, "2026-W10", out=tmp_path, made_at=MADE)
     for before, after in zip(week10["files"], again["files"], strict=True):
         assert Path(before).read_bytes() == Path(after).read_bytes()

@@ -217,6 +217,7 @@ def _verify(options: Namespace) -> int:
         output.say(f"{name:<10} {'not signed' if passed is None else 'good' if passed else 'FAILED'}")
     if answer.signer is not None:
         output.say(f"signed by {answer.signer}{'' if options.trust else ' (not checked against --trust)'}")
+        output.say(f"           its certificate has the SHA-256 {answer.signer_sha256}")
     for fault in answer.faults:
         output.say(f"  {fault}")
     name = options.file if answer.number is None else f"certificate {answer.number}"

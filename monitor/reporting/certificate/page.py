@@ -86,8 +86,21 @@ def certificate_context(record: CertificateRecord) -> dict[str, Any]:
             (texts("page.opinions"), answer(record.opinions, texts)),
             (texts("page.validity"), answer(record.relates_only, texts)),
             (texts("page.reproduction"), answer(record.reproduction, texts)),
+            *_beside_the_file(record, texts),
         ],
     }
+
+
+def _beside_the_file(record: CertificateRecord, texts: Texts) -> list[tuple[str, str]]:
+    """What somebody needs who checks the file years later: who signs it, and where the audit of the database stood."""
+    rows = []
+    if record.signer is not None:
+        signer = texts("page.signer", name=record.signer.name, sha256=record.signer.sha256)
+        rows.append((texts("page.signer_title"), signer))
+    if record.anchor is not None:
+        anchor = texts("page.anchor", entry=record.anchor.entry, sha256=record.anchor.sha256)
+        rows.append((texts("page.anchor_title"), anchor))
+    return rows
 
 
 def _method(method: MethodUsed, texts: Texts) -> list[tuple[str, str]]:

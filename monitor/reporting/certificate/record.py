@@ -13,6 +13,7 @@ from datetime import date
 from enum import StrEnum
 
 from monitor.documents import OMITTED
+from monitor.records import AuditAnchor
 from monitor.reporting.certificate.grounds import AcceptedGround
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
@@ -111,6 +112,14 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
+class Signer:
+    """Who signs the file electronically: the name in the signing certificate, and that one's SHA-256, hexadecimal."""
+
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True)
 class ConformityVerdict:
     """What is stated of one parameter: its tolerance (limit of the absolute value) and probability of conformity.
 
@@ -197,7 +206,8 @@ class CertificateRecord:
     ``replaces`` is the certificate that this one amends. ``volumetric`` maps follow from the ``results``; they are
     printed where one was asked for. ``accepted`` are the grounds against it that the laboratory answers for; None where
     there were none. ``accredited`` and ``mark`` (a picture as a data address) are printed where the laboratory states
-    them, ``standards`` with the traceability.
+    them, ``standards`` with the traceability. ``anchor`` is the last entry of the audit when the certificate was made,
+    ``signer`` who signs the file; both None in records of earlier versions.
     """
 
     title: str | None
@@ -232,3 +242,5 @@ class CertificateRecord:
     accredited: Accreditation | None = field(default=None, metadata=OMITTED)
     mark: str | None = field(default=None, metadata=OMITTED)
     standards: tuple[Standard, ...] | None = field(default=None, metadata=OMITTED)
+    anchor: AuditAnchor | None = field(default=None, metadata=OMITTED)
+    signer: Signer | None = field(default=None, metadata=OMITTED)

@@ -137,6 +137,7 @@ def fleet_context(fleet: Fleet) -> dict[str, Any]:
         "made_iso": fleet.made_at.isoformat() + "Z",
         "software": fleet.software,
         "risk": percent(fleet.risk),
+        "anchor": fleet.anchor,
         "ended": fleet.ended,
         "lines": [_line(row) for row in fleet.rows],
         "legend": [

@@ -11,6 +11,7 @@ from datetime import date, datetime
 from typing import Literal
 
 from monitor.documents import OMITTED
+from monitor.records import AuditAnchor
 from monitor.reporting.health.comparison import ModelHealth
 from monitor.reporting.svg.map_slices import Slice
 
@@ -224,7 +225,8 @@ class Fleet:
     ``refused_imports`` are those of the week that stand on no machine's page: their machine is not known. ``ended``
     says whether the week had, by the shop's clock, when the report was made. ``attention`` are the records of the most
     urgent machines, for the pictures and answers of the first page. ``noticed``: machine and sentence of what was
-    noticed in the week under weekly looks at the fleet.
+    noticed in the week under weekly looks at the fleet. ``anchor`` is the last entry of the audit when the report was
+    made.
     """
 
     week: str
@@ -238,6 +240,7 @@ class Fleet:
     ended: bool = True
     noticed: tuple[tuple[str, str], ...] = ()
     attention: tuple[MachineHealth, ...] = ()
+    anchor: AuditAnchor | None = None
 
 
 def fleet_row(health: MachineHealth) -> FleetRow:

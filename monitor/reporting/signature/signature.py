@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.record import Signer
 
 #: A file with any of these bytes carries a signature, or carried one before it was altered.
 _MARKS = (b"/ByteRange", b"/ETSI.CAdES.detached", b"/Adobe.PPKLite", b"/Type /Sig")
@@ -23,7 +24,7 @@ class SignatureFinding:
     """The finding about a file's signature: None for ``good`` where it carries none."""
 
     good: bool | None
-    signer: str | None
+    signer: Signer | None
     faults: tuple[str, ...]
 
 
@@ -58,7 +59,7 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
         (signature,) = signatures
         status = validate_pdf_signature(signature, signer_validation_context=context)
         certificate = _Certificate(
-            signature.signer_cert.subject.human_friendly,
+            signer_in(signature.signer_cert),
             signature.signer_cert.not_valid_before,
             signature.signer_cert.not_valid_after,
         )
@@ -74,7 +75,7 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
 
 @dataclass(frozen=True)
 class _Certificate:
-    signer: str
+    signer: Signer
     first: datetime
     last: datetime
 
@@ -101,7 +102,7 @@ def _faults_of_file(status: Any, clean: bool) -> list[str]:
 
 
 def _faults_of_signer(status: Any, certificate: _Certificate, moment: datetime) -> list[str]:
-    signer, first, last = certificate.signer, certificate.first, certificate.last
+    signer, first, last = certificate.signer.name, certificate.first, certificate.last
     if not first <= moment <= last:
         return [
             f"the certificate of {signer} is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d}, not on {moment:%Y-%m-%d}"
@@ -123,6 +124,11 @@ def _room_is_clean(pdf: bytes, covered: list[int]) -> bool:
     size = int.from_bytes(content[2 : 2 + octets], "big") if octets else content[1]
     exact = content[: 2 + octets + size].hex().ljust(len(digits), "0").encode("ascii")
     return room[:1] == b"<" and room[-1:] == b">" and digits in (exact, exact.upper())
+
+
+def signer_in(certificate: Any) -> Signer:
+    """Return the name and the fingerprint in a certificate, an ``asn1crypto.x509.Certificate``."""
+    return Signer(certificate.subject.human_friendly, certificate.sha256.hex())
 
 
 def need_pyhanko() -> None:

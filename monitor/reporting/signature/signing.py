@@ -10,14 +10,15 @@ from __future__ import annotations
 import io
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from monitor.exceptions import InputError
-from monitor.reporting.signature.signature import need_pyhanko
+from monitor.reporting.certificate.record import Signer
+from monitor.reporting.signature.signature import need_pyhanko, signer_in
 
 _FIELD = "Signature"
 #: Bytes reserved for the signature itself; a certificate chain of three with RSA 4096 needs about 12 000.
@@ -70,7 +71,7 @@ def sign(pdf: bytes, key: Key) -> bytes:
         docmdp_permissions=fields.MDPPerm.NO_CHANGES,
     )
     out = io.BytesIO()
-    with _token_signer(key) if isinstance(key, TokenKey) else _file_signer(key) as signer:
+    with _opened(key) as signer:
         _check_in_force(signer.signing_cert)
         signers.sign_pdf(
             IncrementalPdfFileWriter(io.BytesIO(pdf)),
@@ -80,6 +81,18 @@ def sign(pdf: bytes, key: Key) -> bytes:
             bytes_reserved=_ROOM_BYTES,
         )
     return out.getvalue()
+
+
+def signer_of(key: Key) -> Signer:
+    """Return who signs with ``key``, as its certificate says. Raises what ``sign`` raises."""
+    need_pyhanko()
+    with _opened(key) as signer:
+        _check_in_force(signer.signing_cert)
+        return signer_in(signer.signing_cert)
+
+
+def _opened(key: Key) -> AbstractContextManager[Any]:
+    return _token_signer(key) if isinstance(key, TokenKey) else _file_signer(key)
 
 
 def _check_in_force(certificate: Any) -> None:

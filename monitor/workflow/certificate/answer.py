@@ -82,7 +82,10 @@ class CertificateChecks:
 
 @dataclass(frozen=True)
 class VerificationAnswer:
-    """Whether a file is a genuine and valid certificate of this database; ``faults`` say why not."""
+    """Whether a file is a genuine and valid certificate of this database; ``faults`` say why not.
+
+    ``signer_sha256`` is the fingerprint of the signer's certificate, None where the file is not signed.
+    """
 
     number: str | None
     ok: bool
@@ -90,3 +93,4 @@ class VerificationAnswer:
     checks: CertificateChecks
     signer: str | None
     faults: tuple[str, ...]
+    signer_sha256: str | None = None

@@ -17,10 +17,11 @@ from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.pdf.render import certificate_pdf
-from monitor.reporting.signature.signing import sign
+from monitor.reporting.signature.signing import sign, signer_of
 from monitor.reporting.texts import ENGLISH, Texts, texts_of
 from monitor.store import (
     Database,
+    last_anchor,
     load_certificate,
     mark_certificate,
     save_certificate,
@@ -74,13 +75,17 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
     runs = [certified_run(db, campaign, model, run, request.asked, stored[run.run]) for run in measured]
     inputs = inputs_of(runs, request.asked, request.fonts)
 
+    signer = None if request.key is None else signer_of(request.key)
+
     def recorded(number: str) -> CertificateRecord:
         identity = CertificateIdentity(
             number, day, label(runs[-1].evaluated.model),
             method_name=_method_name(campaign.method, texts_of(stated.language or ENGLISH)),
         )  # fmt: skip
         record = _record(stated, runs, request, identity)
-        return dataclasses.replace(record, replaces=replaced, accepted=accepted or None)
+        return dataclasses.replace(
+            record, replaces=replaced, accepted=accepted or None, anchor=last_anchor(db), signer=signer
+        )
 
     for _ in range(_NUMBERS):
         # Nobody waits while a page is rendered; whoever was quicker has the number, and this one takes the next.

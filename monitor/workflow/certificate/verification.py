@@ -40,6 +40,8 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
     signature = SignatureFinding(None, None, ())
     if is_signed(content):
         signature = check_signature(content, request.trusted, at)
+    if stored is not None:
+        signature = _as_stated(signature, stored)
     checks = CertificateChecks(
         hash=stored is not None,
         chain=chain.ok,
@@ -58,9 +60,23 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         ok=checks.passed,
         state=None if stored is None else stored.state,
         checks=checks,
-        signer=signature.signer,
+        signer=None if signature.signer is None else signature.signer.name,
+        signer_sha256=None if signature.signer is None else signature.signer.sha256,
         faults=(*([] if invalid is None else [invalid]), *other, *signature.faults, *chain.faults),
     )
+
+
+def _as_stated(signature: SignatureFinding, stored: StoredCertificate) -> SignatureFinding:
+    """Return the finding, with a fault where another signed than the certificate itself states.
+
+    Certificates of earlier versions state nobody.
+    """
+    stated = stored.record.get("signer")
+    if stated is None or (signature.signer is not None and signature.signer.sha256 == stated["sha256"]):
+        return signature
+    actual = "nobody" if signature.signer is None else f"{signature.signer.name} ({signature.signer.sha256})"
+    fault = f"the certificate states that {stated['name']} ({stated['sha256']}) signs it, and {actual} does"
+    return SignatureFinding(False, signature.signer, (*signature.faults, fault))
 
 
 def _unknown(db: Database, name: str, content: bytes) -> str:

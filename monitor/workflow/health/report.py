@@ -26,6 +26,7 @@ from monitor.store import (
     analysis_text,
     campaign_machines,
     check_campaigns,
+    last_anchor,
     machine_descriptions,
     save_analysis,
 )
@@ -84,6 +85,7 @@ def report(
             ended=today > week.last,
             noticed=tuple((notice.machine, sentence(notice)) for notice in looks.notices),
             attention=tuple(stored_health(db, number) for _, number in rows[:ATTENTION]),
+            anchor=last_anchor(db),
         )  # fmt: skip
         files = _write(db, fleet, [number for _, number in rows], request, engine)
     return _answer(fleet, week, files, looks)
