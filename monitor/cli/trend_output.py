@@ -164,8 +164,10 @@ def _change(name: str, change: DatedChange) -> str:
 def _event_step(name: str, step: StepAtEvent) -> str:
     size = f"{output.rounded(step.size, step.u)} {step.unit} (u = {output.two_digits(step.u)} {step.unit})"
     event = f"the event of {_minute(step.at)} UTC, {step.kind}: {step.description}"
-    if step.scatter_of == "days":
+    if step.decided:
         return f"{name} stepped by {size} at {event} (p = {output.probability(step.p_value)})"
+    if step.scatter_of == "days":
+        return f"{name} differs by {size} before and after {event}, {agreement.DAYS_MAY_DO}"
     return (
         f"{name} differs by {size} before and after {event}; u is of the runs alone, {agreement.NOT_DECIDED}"
     )

@@ -8,6 +8,8 @@ have, and the angles at which people index. What a fit has to see is told by `id
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from datetime import datetime, timedelta
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +45,12 @@ LARGEST_SHARE = 1e-3
 LARGEST_BAR_DIFFERENCE = 0.5
 #: Standard uncertainties of probes and trackers in mm: 0.01 µm is finer than any, 1 mm coarser than any.
 PROBE_RANGE = (1e-5, 1.0)
+#: °C of shops and measuring rooms; spindles and motors are hotter, and not asked. 20 °C in kelvin are 293.
+AIR_RANGE = (-40.0, 60.0)
+#: Two days begin at least so far apart: two shifts of one date do not.
+APART = timedelta(hours=12)
+#: What a recorded temperature that says how long the bar was is called.
+AIR_NAMES = ("ambient", "air", "bar", "artefact", "artifact", "workpiece")
 #: Diameters of calibrated balls in mm.
 BALL_RANGE = (0.1, 300.0)
 
@@ -51,7 +59,7 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
     """Sentences on what to look at, each with the numbers that it rests on; empty for most campaigns."""
     return tuple(
         sentence
-        for check in (_short_runs, _travel, _angles, _places, _statements)
+        for check in (_short_runs, _travel, _angles, _places, _statements, _temperatures, _days)
         for sentence in check(campaign)
     )
 
@@ -208,6 +216,65 @@ def _statements(campaign: Campaign) -> Iterator[str]:
             f"the scale bar is {bar.length:g} mm long, but its balls {' and '.join(bar.balls)} are declared "
             f"{bar.length - difference:.7g} mm apart: check length_mm and nominal_mm"
         )
+
+
+def _temperatures(campaign: Campaign) -> Iterator[str]:
+    """Air, bars and workpieces at which nobody measures: kelvin or Fahrenheit."""
+    implausible: dict[str, list[tuple[int, float]]] = {}
+    for run in campaign.runs:
+        for name, value in implausible_temperatures(campaign, run.run).items():
+            implausible.setdefault(name, []).append((run.run, value))
+    for name, values in implausible.items():
+        run_number, value = values[0]
+        yield (
+            f"{name} is {value:g} in run {run_number} ({len(values)} of {len(campaign.runs)} runs lie outside "
+            f"{AIR_RANGE[0]:g} to {AIR_RANGE[1]:g} °C): is the unit °C?"
+        )
+
+
+def _days(campaign: Campaign) -> Iterator[str]:
+    """Days that are none: several numbers on one date, which an uncertainty over days would rest on."""
+    first: dict[int, datetime] = {}
+    for run in sorted(campaign.runs, key=lambda run: run.started_at):
+        first.setdefault(run.day, run.started_at)
+    began = sorted(first.items(), key=lambda entry: entry[1])
+    close = [
+        (day, later)
+        for (day, at), (later, after) in pairwise(began)
+        if at.date() == after.date() and after - at < APART
+    ]
+    if close:
+        day, later = close[0]
+        yield (
+            f"days {day} and {later} began on {first[day]:%Y-%m-%d} less than {APART.total_seconds() / 3600.0:g} hours "
+            f"apart ({len(close)} of {len(began) - 1} such): are the numbers in the column day those of days? What "
+            "days differ by is estimated from them"
+        )
+
+
+def implausible_temperatures(campaign: Campaign, run: int) -> dict[str, float]:
+    """Temperatures of the air, a bar or a workpiece in a run that no place has, °C by name: the one that is farthest
+    off."""
+    rows = campaign.probings.run == run
+    recorded: dict[str, Array] = {
+        name: values[rows] for name, values in campaign.probings.channels.items() if name.endswith("_degC")
+    }
+    for measured in campaign.runs:
+        if measured.run == run:
+            recorded |= {name: np.array([value]) for name, value in measured.conditions.items()}
+    result = {}
+    for name, values in recorded.items():
+        finite = values[np.isfinite(values)]
+        if (
+            not len(finite)
+            or not name.endswith("_degC")
+            or not any(word in name.lower() for word in AIR_NAMES)
+        ):
+            continue
+        farthest = float(finite[np.abs(finite - sum(AIR_RANGE) / 2.0).argmax()])
+        if not AIR_RANGE[0] <= farthest <= AIR_RANGE[1]:
+            result[name] = farthest
+    return result
 
 
 def bar_difference(campaign: Campaign) -> float | None:

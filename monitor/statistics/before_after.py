@@ -5,7 +5,10 @@ its uncertainty: what is left is the scatter of the means of days, whatever make
 days of both sides and, where these are few, from other days of the same machine. One day a side and no other day cannot
 tell a change from days that differ, however many runs there are: then nothing is decided. Judged by E_n with the
 expanded uncertainty at 95 % for the degrees of freedom that there are, so that of machines that did not change one in
-twenty is said to have. Compare results of different methods, which share less, with ``normalised_error``.
+twenty is said to have. Days of a campaign may also resemble those before them, which few days do not show: what is
+beyond independent days but not beyond such (``following_days``), or beyond days of one scatter but not beyond two sides
+that scatter differently, is not decided either. Compare results of different
+methods, which share less, with ``normalised_error``.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_vector
+from monitor.statistics.following_days import REFUTED, FollowingDays, following_days
 from monitor.statistics.sums import label_groups
 
 #: Probability with which the expanded uncertainty holds the difference of a machine that did not change.
@@ -54,6 +58,10 @@ class BeforeAfter:
     their runs, None where no two days are alike: then the difference of the machine and that of two days are one, ``u``
     is of runs alone, and nothing is ``decided``. ``other_days`` of the machine took part in the estimate; of so many
     ``other_campaigns`` the means differ by more than that, and ``u``, ``dof`` and ``k`` are theirs (0: they do not).
+    ``cautious`` is the largest expanded uncertainty that the days do not exclude: for days that resemble those before
+    them by ``correlation``, and for sides of different scatter (Welch; where no other days took part and both have
+    two); None where other campaigns say how campaigns differ, or nothing is known of the days. ``following`` is the
+    first of the two.
     """
 
     before: float
@@ -67,6 +75,9 @@ class BeforeAfter:
     between: float | None
     other_days: int
     other_campaigns: int = 0
+    cautious: float | None = None
+    following: FollowingDays | None = None
+    correlation: float | None = None
 
     @property
     def decided(self) -> bool:
@@ -85,19 +96,25 @@ class BeforeAfter:
 
     @property
     def agree(self) -> bool | None:
-        """Whether the difference is no larger than its expanded uncertainty; None where nothing is decided."""
-        return None if self.e_n is None else abs(self.e_n) <= 1.0
+        """Whether the difference is no larger than its expanded uncertainty; None where nothing is decided: nothing is
+        known of the days, or it is larger for independent days of one scatter only."""
+        if self.e_n is None:
+            return None
+        if abs(self.e_n) <= 1.0:
+            return True
+        return None if self.cautious is not None and abs(self.difference) <= self.cautious else False
 
 
 @dataclass(frozen=True)
 class _Means:
-    """Means of d days with their numbers of runs, the stretch of each from 0 (before), 1 (after) on, and the sum of
-    squares within the days."""
+    """Means of d days with their numbers of runs, the stretch of each from 0 (before), 1 (after) on, the sum of
+    squares within the days, and the campaign of each."""
 
     mean: Array
     runs: Array
     stretch: npt.NDArray[np.intp]
     within: float
+    campaign: npt.NDArray[np.intp]
 
     @property
     def dof_days(self) -> int:
@@ -108,28 +125,29 @@ class _Means:
         return int(self.runs.sum()) - len(self.mean)
 
 
-def _means(values: Array, day: npt.NDArray[np.intp], stretch: npt.NDArray[np.intp]) -> _Means:
+def _means(
+    values: Array, day: npt.NDArray[np.intp], stretch: npt.NDArray[np.intp], campaign: npt.NDArray[np.intp]
+) -> _Means:
     runs = np.bincount(day).astype(np.float64)
     # About one of the values: a large value common to all would cost digits.
     away = values - values[0]
     mean = np.bincount(day, away) / runs
-    of_day = np.zeros(len(runs), dtype=np.intp)
-    of_day[day] = stretch
-    return _Means(mean + values[0], runs, of_day, float(((away - mean[day]) ** 2).sum()))
+    of_day, by_campaign = np.zeros((2, len(runs)), dtype=np.intp)
+    of_day[day], by_campaign[day] = stretch, campaign
+    return _Means(mean + values[0], runs, of_day, float(((away - mean[day]) ** 2).sum()), by_campaign)
 
 
-def _joined(columns: list[tuple[Array, npt.ArrayLike, npt.NDArray[np.intp]]]) -> _Means:
+def _joined(
+    columns: list[tuple[Array, npt.ArrayLike, npt.NDArray[np.intp], npt.NDArray[np.intp]]],
+) -> _Means:
     """Means of the days of several parts, whose days differ although their labels may be alike."""
     day, count = [], 0
-    for values, days, _ in columns:
+    for values, days, *_ in columns:
         index = label_groups(days, len(values))[1]
         day.append(index + count)
         count += int(index.max()) + 1
-    return _means(
-        np.concatenate([values for values, _, _ in columns]),
-        np.concatenate(day),
-        np.concatenate([stretch for _, _, stretch in columns]),
-    )
+    values, stretch, campaign = (np.concatenate([column[i] for column in columns]) for i in (0, 2, 3))
+    return _means(values, np.concatenate(day), stretch, campaign)
 
 
 def before_after(
@@ -138,6 +156,7 @@ def before_after(
     days_before: npt.ArrayLike,
     days_after: npt.ArrayLike,
     others: OtherDays | None = None,
+    refuted: float = REFUTED,
 ) -> BeforeAfter:
     """Compare runs (n,) before with runs (m,) after an event, of the days (n,) and (m,), every day alike.
 
@@ -145,6 +164,7 @@ def before_after(
     for independent normal days of as many runs, whatever the day component; with unequal numbers of runs the scatter of
     the runs makes up what the means of a side scatter more than those of the others (Satterthwaite). A day that the
     event cuts in two counts on both sides: its two halves share what is of the day only in part, which is neglected.
+    ``refuted`` is that of ``following_days``.
     Raises ``DataError`` for fewer than three runs, or where nothing scatters. Measured: docs/trials-statistics.md.
     """
     x, y = as_vector(before, "before"), as_vector(after, "after")
@@ -152,18 +172,20 @@ def before_after(
         raise DataError(
             f"{len(x)} run(s) before and {len(y)} after say nothing of their scatter; three are needed."
         )
-    sides = [(x, days_before, np.zeros(len(x), np.intp)), (y, days_after, np.ones(len(y), np.intp))]
+    of_x, of_y = np.zeros(len(x), np.intp), np.ones(len(y), np.intp)
+    sides = [(x, days_before, of_x, of_x), (y, days_after, of_y, of_y)]
     joined = _joined(sides)
     means, other_days = joined, 0
     if others is not None and joined.dof_days < ENOUGH and len(np.asarray(others.values)):
         values = as_vector(others.values, "others")
         stretch = label_groups(others.stretches, len(values))[1] + 2
-        every = _joined([*sides, (values, others.days, stretch)])
+        campaign = label_groups(others.campaigns, len(values))[1] + 2
+        every = _joined([*sides, (values, others.days, stretch, campaign)])
         if every.dof_days > joined.dof_days:
             means, other_days = every, len(every.mean) - len(joined.mean)
     if np.ptp(x) == 0.0 and np.ptp(y) == 0.0:
         raise DataError("no run differs from the others of its side; the difference has no uncertainty.")
-    result = _judged(joined, means, other_days)
+    result = _judged(joined, means, other_days, refuted)
     return result if others is None else _beside_campaigns(result, others)
 
 
@@ -173,6 +195,8 @@ def _beside_campaigns(result: BeforeAfter, others: OtherDays) -> BeforeAfter:
     dof = len(means) - len(np.unique(stretch))
     if dof < CAMPAIGNS_THAT_SAY:
         return result
+    # Days that follow each other make campaigns differ, and that is known.
+    result = replace(result, cautious=None, correlation=None, following=None)
     squares = sum(
         float(((means[stretch == i] - means[stretch == i].mean()) ** 2).sum()) for i in set(stretch)
     )
@@ -207,7 +231,7 @@ def _factor(dof: float) -> float:
     return -float(scipy.special.stdtrit(dof, (1.0 - LEVEL) / 2.0))
 
 
-def _judged(of_sides: _Means, means: _Means, other_days: int) -> BeforeAfter:
+def _judged(of_sides: _Means, means: _Means, other_days: int, refuted: float) -> BeforeAfter:
     """The difference of the two sides of ``of_sides`` by the scatter of the days of ``means``."""
     sides = [of_sides.stretch == side for side in (0, 1)]
     first, second = (float(of_sides.mean[side].mean()) for side in sides)
@@ -217,19 +241,26 @@ def _judged(of_sides: _Means, means: _Means, other_days: int) -> BeforeAfter:
     of_runs = means.within / means.dof_runs if means.dof_runs else 0.0
     if means.dof_days == 0:
         # Nothing is known of the days: what the runs say, as a lower bound.
-        variances, dof, between = of_runs * share / days, float(means.dof_runs), None
+        variances, dof, between, follow = of_runs * share / days, float(means.dof_runs), None, None
     else:
         of_days, expected = _scatter_of_days(means)
-        by_runs = of_runs * float(np.maximum(share - expected, 0.0) @ (1.0 / days))
-        by_days = of_days * float((1.0 / days).sum())
-        total = by_days + by_runs
+        by_runs = of_runs * float(np.maximum(share - expected, 0.0) @ (1.0 / days)), means.dof_runs
+        dof = _satterthwaite((of_days * float((1.0 / days).sum()), means.dof_days), by_runs)
         variances = (of_days + of_runs * np.maximum(share - expected, 0.0)) / days
-        parts = by_days**2 / means.dof_days + (by_runs**2 / means.dof_runs if means.dof_runs else 0.0)
-        dof = total**2 / parts if parts > 0.0 else float(means.dof_days)
         between = float(np.sqrt(max(of_days - of_runs * expected, 0.0)))
+        follow = following_days(means.mean, means.stretch, means.campaign, (0, 1), refuted)
     u = float(np.sqrt(variances.sum()))
     if u == 0.0:
         raise DataError("no day differs from the others of its side; the difference has no uncertainty.")
+    cautious = following = None
+    if follow is not None:
+        following = FollowingDays(
+            float(np.hypot(follow.u, np.sqrt(by_runs[0]))),
+            _satterthwaite((follow.u**2, follow.dof), by_runs),
+            follow.correlation,
+        )
+        unequal = 0.0 if other_days else _unequal(of_sides, sides)
+        cautious = max(_factor(following.dof) * following.u, unequal, _factor(dof) * u)
     return BeforeAfter(
         before=first,
         after=second,
@@ -241,7 +272,27 @@ def _judged(of_sides: _Means, means: _Means, other_days: int) -> BeforeAfter:
         k=_factor(dof),
         between=between,
         other_days=other_days,
+        cautious=cautious,
+        correlation=None if follow is None else follow.correlation,
+        following=following,
     )
+
+
+def _unequal(of_sides: _Means, sides: list[npt.NDArray[np.bool_]]) -> float:
+    """Expanded uncertainty of the difference with the scatter of each side by its own days, 0 where one has one day.
+
+    Source: B. L. Welch, Biometrika 29 (1938) 350.
+    """
+    if min(int(side.sum()) for side in sides) < 2:
+        return 0.0
+    parts = [(float(of_sides.mean[side].var(ddof=1) / side.sum()), float(side.sum()) - 1.0) for side in sides]
+    return _factor(_satterthwaite(*parts)) * float(np.sqrt(sum(variance for variance, _ in parts)))
+
+
+def _satterthwaite(*parts: tuple[float, float]) -> float:
+    """Degrees of freedom of a sum of variances with their own (GUM G.4.1); parts of none or of no size are left out."""
+    squares = sum(variance**2 / dof for variance, dof in parts if dof)
+    return sum(variance for variance, _ in parts) ** 2 / squares if squares > 0.0 else float(parts[0][1])
 
 
 def _scatter_of_days(means: _Means) -> tuple[float, float]:

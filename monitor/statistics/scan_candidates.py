@@ -16,6 +16,9 @@ Kind = Literal["step", "slope", "trend", "transient"]
 DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
 #: Fewest runs on each side of a change: one run alone is an outlier, not a change.
 EDGE = 2
+#: A decay of which the first run alone makes so much of the sum of squares is that one run, an outlier: with heavy
+#: tails most false changes of 20 runs were such (docs/trials-statistics.md).
+ONE_RUN = 0.75
 
 
 #: A wave is no change where the history covers this share of its period, with so many runs.
@@ -41,9 +44,10 @@ def candidates(times: Array, base: Base) -> tuple[Array, tuple[Kind, ...], npt.N
     steps_of: list[Kind] = ["step"] * len(at)
     if base == "constant":
         decays = np.exp(-scaled[:, np.newaxis] / np.array(DECAYS))
+        decays = decays[:, decays[0] ** 2 <= ONE_RUN * (decays**2).sum(axis=0)]
         columns = np.column_stack([scaled, decays, steps])
-        kinds: list[Kind] = ["trend", *_transients()]
-        return columns, (*kinds, *steps_of), np.concatenate([np.zeros(1 + len(DECAYS), dtype=np.int64), at])
+        kinds: list[Kind] = ["trend", *_transients(decays.shape[1])]
+        return columns, (*kinds, *steps_of), np.concatenate([np.zeros(len(kinds), dtype=np.int64), at])
     bends = after * (scaled[:, np.newaxis] - scaled[at - 1])
     inner = slice(1, len(at) - 1) if len(at) > 4 else slice(0, 0)
     columns = np.column_stack([steps, bends[:, inner]])
@@ -51,5 +55,5 @@ def candidates(times: Array, base: Base) -> tuple[Array, tuple[Kind, ...], npt.N
     return columns, (*steps_of, *bends_of), np.concatenate([at, at[inner]])
 
 
-def _transients() -> list[Kind]:
-    return ["transient" for _ in DECAYS]
+def _transients(count: int) -> list[Kind]:
+    return ["transient" for _ in range(count)]

@@ -93,10 +93,13 @@ def _parameters_long(db: Database, machine: str | None) -> Sheet:
 def _parameters(db: Database, machine: str | None) -> Sheet:
     """A row for every run of every model, an estimate and its standard uncertainty a parameter."""
     keys = ("campaign", "machine", "model", "model_version", "run", "started_at", "day", "warm_up")
+    # Machines of several topologies may have a parameter that refers to different axes.
     columns = db.rows(
-        f"SELECT DISTINCT parameter, unit FROM v_parameters {_WHERE} ORDER BY ALL", {"machine": machine}
+        "SELECT parameter, unit, string_agg(DISTINCT refers_to, ' or ' ORDER BY refers_to) "
+        f"FROM v_parameters {_WHERE} GROUP BY ALL ORDER BY ALL",
+        {"machine": machine},
     )
-    places = {pair: index for index, pair in enumerate(columns)}
+    places = {(parameter, unit): index for index, (parameter, unit, _) in enumerate(columns)}
     table: dict[tuple[Any, ...], list[Any]] = {}
     for *key, parameter, unit, value, u in db.rows(
         f"SELECT {', '.join(keys)}, parameter, unit, value, u FROM v_parameters {_WHERE} "
@@ -106,8 +109,14 @@ def _parameters(db: Database, machine: str | None) -> Sheet:
         row = table.setdefault(tuple(key), [None] * (2 * len(columns)))
         index = 2 * places[parameter, unit]
         row[index : index + 2] = [value, u]
-    heads = [text for name, unit in columns for text in (f"{name} / {unit}", f"u({name}) / {unit}")]
-    meanings = ["Estimate, empty where refused", "Standard uncertainty"] * len(columns)
+    heads = [text for name, unit, _ in columns for text in (f"{name} / {unit}", f"u({name}) / {unit}")]
+    meanings = [
+        text
+        for *_, frame in columns
+        for text in (
+            "Estimate, empty where refused" + (f"; refers to: {frame}" if frame else ""), "Standard uncertainty",
+        )
+    ]  # fmt: skip
     return Sheet(
         "parameters",
         tuple(f"{key} / UTC" if key == "started_at" else key for key in keys) + tuple(heads),

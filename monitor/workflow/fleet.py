@@ -194,7 +194,10 @@ def _rank(
         k = sums.groups
         others = (sums.sum_m - sums.latest) / (k - 1.0)
         squares = sums.sum_mm - sums.latest**2 - (k - 1.0) * others**2
-        sd = np.sqrt(np.maximum(squares, 0.0) / (k - 2.0) * (1.0 + 1.0 / (k - 1.0)))
+        variance = np.maximum(squares, 0.0) / (k - 2.0) * (1.0 + 1.0 / (k - 1.0))
+        # A day of few runs after days of many: what the mean of its runs scatters more than theirs do.
+        fewer = 1.0 / sums.latest_runs - (k - 1.0) / (sums.runs - sums.latest_runs)
+        sd = np.sqrt(variance + np.nan_to_num(cells.sd_pooled) ** 2 * np.maximum(fewer, 0.0))
         z = np.abs(sums.latest - others) / np.where(k >= FEWEST_TO_STAND_OUT, sd, np.nan)
         ratio = cells.between / cells.sd_pooled
         steepness = np.abs(drift.slope / drift.u)

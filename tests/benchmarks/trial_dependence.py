@@ -19,7 +19,6 @@ from monitor.statistics import (
     cusum_chart,
     dependence,
     ewma_chart,
-    find_changes,
     individuals_chart,
     mewma_chart,
     reference_period,
@@ -29,6 +28,7 @@ from monitor.statistics import (
 )
 from monitor.statistics.before_after import OtherDays, before_after
 from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
+from monitor.statistics.changes import _repeated, _Search, _Series
 
 SEED = 20261122
 YEAR = 365.25
@@ -213,7 +213,7 @@ def charts(rng: np.random.Generator) -> None:
         rows,
     )
     rows = []
-    for p in (2, 5, 10):
+    for p in (2, 5, 10, 15):
         for r in (0.0, 0.3, 0.5, 0.8):
             hits = np.zeros(5)
             for _ in range(200):
@@ -241,19 +241,28 @@ def charts(rng: np.random.Generator) -> None:
     )
 
 
+#: Histories of 20 day means of a cell; of 52 half, of 104 a quarter.
+HISTORIES = 800
+
+
 def changes(rng: np.random.Generator) -> None:
     """Histories with any change at 1 %, of one parameter and of one of 13."""
     rows: list[list[object]] = []
-    for n in (20, 52, 104):
+    for n, count in ((20, HISTORIES), (52, HISTORIES // 2), (104, HISTORIES // 4)):
         t = 7.0 * np.arange(n)
-        wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, YEAR, (200, 1))) / YEAR)
+        wave = np.cos(2.0 * np.pi * (t + rng.uniform(0.0, YEAR, (count, 1))) / YEAR)
+        step = 1.0 * (np.arange(n) >= 0.6 * n)
         cases = {
-            "independent": rng.normal(size=(200, n)),
-            "r = 0.6": first_order(rng, 200, n, 0.6),
-            "r = 0.8": first_order(rng, 200, n, 0.8),
-            "yearly cycle of one scatter": rng.normal(size=(200, n)) + wave,
-            "Student, 4 degrees of freedom": rng.standard_t(4, (200, n)),
-            "step of 3": rng.normal(size=(200, n)) + 3.0 * (np.arange(n) >= 0.6 * n),
+            "independent": rng.normal(size=(count, n)),
+            "r = 0.6": first_order(rng, count, n, 0.6),
+            "r = 0.8": first_order(rng, count, n, 0.8),
+            "yearly cycle of one scatter": rng.normal(size=(count, n)) + wave,
+            "Student, 4 degrees of freedom": rng.standard_t(4, (count, n)),
+            "Student, 3": rng.standard_t(3, (count, n)),
+            "exponential": rng.exponential(size=(count, n)),
+            "step of 3": rng.normal(size=(count, n)) + 3.0 * step,
+            "step of 5": rng.normal(size=(count, n)) + 5.0 * step,
+            "Student, 3, step of 5": rng.standard_t(3, (count, n)) / np.sqrt(3.0) + 5.0 * step,
         }
         for name, series in cases.items():
             rows.append(
@@ -265,7 +274,7 @@ def changes(rng: np.random.Generator) -> None:
     for days, runs in ((5, 4), (10, 4)):
         day = np.repeat(np.arange(days), runs)
         for component in (0.0, 1.0, 2.0):
-            series = rng.normal(size=(200, len(day))) + component * rng.normal(size=(200, days))[:, day]
+            series = rng.normal(size=(500, len(day))) + component * rng.normal(size=(500, days))[:, day]
             t = day + np.tile(np.arange(runs) / 24.0, days)
             rates = [_called(series, t, day, level, rng) for level in (0.01, 0.01 / 13)]
             rows.append([f"{days} days of {runs}, day component {component:g}", *rates])
@@ -275,16 +284,17 @@ def changes(rng: np.random.Generator) -> None:
 def _called(
     series: np.ndarray, t: np.ndarray, days: np.ndarray | None, level: float, rng: np.random.Generator
 ) -> float:
-    trials = 1999 if level > 0.005 else 6499
-    together = [
-        find_changes({"a": y}, t, rng=rng, days=days, cycle=YEAR, false_alarm=level, trials=trials)
-        for y in series[:120]
-    ]
-    return float(np.mean([bool(found.changes or found.trends) for found in together]))
+    """Share of histories with any change or trend; they share the simulated series, of which there are more."""
+    search = _Search(rng, 9999 if level > 0.005 else 29999)
+    calls = 0
+    for y in series:
+        steps, trends = search.pieces([(_Series("a", y, t, None, _repeated(days), YEAR), 0)], level)
+        calls += bool(steps or trends)
+    return calls / len(series)
 
 
 #: Machines of a cell of that table.
-MACHINES = 2000
+MACHINES = 600
 #: Days of runs before and after, and those of the machine's other campaigns.
 EVENTS = (
     ((4,), (4,), ()),
@@ -299,26 +309,32 @@ EVENTS = (
     ((4,) * 5, (4,) * 5, ((4,) * 5,) * 4),
     ((4,) * 5, (4,) * 5, ((4,) * 5,) * 10),
     ((4,) * 5, (4,) * 2, ()),
+    ((4,) * 10, (4,) * 2, ()),
     ((1,) * 3, (1,) * 3, ()),
     ((2, 6, 4), (8, 3), ()),
 )
 
 
 def _campaign(
-    rng: np.random.Generator, runs: tuple[int, ...], days: np.ndarray
+    rng: np.random.Generator, runs: tuple[int, ...], days: np.ndarray, scatter: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     index = np.repeat(np.arange(len(runs)), runs)
-    return days[index] + rng.normal(size=len(index)), index
+    return scatter * (days[index] + rng.normal(size=len(index))), index
 
 
 def _differences(
-    days_of: Callable[[int], np.ndarray], case: tuple, rng: np.random.Generator, shift: float
+    days_of: Callable[[int], np.ndarray],
+    case: tuple,
+    rng: np.random.Generator,
+    shift: float,
+    after_scatter: float = 1.0,
 ) -> str:  # type: ignore[type-arg]
-    """Shares of machines whose difference is called and not decided."""
+    """Shares of machines whose difference is called, and called or not decided."""
     before, after, rest = case
     called = undecided = 0
     for _ in range(MACHINES):
-        (x, of_x), (y, of_y) = (_campaign(rng, runs, days_of(len(runs))) for runs in (before, after))
+        x, of_x = _campaign(rng, before, days_of(len(before)))
+        y, of_y = _campaign(rng, after, days_of(len(after)), after_scatter)
         columns = [_campaign(rng, runs, days_of(len(runs))) for runs in rest]
         others = None
         if rest:
@@ -330,7 +346,9 @@ def _differences(
             )
         agree = before_after(x, y + shift, of_x, of_y, others).agree
         called, undecided = called + (agree is False), undecided + (agree is None)
-    return "not decided" if undecided == MACHINES else f"{called / MACHINES:.3f}"
+    if undecided == MACHINES:
+        return "not decided"
+    return f"{called / MACHINES:.3f} / {(called + undecided) / MACHINES:.3f}"
 
 
 def events(rng: np.random.Generator) -> None:
@@ -355,9 +373,10 @@ def events(rng: np.random.Generator) -> None:
         row.append(_differences(lambda n: first_order(rng, 1, n, 0.6)[0], case, rng, 0.0))
         row.append(_differences(lambda n: rng.standard_t(3, n) / np.sqrt(3.0), case, rng, 0.0))
         row.append(_differences(lambda n: 0.7 * rng.normal(size=n) + 0.7 * rng.normal(), case, rng, 0.0))
+        row.append(_differences(lambda n: rng.normal(size=n), case, rng, 0.0, 3.0))
         rows.append(row)
     table(
-        "Before and after an event: called where nothing changed, and where it did, in its standard deviations",
+        "Before and after an event: called / called or not decided; changed by standard deviations of the difference",
         [
             "days of runs before",
             "after",
@@ -368,6 +387,7 @@ def events(rng: np.random.Generator) -> None:
             "days AR 0.6",
             "days Student, 3",
             "campaigns differ by 0.7 too",
+            "3 times the scatter after",
         ],
         rows,
     )

@@ -53,6 +53,16 @@ def test_a_wrong_reading_of_a_ball_is_the_one_that_is_named(virtual_campaigns, s
         assert np.abs(difference).max() < 1e-9
 
 
+@pytest.mark.parametrize("off", [5.0, -5.0, 50.0])
+@pytest.mark.parametrize("axis", ["X", "Y", "Z"])
+def test_a_touch_that_stands_apart_is_named_by_the_reading_that_is_wrong_along_the_surface_too(axis, off):
+    campaign = read_campaign(EXAMPLES / "tilting-table")
+    row = int(second_run(campaign)[41])
+    (reading,) = robust_fit(problem_of(wrong.with_wrong_reading(campaign, row, axis, off))).gross
+    assert (reading.row, reading.axis) == (row, axis.lower())
+    assert reading.size == pytest.approx(off, abs=0.1)
+
+
 @pytest.mark.parametrize("example", ["tilting-table", "free-form-pocket", "tracked-robot"])
 @pytest.mark.parametrize("size", [0.5, 50.0])
 def test_other_methods_find_it_too(example, size):

@@ -6,6 +6,8 @@ import csv
 import math
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -140,3 +142,14 @@ def test_a_run_that_was_broken_off(tmp_path: Path) -> None:
     (folder / "probings.csv").write_text("".join(lines[:-10]), encoding="utf-8")
     (told,) = of(folder)
     assert told.startswith("run 20 has 52 probings, 19 others have 62")
+
+
+def test_days_that_are_hours() -> None:
+    campaign = read_campaign(EXAMPLES / "five-days")
+    start = campaign.runs[0].started_at
+    runs = tuple(
+        replace(run, started_at=start + timedelta(minutes=30 * i)) for i, run in enumerate(campaign.runs)
+    )
+    (doubt,) = doubts(replace(campaign, runs=runs))
+    assert doubt.startswith("days 1 and 2 began on 20")
+    assert "(4 of 4 such): are the numbers in the column day those of days?" in doubt

@@ -67,14 +67,61 @@ def test_false_alarms_and_a_change_of_three_and_a_half_standard_deviations(
     before, after, component, rate_at_most
 ):
     rng = np.random.default_rng([*before, *after])
-    false_alarms = seen = 0
+    false_alarms = seen = called = 0
     u = np.sqrt(sum((component**2 + 1.0 / runs) / days for days, runs in (before, after)))
     for _ in range(300):
         (x, of_x), (y, of_y) = sides(rng, *before, component), sides(rng, *after, component)
         false_alarms += not before_after(x, y, of_x, of_y).agree
         seen += not before_after(x, y + 3.5 * u, of_x, of_y).agree
+        called += before_after(x, y + 7.0 * u, of_x, of_y).agree is False
     assert rate_at_most(false_alarms, 300, 0.05)
     assert seen / 300 > 0.6
+    assert called / 300 > 0.4
+
+
+@pytest.mark.parametrize(("before", "after", "correlation"), [(5, 5, 0.6), (5, 2, 0.6), (5, 5, 0.0)])
+def test_days_that_follow_each_other_are_not_called_and_u_is_that_of_dense_matrices(
+    before, after, correlation, rate_at_most
+):
+    rng = np.random.default_rng([before, after])
+    ns = (before, after)
+    called = 0
+    for _ in range(300):
+        days = [rng.normal(size=n) for n in ns]
+        for side in days:
+            for i in range(1, len(side)):
+                side[i] = correlation * side[i - 1] + np.sqrt(1.0 - correlation**2) * side[i]
+        result = before_after(*days, np.arange(before), np.arange(after))
+        called += result.agree is False
+    assert rate_at_most(called, 300, 0.075)
+    # The last machine by dense matrices: Satterthwaite for the sum of squares y'MCM y (Box 1954).
+    c = np.zeros((sum(ns), sum(ns)))
+    for start, n in ((0, before), (before, after)):
+        c[start : start + n, start : start + n] = result.correlation ** np.abs(
+            np.subtract.outer(range(n), range(n))
+        )
+    stretch = np.repeat([[1.0, 0.0], [0.0, 1.0]], ns, axis=1)
+    m = np.eye(sum(ns)) - stretch.T @ np.diag(1.0 / np.array(ns)) @ stretch
+    contrast = np.repeat([-1.0 / before, 1.0 / after], ns)
+    y = np.concatenate(days)
+    u = np.sqrt(y @ m @ y / np.trace(m @ c) * (contrast @ c @ contrast))
+    dof = np.trace(m @ c) ** 2 / np.trace(m @ c @ m @ c)
+    welch = stats.ttest_ind(days[1], days[0], equal_var=False).confidence_interval(0.95)
+    assert result.cautious == pytest.approx(
+        max(stats.t.ppf(0.975, dof) * u, (welch.high - welch.low) / 2.0, result.expanded)
+    )
+
+
+def test_two_days_that_scatter_more_than_ten_before_are_seldom_called_without_welch(rate_at_most):
+    rng = np.random.default_rng(3)
+    called = alike = 0
+    for _ in range(400):
+        x, y = 0.5 * rng.normal(size=10), 3.0 * rng.normal(size=2)
+        result = before_after(x, y, np.arange(10), np.arange(2))
+        called, alike = called + (result.agree is False), alike + (abs(result.e_n) > 1.0)
+    # Welch with one degree of freedom holds 8 to 9 % (docs/trials-statistics.md); days of one scatter half of them.
+    assert rate_at_most(called, 400, 0.09)
+    assert alike / 400 > 0.4
 
 
 def test_refusals_say_what_is_needed():

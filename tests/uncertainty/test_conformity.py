@@ -88,3 +88,18 @@ def test_what_cannot_be_judged_is_refused() -> None:
         conformity([0.0], [[0.0]], [-1.0], [1.0])
     with pytest.raises(DataError, match="degrees of freedom must be positive"):
         conformity([0.0], [[1.0]], [-1.0], [1.0], dof=0)
+
+
+@pytest.mark.parametrize("dof", [3, 8, 15])
+def test_a_verdict_of_few_degrees_of_freedom_is_wrong_no_more_often_than_it_says(dof: int) -> None:
+    """The machine lies at its limit; u is estimated with ``dof``, as a verdict of few runs has it."""
+    rng = np.random.default_rng(dof)
+    passed = normal = 0
+    for _ in range(2000):
+        u2 = rng.chisquare(dof) / dof
+        y = 20.0 + rng.normal()
+        passed += conformity([y], [[u2]], [-20.0], [20.0], dof=float(dof)).single[0] >= 0.95
+        normal += conformity([y], [[u2]], [-20.0], [20.0]).single[0] >= 0.95
+    assert 0.035 < passed / 2000 < 0.065
+    # As known, the same u would pass more of them: the degrees of freedom are what holds the rate.
+    assert normal > passed + 10

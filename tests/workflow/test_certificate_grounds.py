@@ -18,7 +18,8 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import solve_problem
 from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
-from monitor.reporting.certificate.grounds import GroundKind
+from monitor.reporting.certificate.grounds import GroundKind, ground_sentence
+from monitor.reporting.texts import texts_of
 from monitor.store import Database, import_campaign, load_certificate
 from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.issue import issue
@@ -145,6 +146,18 @@ def test_no_temperature_where_a_bar_gives_the_length(five_days: Campaign) -> Non
     tilting = read_campaign(EXAMPLES / "tilting-table")
     bare = replace(tilting, runs=tuple(replace(run, conditions={}) for run in tilting.runs))
     assert grounds(bare, 1) == ()
+
+
+@pytest.mark.parametrize(("degrees", "limit"), [(294.15, 60.0), (68.0, 60.0), (-60.0, -40.0)])
+def test_a_temperature_in_kelvin_or_fahrenheit(five_days: Campaign, degrees: float, limit: float) -> None:
+    kelvin = replace(
+        five_days, runs=tuple(replace(run, conditions={"ambient_degC": degrees}) for run in five_days.runs)
+    )
+    (ground,) = grounds(kelvin)
+    assert (ground.kind, ground.size, ground.limit) == (GroundKind.TEMPERATURE, degrees, limit)
+    assert re.search(r"ambient_degC is \S+ °C, at which nobody measures", ground_sentence(ground, texts_of()))
+    (doubt,) = (each for each in doubts(kelvin) if "degC" in each)
+    assert "20 of 20 runs lie outside -40 to 60 °C): is the unit °C?" in doubt
 
 
 def test_every_ground_is_accepted_by_its_name_and_none_that_is_absent(five_days: Campaign) -> None:

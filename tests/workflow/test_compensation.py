@@ -290,6 +290,28 @@ def test_headers_say_what_is_added_to_what_and_the_reversal_value(simulator, tmp
     header, _ = _table(path)
     assert any("correction_x_um to the reading x_mm" in line for line in header)
     assert any("DO NOT add these" in line for line in header)
+    assert (
+        "# The rows hold for a tool whose tip stands at x 3.000, y -2.000, z -140.000 mm in the frame of the"
+        in header
+    )
+
+
+@pytest.mark.parametrize("topology", TOPOLOGIES[:5])
+def test_another_tool_than_the_table_names_keeps_an_error_of_first_order(simulator, tmp_path, topology):
+    signs = _signs(topology, False)
+    truth = Truth(simulator, topology, signs, 1.0)
+    (path,) = write_tables(_mapped(truth, topology, signs), "volumetric-csv", tmp_path)
+    commanded, corrected = _controlled(truth, _table(path)[1])
+    left = {}
+    for name, tip in (("its own", TIP), ("150 mm longer", TIP - [0.0, 0.0, 150.0])):
+        truth.tip = tip
+        at_zero = {
+            axis.name: np.array([0.0 if axis.rotary else np.mean(STROKES[axis.name])])
+            for axis in truth.machine.axes
+        }
+        zero = truth.miss(at_zero, truth.programmed(at_zero))
+        left[name] = _largest(truth.miss(corrected, truth.programmed(commanded)) - zero)
+    assert left["150 mm longer"] > 20.0 * left["its own"]
 
 
 def test_refused_where_no_axis_has_a_known_positioning_error(simulator, tmp_path):

@@ -51,6 +51,47 @@ def test_a_step_is_that_of_a_t_test_of_the_days():
     assert step.event is REPAIR
 
 
+@pytest.mark.parametrize(("correlation", "decided"), [(0.6, False), (0.0, True)])
+def test_steps_of_days_that_follow_each_other_are_named_as_not_decided(correlation, decided):
+    rng = np.random.default_rng(23)
+    called = named = 0
+    for _ in range(200):
+        past = {}
+        for k in range(4):
+            days = rng.standard_normal((10, 1))
+            for i in (*range(1, 5), *range(6, 10)):
+                days[i] = correlation * days[i - 1] + np.sqrt(1.0 - correlation**2) * days[i]
+            past[f"E{k}"] = _past(f"E{k}", days + 0.5 * rng.standard_normal((10, 4)))
+        event = MachineEvent(START + timedelta(days=4.5), "repair", "")
+        steps = event_steps(past, [event])
+        called, named = called + any(step.decided for step in steps), named + bool(steps)
+    # Nominal 5 % of machines; independent days alone would call ``named`` of them.
+    assert called / 200 < 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / 200)
+    assert decided or named / 200 > 0.2
+
+
+@pytest.mark.parametrize(("days", "runs", "after"), [(8, 3, 1), (6, 10, 1), (9, 10, 2)])
+def test_a_check_of_few_runs_after_days_of_many_is_no_step(days, runs, after):
+    rng = np.random.default_rng([days, runs, after])
+    first = START.timestamp() / 86400.0
+    day = np.repeat(np.arange(days + 1), [*[runs] * days, after])
+    t = first + day + 0.01 * np.arange(len(day)) / len(day)
+    event = MachineEvent(START + timedelta(days=days - 0.5), "repair", "")
+    called = 0
+    for _ in range(150):
+        past = {}
+        for k in range(4):
+            series = Series(
+                f"E{k}", "µrad", rng.standard_normal(len(day)), np.ones(len(day)), t, day, np.zeros(len(day)),
+                np.zeros(len(day), dtype=np.bool_), timedelta(),
+            )  # fmt: skip
+            past[f"E{k}"] = ParameterPast(
+                series, np.ones(len(day), dtype=np.bool_), ChangeSearch(), PieceDrift(series, -np.inf)
+            )
+        called += bool(event_steps(past, [event]))
+    assert called / 150 < 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / 150)
+
+
 def test_a_note_and_an_event_without_runs_on_both_sides_state_nothing():
     past = {"EB0C": _past("EB0C", _runs(np.random.default_rng(2), 3, 4, 15.0, 1.0))}
     early = MachineEvent(START - timedelta(days=9), "repair", "before all runs")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from by_path import load
+from scipy import stats
 
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign, machine_history
@@ -186,6 +187,68 @@ def test_fleet_and_page_fit_the_same_line_where_days_are_alike(tmp_path: Path) -
     assert crossing.timestamp() / DAY_S == pytest.approx(
         latest.timestamp() / DAY_S + row.years_to_limit * 365.25, abs=1.0
     )
+
+
+def _following(rng: np.random.Generator, weeks: int, correlation: float) -> np.ndarray:
+    """Weekly values, each like the one before, of unit variance."""
+    values = rng.normal(size=weeks)
+    for i in range(1, weeks):
+        values[i] = correlation * values[i - 1] + np.sqrt(1.0 - correlation**2) * values[i]
+    return values
+
+
+def test_the_ranking_and_the_recommended_interval_rest_on_days_that_follow_each_other(tmp_path: Path) -> None:
+    """Ten machines wander without a drift, one drifts: a line through independent days calls half of them."""
+    weeks, plain = 40, 0
+    rng = np.random.default_rng(31)
+    with Database(tmp_path / "following.duckdb") as db:
+        wandering = {}
+        for i in range(10):
+            days = 2.0 * _following(rng, weeks, 0.8)[:, np.newaxis]
+            wandering[f"W{i}"] = days + 0.3 * rng.normal(size=(weeks, 4))
+            line = stats.linregress(7.0 * np.arange(weeks), wandering[f"W{i}"].mean(axis=1))
+            plain += line.pvalue < 0.05
+            synthetic.add_machine(db, f"W{i}", {"EXX": wandering[f"W{i}"]})
+        drifting = 0.3 * np.arange(weeks)[:, np.newaxis] + rng.normal(size=(weeks, 4))
+        synthetic.add_machine(db, "D", {"EXX": drifting})
+        # The same values of the worst wanderer in an order that says nothing: there days are independent.
+        worst = max(
+            wandering, key=lambda name: abs(np.polyfit(range(weeks), wandering[name].mean(axis=1), 1)[0])
+        )
+        synthetic.add_machine(db, "S", {"EXX": wandering[worst][rng.permutation(weeks)]})
+        table = {row.machine: row for row in fleet(db, FleetRequest(top=0)).table}
+        pages = {name: trend(db, TrendRequest(name)).parameters["EXX"] for name in (worst, "S")}
+    assert plain >= 4
+    assert "drift" in table["D"].attention
+    called = [name for name in wandering if "drift" in table[name].attention]
+    assert len(called) <= 1
+    # The interval of the slope, from which the recommended interval is taken, is that of days that follow each other.
+    assert table[worst].slope_widening > 1.5
+    soon, late = (pages[name].forecast.recommended_interval_days for name in (worst, "S"))
+    assert soon < 0.7 * late
+
+
+def test_one_check_run_after_days_of_many_does_not_stand_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(5)
+    gather_values, gather_runs = synthetic.gather_values, synthetic.gather_runs
+    monkeypatch.setattr(synthetic, "gather_values", lambda db: None)
+    monkeypatch.setattr(synthetic, "gather_runs", lambda db: None)
+    with Database(tmp_path / "check.duckdb") as db:
+        for i in range(12):
+            values = {name: rng.normal(size=(9, 10)) for name in ("EXX", "EYY", "EZZ")}
+            synthetic.add_machine(db, f"M{i}", values)
+        # Of the last campaign of each machine one run is left.
+        last = "(SELECT max(campaign_id) FROM imported_campaign GROUP BY machine)"
+        db.execute(f"DELETE FROM parameter_value WHERE identification_id IN {last} AND run > 1")
+        db.execute(f"DELETE FROM run WHERE campaign_id IN {last} AND run > 1")
+        db.execute(f"UPDATE identification SET run_count = 1 WHERE identification_id IN {last}")
+        gather_values(db)
+        gather_runs(db)
+        rows = fleet(db, FleetRequest(top=0)).table
+    assert len(rows) == 36
+    assert sum(row.attention == "the latest day stands out" for row in rows) <= 1
 
 
 def test_a_report_of_an_earlier_week_knows_what_was_known_then(

@@ -304,7 +304,9 @@ def _checked(problem: ChainProblem, solution: Solution) -> npt.NDArray[np.bool_]
 def off_reading(problem: ChainProblem, by_error: Array, row: int, vector: Array) -> tuple[str, float]:
     """The reading that explains most of the residual (d,) of a row, and by how much it is off, in mm.
 
-    ``by_error`` (n, 3, J, 2, 6) are the derivatives of the chain's vectors by its errors.
+    ``by_error`` (n, 3, J, 2, 6) are the derivatives of the chain's vectors by its errors. A row that stands apart from
+    the others of its target (``far_off``) has the whole ``vector`` (3,) from them: the part of it that the method
+    measures may be small.
     """
     chain = problem.context.chain
     linear = problem.measured_joints
@@ -315,7 +317,8 @@ def off_reading(problem: ChainProblem, by_error: Array, row: int, vector: Array)
         [np.array(chain.joints[joint].direction) * chain.joints[joint].sign for joint in linear]
     )
     shifts = np.einsum("nrac,ac->nra", by_error[:, :, linear, MOTION, :3], directions)
-    off = np.linalg.pinv(problem.observe(shifts)[row]) @ vector
+    measured = shifts if problem.far_off[row] else problem.observe(shifts)
+    off = np.linalg.pinv(measured[row]) @ vector
     most = int(np.abs(off).argmax())
     return chain.joints[linear[most]].name.lower(), float(off[most])
 
@@ -324,7 +327,10 @@ def as_reading(problem: ChainProblem, by_error: Array, deviation: Deviation) -> 
     """A deviation as people find it in the file."""
     context, row = problem.context, deviation.row
     measured = problem.measured_joints
-    axis, size = off_reading(problem, by_error, row, np.array(deviation.vector))
+    vector = np.array(deviation.vector)
+    if problem.far_off[row]:
+        vector = problem.evaluated(problem.start, problem.common_start).residual[row]
+    axis, size = off_reading(problem, by_error, row, vector)
     return GrossReading(
         row=row,
         run=int(context.run[row]),

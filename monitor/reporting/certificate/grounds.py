@@ -28,7 +28,8 @@ class GroundKind(StrEnum):
 class Ground:
     """One ground: of a ``run`` and a ``subject`` (a parameter, a reading, a bar), a ``size`` beyond its ``limit``.
 
-    Both are in ``unit``; a temperature that is missing has none of the three.
+    Both are in ``unit``; a temperature that is missing has none of the three, one that no place has all of
+    them.
     """
 
     kind: GroundKind
@@ -51,6 +52,8 @@ class AcceptedGround:
 def ground_sentence(ground: Ground, texts: Texts) -> str:
     """A ground in words, without a full stop."""
     key = ground.kind.value.replace("-", "_")
+    if ground.kind is GroundKind.TEMPERATURE and ground.size is not None:
+        key = "impossible_temperature"
     return texts(
         f"grounds.{key}",
         run=ground.run,

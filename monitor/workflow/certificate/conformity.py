@@ -75,11 +75,12 @@ def statement_of(
     judged = conformity(
         result.estimate[limited], result.covariance[np.ix_(limited, limited)], -tolerance, tolerance, dof=dofs
     )
-    verdicts = []
+    verdicts, wrong = [], 0.0
     for index, dof, p in zip(map(int, limited), map(float, dofs), map(float, judged.single), strict=True):
         u = float(result.u[index])
         band = _guard_factor(rule, result, dof) * u
         parameter = _Judged(abs(float(result.estimate[index])), float(limits[index]), u, dof, band, p)
+        wrong = max(wrong, _largest_risk(parameter))
         name = result.names[index]
         risks = _global_risks(rule, parameter, (process or {}).get(name))
         verdicts.append(
@@ -88,7 +89,7 @@ def statement_of(
             )
         )
     return ConformityStatement(
-        *_rule_in_words(rule, result, texts),
+        *_rule_in_words(rule, result, texts, wrong),
         tuple(verdicts),
         judged.joint,
         result.state,
@@ -97,11 +98,11 @@ def statement_of(
     )
 
 
-def _rule_in_words(rule: str, result: ResultSet, texts: Texts) -> tuple[str, str]:
+def _rule_in_words(rule: str, result: ResultSet, texts: Texts, wrong: float) -> tuple[str, str]:
+    """The rule, and the risk of a statement: ``wrong`` is the largest of the limits that are stated."""
     sign = texts.decimal_sign
     wanted, failing, outside = (
-        written_probability(round(probability, 4), sign)
-        for probability in (WANTED, 1.0 - WANTED, 0.5 * (1.0 - COVERED))
+        written_probability(round(probability, 4), sign) for probability in (WANTED, 1.0 - WANTED, wrong)
     )
     covered, p = written_probability(COVERED, sign), written_probability(result.p, sign)
     rule_text, risk = (
@@ -164,6 +165,26 @@ def _verdict(rule: str, judged: _Judged) -> Verdict:
     return Verdict.FAIL if judged.probability <= 1.0 - WANTED else Verdict.UNDECIDED
 
 
+def _probability_at(judged: _Judged, value: float) -> float:
+    """Probability of conformity if the estimate were ``value``."""
+    from monitor.uncertainty.conformity import conformity
+
+    limit = judged.limit
+    return float(conformity([value], [[judged.u**2]], [-limit], [limit], dof=judged.dof).single[0])
+
+
+def _largest_risk(judged: _Judged) -> float:
+    """The largest probability with which 'pass' or 'fail' by a guard band can be wrong, whatever the estimate.
+
+    At the edges of acceptance and rejection; both limits count, so that it is more than one tail where the tolerance is
+    not wide against u (JCGM 106:2012, 9.3.2).
+    """
+    passing = (
+        1.0 - _probability_at(judged, judged.limit - judged.band) if judged.band <= judged.limit else 0.0
+    )
+    return max(passing, _probability_at(judged, judged.limit + judged.band))
+
+
 def _global_risks(rule: str, judged: _Judged, spread: float | None) -> tuple[float | None, float | None]:
     """Consumer's and producer's risk of passing by the rule, None where no spread is stated."""
     if spread is None:
@@ -178,20 +199,12 @@ def _global_risks(rule: str, judged: _Judged, spread: float | None) -> tuple[flo
 
 def _acceptance(rule: str, judged: _Judged) -> float | None:
     """The largest absolute estimate that passes; None where none does."""
-    from monitor.uncertainty.conformity import conformity
-
     if rule in ("simple", "guard", "ilac"):
         return judged.limit - judged.band if judged.band <= judged.limit else None
-
-    def passes(value: float) -> bool:
-        limit = judged.limit
-        p = conformity([value], [[judged.u**2]], [-limit], [limit], dof=judged.dof).single[0]
-        return bool(p >= WANTED)
-
-    if not passes(0.0):
+    if _probability_at(judged, 0.0) < WANTED:
         return None
     low, high = 0.0, judged.limit
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if passes(middle) else (low, middle)
+        low, high = (middle, high) if _probability_at(judged, middle) >= WANTED else (low, middle)
     return low

@@ -25,7 +25,7 @@ from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
 from monitor.workflow.health.forecast import stated_drift
 from monitor.workflow.health.weeks import Week
-from monitor.workflow.history.agreement import NOT_DECIDED
+from monitor.workflow.history.agreement import DAYS_MAY_DO, NOT_DECIDED
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
 from monitor.workflow.history.forecast import DriftForecast
@@ -137,8 +137,11 @@ def _step_in_words(step: EventStep) -> str:
     """What a parameter stepped by at an event, and that one knows since when."""
     size, u = in_words(step.size, step.u, sign=True)
     event = f"the event '{step.event.description}'"
-    if step.by_days:
+    if step.decided:
         return f"{step.parameter} stepped by {size} {step.unit} at {event} (u = {u} {step.unit})"
+    if step.by_days:
+        differs = f"{step.parameter} differs by {size} {step.unit} before and after {event}"
+        return f"{differs} (u = {u} {step.unit}): {DAYS_MAY_DO}"
     return (
         f"{step.parameter} differs by {size} {step.unit} before and after {event} (u = {u} {step.unit} by the runs "
         f"alone): {NOT_DECIDED}"

@@ -32,7 +32,7 @@ from monitor.workflow.health.refusals import refused_of
 from monitor.workflow.health.request import ReportOptions
 from monitor.workflow.health.results import MeasuredWeek, Results, stored_results, stored_with, task_of
 from monitor.workflow.health.runs import campaign_span, first_run, past_runs
-from monitor.workflow.health.task import Task, TaskResult
+from monitor.workflow.health.task import NOT_IDENTIFIED, Task, TaskResult
 from monitor.workflow.health.verdict import (
     changed_in_words,
     conformity_of,
@@ -165,9 +165,10 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     )
     quality = data_quality(db, past.runs_of_week, explanation, stated, past.refused, remarks)
     can_be = not isinstance(method_named(last.method).uncertainty, Unable)
-    state = state_of(
-        judged, noted, explanation, quality, past.options.risk, evaluated=stated is not None or not can_be
-    )
+    # A campaign whose identification is refused has no numbers, whatever a robust fit of one run made of it.
+    refused = any(remark.startswith(f"campaign {last.campaign} {NOT_IDENTIFIED}") for remark in remarks)
+    evaluated = (stated is not None and not refused) or not can_be
+    state = state_of(judged, noted, explanation, quality, past.options.risk, evaluated=evaluated)
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
         changed=changed_in_words(noted, explanation, quality),

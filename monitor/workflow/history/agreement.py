@@ -26,6 +26,12 @@ NOT_DECIDED = (
     "not decided: one day on each side cannot tell a change from days that differ; measure a second day"
 )
 
+#: Why nothing is said of what independent days of one scatter do not explain and other days do.
+DAYS_MAY_DO = (
+    "not decided: more than independent days that scatter alike explain, but days that follow each other, or that "
+    "scatter differently on the two sides, may do as much; more days on each side or further campaigns decide it"
+)
+
 
 class PairKind(Enum):
     """Why two results are compared."""
@@ -43,7 +49,9 @@ class ParameterAgreement:
     of the days that it holds, estimated with ``other_days`` of the machine where the sides have few, or
     the scatter of so many ``other_campaigns`` where that is larger. ``agree`` and
     ``e_n`` are None where nothing is known of the days, and ``why_not_decided`` says what would decide it: ``expanded``
-    is then of runs alone.
+    is then of runs alone. ``expanded`` and ``e_n`` are for independent days of one scatter; ``agree`` is None, too,
+    where the difference is larger than ``expanded`` and no larger than ``expanded_cautious``, for days that follow each
+    other or sides that scatter differently.
     """
 
     unit: str
@@ -61,6 +69,7 @@ class ParameterAgreement:
     other_days: int | None = field(default=None, metadata=OMITTED)
     other_campaigns: int | None = field(default=None, metadata=OMITTED)
     why_not_decided: str | None = field(default=None, metadata=OMITTED)
+    expanded_cautious: float | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,7 +196,7 @@ def _across_event(
     return ParameterAgreement(
         unit, result.before, result.u_before, result.after, result.u_after, result.difference, result.expanded,
         result.k, result.e_n, result.agree, result.dof, result.between, result.other_days, result.other_campaigns,
-        None if result.decided else NOT_DECIDED,
+        None if result.agree is not None else DAYS_MAY_DO if result.decided else NOT_DECIDED, result.cautious,
     )  # fmt: skip
 
 
@@ -240,9 +249,11 @@ def sentence(pair: AgreementPair) -> str:
 def _moved(pair: AgreementPair) -> str:
     """The parameters that moved at an event, from which value to which."""
     moved = [(name, pair.parameters[name]) for name in pair.disagree]
+    undecided = any(result.why_not_decided for result in pair.parameters.values())
+    quiet = "nothing decided" if undecided else "nothing moved beyond the scatter of runs and days"
     return (
         ", ".join(f"{name} {result.first:.3g} -> {result.second:.3g} {result.unit}" for name, result in moved)
-        or "nothing moved beyond the scatter of runs and days"
+        or quiet
     )
 
 
@@ -253,5 +264,9 @@ def _judged_with(pair: AgreementPair) -> str:
     campaigns = max((result.other_campaigns or 0 for result in results), default=0)
     lean = [f"{count} other {of}" for count, of in ((days, "days"), (campaigns, "campaigns")) if count]
     judged = f"; judged with the scatter of {' and '.join(lean)} of the machine" if lean else ""
-    undecided = [name for name, result in pair.parameters.items() if result.agree is None]
-    return judged + (f"; {NOT_DECIDED} ({', '.join(undecided)})" if undecided else "")
+    undecided = "".join(
+        f"; {', '.join(names)} {reason}"
+        for reason in (DAYS_MAY_DO, NOT_DECIDED)
+        if (names := [name for name, result in pair.parameters.items() if result.why_not_decided == reason])
+    )
+    return judged + undecided

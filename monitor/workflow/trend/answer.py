@@ -113,7 +113,7 @@ class StepAtEvent:
     """What a parameter stepped by at a recorded event, the mean after it less the mean before; ``at`` in UTC.
 
     ``scatter_of`` says by what the uncertainty is: ``days``; or ``runs`` where no two days say how days differ, and
-    then it is not decided whether it is a step.
+    then it is not ``decided`` whether it is a step, nor where days that follow each other explain it.
     """
 
     at: str
@@ -124,6 +124,7 @@ class StepAtEvent:
     unit: str
     p_value: float
     scatter_of: str
+    decided: bool
 
 
 @dataclass(frozen=True)

@@ -272,7 +272,7 @@ def _with_event_steps(
             event_steps=tuple(
                 StepAtEvent(
                     step.event.at.astimezone(UTC).isoformat(), step.event.kind, step.event.description, step.size,
-                    step.u, step.unit, step.p_value, "days" if step.by_days else "runs",
+                    step.u, step.unit, step.p_value, "days" if step.by_days else "runs", step.decided,
                 )
                 for step in steps
                 if step.parameter == name

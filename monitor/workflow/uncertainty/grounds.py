@@ -12,7 +12,13 @@ import numpy as np
 
 from monitor.discovery import RobustFit
 from monitor.effects import ChainEffect
-from monitor.readers.doubts import LARGEST_BAR_DIFFERENCE, bar_difference
+from monitor.readers.doubts import (
+    AIR_NAMES,
+    AIR_RANGE,
+    LARGEST_BAR_DIFFERENCE,
+    bar_difference,
+    implausible_temperatures,
+)
 from monitor.records import Campaign, Run
 from monitor.reporting.certificate.grounds import Ground, GroundKind
 from monitor.units import MICROMETRE
@@ -30,8 +36,6 @@ LARGEST_ANGLE, LARGEST_MASTERING = 5e-3, float(np.deg2rad(5.0))
 #: mm. An axis of a machine given by letters lies where the machine file's coordinates put it, to some tenths. Largest
 #: in the examples: 0.11. Of a chain with lengths `identify` compares each with its own.
 LARGEST_OFFSET = 5.0
-#: What a recorded temperature that says how long the bar was is called.
-TEMPERATURES = ("ambient", "air", "bar", "artefact", "artifact", "workpiece")
 
 
 def grounds_of(campaign: Campaign, robust: RobustFit, run: int) -> tuple[Ground, ...]:
@@ -100,7 +104,10 @@ def _scale_bar(campaign: Campaign, run: int) -> Iterator[Ground]:
 
 
 def _temperature(campaign: Campaign, run: Run) -> Iterator[Ground]:
-    """A bar gives the unit of length: without a temperature nobody can say how long it was (11.5 µm/m for 1 K)."""
+    """A bar gives the unit of length: without a temperature nobody can say how long it was (11.5 µm/m for 1 K). One
+    that no place has is printed as a condition, and corrects a length by millimetres where an expansion is stated."""
+    for name, value in implausible_temperatures(campaign, run.run).items():
+        yield Ground(GroundKind.TEMPERATURE, run.run, name, value, AIR_RANGE[value > 0.0], "°C")
     bar = campaign.artefact.scale_bar
     if bar is None:
         return
@@ -110,6 +117,6 @@ def _temperature(campaign: Campaign, run: Run) -> Iterator[Ground]:
         name for name, values in campaign.probings.channels.items() if np.isfinite(values[rows]).any()
     ]
     if not any(
-        name.endswith("_degC") and any(word in name.lower() for word in TEMPERATURES) for name in recorded
+        name.endswith("_degC") and any(word in name.lower() for word in AIR_NAMES) for name in recorded
     ):
         yield Ground(GroundKind.TEMPERATURE, run.run, "-".join(bar.balls))

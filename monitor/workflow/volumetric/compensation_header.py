@@ -49,6 +49,7 @@ def volumetric_header(mapped: VolumetricMap) -> list[str]:
         "along X, Y, Z of the machine. DO NOT add these, nor their negatives, to readings: an axis that carries the",
         "workpiece may move it the other way.",
         "The place of the tip is corrected, the direction of the tool is not.",
+        *_tool(mapped),
         "not_corrected_um is what no linear axis can move.",
         "The positioning errors of the axes are in this table.",
         "Use it or the positioning table of the run, not both.",
@@ -73,6 +74,14 @@ def _origin(mapped: VolumetricMap) -> Iterator[str]:
         f"machine {campaign.machine.id}, {mapped.errors.chain.topology}; campaign {campaign.name}, "
         f"run {evaluated.run}, model {label(evaluated.model)}"
     )
+
+
+def _tool(mapped: VolumetricMap) -> Iterator[str]:
+    """Lines on the tool for which the rows hold: angular errors act with its length."""
+    x, y, z = (float(value) + 0.0 for value in mapped.errors.tip)
+    yield f"The rows hold for a tool whose tip stands at x {x:.3f}, y {y:.3f}, z {z:.3f} mm in the frame of the"
+    yield "spindle, as the stylus of the probing did. Squareness, tilts and angular errors act with the length of"
+    yield "the tool: another tool needs a table of its own, or an error of 1 um remains for every 100 mm and 10 urad."
 
 
 def _zero(mapped: VolumetricMap) -> str:
