@@ -82,12 +82,16 @@ def axes_of(topology: str) -> tuple[tuple[Axis, ...], str | None]:
         if not name:
             continue
         if name[0] not in (ROTARY if bracket else LINEAR + ROTARY):
-            subject = "a spindle" if bracket else "an axis"
-            letters = "A, B, C" if bracket else "X, Y, Z, U, V, W (linear) and A, B, C (rotary)"
-            return (), f"{subject} cannot be called {name[:20]}; the letters are {letters}"
+            return (), _misnamed(name, spindle=bool(bracket))
         axes.append(Axis(name, "spindle" if bracket else "linear" if name[0] in LINEAR else "rotary"))
     fault = _fault_of(parts, axes)
     return (tuple(axes), None) if fault is None else ((), fault)
+
+
+def _misnamed(name: str, *, spindle: bool) -> str:
+    subject = "a spindle" if spindle else "an axis"
+    letters = "A, B, C" if spindle else "X, Y, Z, U, V, W (linear) and A, B, C (rotary)"
+    return f"{subject} cannot be called {name[:20]}; the letters are {letters}"
 
 
 def _fault_of(parts: Sequence[str], axes: Sequence[Axis]) -> str | None:

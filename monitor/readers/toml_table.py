@@ -132,11 +132,11 @@ class Table:
 
     def finish(self) -> None:
         """Refuse every key that was not asked for."""
-        known = tuple(dict.fromkeys(self._asked_for))
+        names = tuple(dict.fromkeys(self._asked_for))
         for key in self.data:
             if key not in self._asked_for:
                 hint = did_you_mean(key, self._asked_for)
-                self.fault(key, f"this key is not known; {hint}the keys here are {one_of(known)}")
+                self.fault(key, f"this key is not known; {hint}the keys here are {one_of(names)}")
 
     def _number(
         self, key: str, value: Any, positive: bool, largest: float | None, unit: str, example: str

@@ -20,7 +20,7 @@ from monitor.cli.parser import common
 from monitor.exceptions import InputError
 
 if TYPE_CHECKING:
-    from monitor.workflow.watching.request import WatchRequest
+    from monitor.workflow.watching.request import WatchAnswer, WatchRequest
 
 EXAMPLE = "monitor watch /srv/measured --out reports-out --mail mail.toml"
 #: Stands for --mail without a file.
@@ -100,17 +100,20 @@ def _look(options: Namespace, request: WatchRequest) -> int:
         return 0
     if not options.once:
         output.say(f"{datetime.now():%Y-%m-%d %H:%M}")
-    for line in lines_of(answer):
+    for line in (*lines_of(answer), *(_left_for_later(answer) if options.once else ()), *_written(answer)):
         output.say(line)
-    for waiting in answer.waiting if options.once else ():
-        output.say(f"left for the next look: {waiting.arrival}: {waiting.why}")
-    if answer.report is not None:
-        for row in answer.report.machines:
-            output.say(f"{row.machine}: {row.state}")
-        for file in answer.report.files:
-            output.say(file)
-    for address in answer.mailed_to:
-        output.say(f"sent to {address}")
     if options.once and not answer.news and not answer.waiting:
         output.say(f"nothing new in {options.folder}")
     return 2 if answer.refused else 0
+
+
+def _left_for_later(answer: WatchAnswer) -> list[str]:
+    return [f"left for the next look: {waiting.arrival}: {waiting.why}" for waiting in answer.waiting]
+
+
+def _written(answer: WatchAnswer) -> list[str]:
+    """The states of the report's machines, its files, and to whom a letter went."""
+    report = answer.report
+    lines = [] if report is None else [f"{row.machine}: {row.state}" for row in report.machines]
+    lines += [] if report is None else report.files
+    return [*lines, *(f"sent to {address}" for address in answer.mailed_to)]

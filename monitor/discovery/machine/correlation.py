@@ -156,7 +156,7 @@ class _White:
     correlation, its decomposition (R, p), (R, p, p), and the part of the criterion that no residual changes."""
 
     triangle: Array
-    own: Array
+    unknowns: Array
     values: Array
     vectors: Array
     logarithm: float
@@ -231,13 +231,13 @@ class NoiseDesign:
     def _resemblance(self, readings: Array) -> float:
         """The sum of products of neighbours, and of all readings up to ``FAR`` apart, less what the fit alone makes of
         white noise, in standard deviations; the larger of the two."""
-        own = self._own[0].reshape(*self._weighted.shape, self.rows.numbers, -1)
-        number = self._share * (int(self._weighted.sum()) * self.rows.numbers - float(np.sum(own**2)))
+        unknowns = self._own[0].reshape(*self._weighted.shape, self.rows.numbers, -1)
+        number = self._share * (int(self._weighted.sum()) * self.rows.numbers - float(np.sum(unknowns**2)))
         variance = max(float(np.sum(readings**2)) / max(number, 1.0), 1e-300)
         lags = np.arange(1, min(FAR, readings.shape[1] - 1) + 1)
         beyond = [
             float(np.sum(readings[:, lag:] * readings[:, :-lag])) / variance
-            + self._share * float(np.sum(own[:, lag:] * own[:, :-lag]))
+            + self._share * float(np.sum(unknowns[:, lag:] * unknowns[:, :-lag]))
             for lag in lags
         ]
         deviates = np.cumsum(beyond) / np.sqrt(np.maximum(lags * number, 1.0))
@@ -250,7 +250,7 @@ class NoiseDesign:
         white = self._whites[correlation]
         residual = _flat(white.triangle @ readings, rest, self.rows.numbers)[..., 0]
         able = white.values > SMALLEST_EIGENVALUE
-        onto = np.einsum("rij,ri->rj", white.vectors, np.einsum("rnp,rn->rp", white.own, residual))
+        onto = np.einsum("rij,ri->rj", white.vectors, np.einsum("rnp,rn->rp", white.unknowns, residual))
         squares = float(
             np.sum(residual**2) - np.sum(np.where(able, onto**2 / np.where(able, white.values, 1.0), 0.0))
         )
@@ -260,11 +260,11 @@ class NoiseDesign:
     def _white(self, correlation: Correlation) -> _White:
         plain = Rows(self._weighted, self.rows.numbers, None)
         triangle, determinant = Whitening(plain, correlation).factors
-        own = _flat(triangle @ self._own[0], self._own[1], self.rows.numbers)
-        values, vectors = np.linalg.eigh(np.swapaxes(own, 1, 2) @ own)
+        unknowns = _flat(triangle @ self._own[0], self._own[1], self.rows.numbers)
+        values, vectors = np.linalg.eigh(np.swapaxes(unknowns, 1, 2) @ unknowns)
         able = values > SMALLEST_EIGENVALUE
         logarithm = float(determinant.sum() + np.sum(np.log(np.where(able, values, 1.0))))
-        return _White(triangle, own, values, vectors, logarithm)
+        return _White(triangle, unknowns, values, vectors, logarithm)
 
 
 def _flat(readings: Array, rest: Array, numbers: int) -> Array:

@@ -271,11 +271,8 @@ def _search(
         if search is None:
             continue
         # Readings are judged under the present effects, again from the start: what looked bad without them may be good.
-        begin = search.under
-        if beside_curves is None and not suspects.same_as(gross):
-            begin, _ = fit_those_possible(problem, search.effects, gross.left_out(problem), current)
-        same_scene = search.scene if begin is search.scene.fit else None
-        more = find_suspects(begin, problem, search.effects, gross, able, same_scene)
+        again = beside_curves is None and not suspects.same_as(gross)
+        more = _suspects_anew(search, problem, gross, able, current if again else None)
         if beside_curves is not None:
             # The curves are pursued anew first: bad poses hide lines.
             return replace(search, suspects=more)
@@ -286,6 +283,18 @@ def _search(
         suspects = more
         noise = _Noise(noise.correlation)
     return _Search(scene, result, refined, suspects, under, tuple(dict.fromkeys(unfitted)), settled=False)
+
+
+def _suspects_anew(
+    search: _Search, problem: ChainProblem, gross: Suspects, able: Sequence[ChainVariant], start: Fit | None
+) -> Suspects:
+    """Judge the readings under the effects of a search, fitted from ``start`` to all but the ``gross`` ones where it is
+    given."""
+    begin = search.under
+    if start is not None:
+        begin, _ = fit_those_possible(problem, search.effects, gross.left_out(problem), start)
+    same_scene = search.scene if begin is search.scene.fit else None
+    return find_suspects(begin, problem, search.effects, gross, able, same_scene)
 
 
 def _scan(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 from monitor.methods import Unable, method_named
 from monitor.reporting.health.records import ALARMS, DataQuality, MachineHealth, RefusedImport, State
@@ -32,7 +33,7 @@ from monitor.workflow.health.refusals import refused_of
 from monitor.workflow.health.request import ReportOptions
 from monitor.workflow.health.results import MeasuredWeek, Results, stored_results, stored_with, task_of
 from monitor.workflow.health.runs import campaign_span, first_run, past_runs
-from monitor.workflow.health.task import NOT_IDENTIFIED, Task, TaskResult
+from monitor.workflow.health.task import Task, TaskResult
 from monitor.workflow.health.verdict import (
     changed_in_words,
     conformity_of,
@@ -125,13 +126,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     history = machine_history(db, past.name.machine, model=model.name, version=model.version)
     history = only_runs(history, past.runs)
     parameter_pasts = machine_past(history, splitting_events(past.events))
-    limits = campaign_tolerances(db, last.campaign)
-    of_type = type_in_use(db, last.campaign)
-    if of_type is not None:
-        remarks.append(
-            f"its tolerances are those of the machine type '{of_type.name}' in the configuration: campaign "
-            f"{last.campaign} states none"
-        )
+    limits = _limits(db, last.campaign, remarks)
     limit_um, beyond = limits.get(VOLUMETRIC), None
     if limit_um is not None and results.map is not None:
         beyond = probability_beyond(results.map, limit_um)
@@ -147,11 +142,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
             continue
         parameter = parameter_pasts[name]
         drifts[name] = drift_forecast(parameter.drift, limits.get(name))
-        starts = [
-            at.replace(tzinfo=None)
-            for at, has_it in zip(history.started_at, parameter.mask, strict=True)
-            if has_it
-        ]
+        starts = [at.replace(tzinfo=None) for at in compress(history.started_at, parameter.mask)]
         judgement = Judgement(limits.get(name), judged.single.get(name), drifts[name])
         parameters.append(parameter_health(parameter, starts, stated, judgement, week))
     of_campaign = [run for run in past.runs if run.campaign == last.campaign]
@@ -166,8 +157,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     quality = data_quality(db, past.runs_of_week, explanation, stated, past.refused, remarks)
     can_be = not isinstance(method_named(last.method).uncertainty, Unable)
     # A campaign whose identification is refused has no numbers, whatever a robust fit of one run made of it.
-    refused = any(remark.startswith(f"campaign {last.campaign} {NOT_IDENTIFIED}") for remark in remarks)
-    evaluated = (stated is not None and not refused) or not can_be
+    evaluated = (stated is not None and last.campaign not in history.unidentified) or not can_be
     state = state_of(judged, noted, explanation, quality, past.options.risk, evaluated=evaluated)
     return MachineHealth(
         past.name.machine, past.name.description, past.name.location, state,
@@ -180,6 +170,17 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         model=model_health(explanation, results.versions, measured.span), quality=quality,
         map=stated_map(results.map, limit_um, beyond),
     )  # fmt: skip
+
+
+def _limits(db: Database, campaign: str, remarks: list[str]) -> dict[str, float]:
+    """The tolerances by which a machine is judged; a remark where they are those of its type."""
+    of_type = type_in_use(db, campaign)
+    if of_type is not None:
+        remarks.append(
+            f"its tolerances are those of the machine type '{of_type.name}' in the configuration: campaign "
+            f"{campaign} states none"
+        )
+    return campaign_tolerances(db, campaign)
 
 
 def _in_words(run: RecordedRun) -> str:

@@ -31,7 +31,7 @@ from monitor.workflow.explain.explain import save_explanation
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.version_answer import HistoryAnswer
 from monitor.workflow.health.runs import Span
-from monitor.workflow.health.task import METHOD, NOT_IDENTIFIED, Task, TaskResult, attempted
+from monitor.workflow.health.task import METHOD, Task, TaskResult, attempted
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.request import COVERAGE
 from monitor.workflow.uncertainty.stored import restored, save_uncertainty
@@ -172,7 +172,7 @@ def stored_with(
     for identification in computed.identified:
         attempted(
             lambda identification=identification: save_identification(db, identification),  # type: ignore[misc]
-            f"campaign {identification.campaign} {NOT_IDENTIFIED}",
+            f"campaign {identification.campaign} could not be identified",
             remarks,
         )
     uncertainty = _saved(

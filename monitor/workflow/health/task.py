@@ -72,10 +72,6 @@ class TaskResult:
     remarks: tuple[str, ...] = ()
 
 
-#: How a remark on a campaign ends whose identification was refused.
-NOT_IDENTIFIED = "could not be identified"
-
-
 def attempted(step: Callable[[], Result], failure: str, remarks: list[str]) -> Result | None:
     """The result of a step, or a remark that says why there is none: one machine does not stop the fleet's report."""
     try:
@@ -135,7 +131,7 @@ def _computed(task: Task, fitted: _Fitted) -> TaskResult:
         solve = (lambda problem: fitted.fit.solution) if same else solve_problem
         identification = attempted(
             lambda campaign=campaign, solve=solve: identified(campaign, task.model, solve)[1],  # type: ignore[misc]
-            f"campaign {campaign.name} {NOT_IDENTIFIED}",
+            f"campaign {campaign.name} could not be identified",
             remarks,
         )
         if identification is not None:

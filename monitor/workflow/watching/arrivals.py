@@ -62,9 +62,9 @@ def _arrival(path: Path) -> Arrival | None:
 
 def _files_below(folder: Path) -> list[Path]:
     paths = [folder]
-    for place, folders, files in os.walk(folder):
+    for directory, folders, files in os.walk(folder):
         folders.sort()
-        paths += [Path(place) / name for name in (*folders, *sorted(files))]
+        paths += [Path(directory) / name for name in (*folders, *sorted(files))]
         if len(paths) > MOST_FILES:
             break
     return paths

@@ -52,9 +52,9 @@ def watch(
     the arrivals of this look for the next one; StoreError where the database cannot be used.
     """
     with one_at_a_time(db, "watch"):
-        done = _done(db)
+        fingerprints = _done(db)
         present = arrivals(request.folder)
-        fresh = [arrival for arrival in present if done.get(_path(arrival)) != arrival.fingerprint]
+        fresh = [arrival for arrival in present if fingerprints.get(_path(arrival)) != arrival.fingerprint]
         waiting = {arrival: why for arrival in fresh if (why := _why_to_wait(arrival, request.rest_s))}
         arrived: list[ArrivedCampaign] = []
         refused: list[RefusedFolder] = []
