@@ -127,13 +127,8 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
     history = only_runs(history, past.runs)
     parameter_pasts = machine_past(history, splitting_events(past.events))
     limits = _limits(db, last.campaign, remarks)
-    limit_um, beyond = limits.get(VOLUMETRIC), None
-    if limit_um is not None and results.map is not None:
-        beyond = probability_beyond(results.map, limit_um)
-    elif limit_um is not None:
-        remarks.append(
-            f"the volumetric error has a limit of {limit_um:g} µm, but no map: it is not judged against it"
-        )
+    limit_um = limits.get(VOLUMETRIC)
+    beyond = None if limit_um is None else _beyond(results, limit_um, remarks)
     judged = with_volumetric(conformity_of(stated, limits), beyond)
     parameters, drifts = [], {}
     added = [name for name in parameter_pasts if name.startswith(model.effects)]
@@ -181,6 +176,16 @@ def _limits(db: Database, campaign: str, remarks: list[str]) -> dict[str, float]
             f"{campaign} states none"
         )
     return campaign_tolerances(db, campaign)
+
+
+def _beyond(results: Results, limit_um: float, remarks: list[str]) -> float | None:
+    """The probability that the volumetric error lies beyond its limit; a remark where there is no map."""
+    if results.map is not None:
+        return probability_beyond(results.map, limit_um)
+    remarks.append(
+        f"the volumetric error has a limit of {limit_um:g} µm, but no map: it is not judged against it"
+    )
+    return None
 
 
 def _in_words(run: RecordedRun) -> str:
