@@ -14,6 +14,7 @@ from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.cli.behind import add_behind, further_sources
 from monitor.cli.configuration import configuration
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.dcc_elements import DccVersion
 from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
 from monitor.workflow.certificate.request import METHODS, RULES
@@ -64,6 +65,10 @@ def add_issuing(parser: ArgumentParser) -> None:
         "--accept", action="append", type=_accepted, default=[], metavar="GROUND=REASON",
         help="issue it although this ground speaks against it, for a reason that is printed; may be repeated: "
         + ", ".join(kind.value for kind in GroundKind),
+    )  # fmt: skip
+    parser.add_argument(
+        "--dcc-version", choices=[str(version) for version in DccVersion],
+        help="release of the digital certificate (default: that of the laboratory's file, else the newest)",
     )  # fmt: skip
     add_fonts(parser)
     signing = parser.add_argument_group("signature (extra [sign]; for a token, extra [token])")
@@ -143,6 +148,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "fonts": tuple(options.font),
         "key": _key(options),
         "accept": dict(options.accept),
+        "dcc_version": options.dcc_version,
     }
 
 

@@ -69,7 +69,7 @@ def options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     shown.add_argument(
         "--dcc", type=Path, metavar="PATH",
-        help="write the digital certificate, PTB DCC 3.2.1 (a folder, or a file ending in .xml)",
+        help="write the digital certificate, PTB DCC (a folder, or a file ending in .xml)",
     )  # fmt: skip
     shown.add_argument(
         "--pdf", type=Path, metavar="PATH",

@@ -48,7 +48,7 @@ def list_certificates(db: Database, request: CertificatesRequest) -> Certificate
 
 
 def write_digital(db: Database, request: CertificateFileRequest) -> CertificateFileAnswer:
-    """Write the digital calibration certificate (PTB DCC 3.2.1) of a stored record to a file or into a folder.
+    """Write the digital calibration certificate (PTB DCC) of a stored record to a file or into a folder.
 
     Raises NotFoundError, InputError where the record names no country.
     """
