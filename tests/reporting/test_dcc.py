@@ -7,6 +7,7 @@ import io
 import subprocess
 import sys
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -69,7 +70,7 @@ def test_ptb_dcc_schema_validates_every_part(
     schema = schema_of(release)
     old = Replaced("K-2026-0041", record.issued_on, "wrong customer", "0" * 64)
     standard = Standard(
-        "scale bar", "SB-1", "2026-77", "Institute", record.issued_on, NotApplicable("recalled")
+        "scale bar", "SB-1", "2026-77", "Institute", date(2026, 1, 7), NotApplicable("recalled")
     )
     for certificate in (
         record,

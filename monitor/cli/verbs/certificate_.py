@@ -33,6 +33,7 @@ from monitor.workflow.certificate.states import (
     list_certificates,
     show_certificate,
     write_digital,
+    write_digital_page,
     write_issued,
 )
 from monitor.workflow.certificate.template import TemplateRequest, write_template
@@ -70,6 +71,10 @@ def options(parser: ArgumentParser) -> None:
     shown.add_argument(
         "--dcc", type=Path, metavar="PATH",
         help="write the digital certificate, PTB DCC (a folder, or a file ending in .xml)",
+    )  # fmt: skip
+    shown.add_argument(
+        "--dcc-html", type=Path, metavar="PATH",
+        help="write what the digital certificate says as a page to read (a folder, or a file ending in .html)",
     )  # fmt: skip
     shown.add_argument(
         "--pdf", type=Path, metavar="PATH",
@@ -163,7 +168,12 @@ def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
 
 
 def _show(options: Namespace) -> int:
-    writing = (("--remake", options.remake), ("--dcc", options.dcc), ("--pdf", options.pdf))
+    files = (
+        ("--dcc", options.dcc, write_digital),
+        ("--dcc-html", options.dcc_html, write_digital_page),
+        ("--pdf", options.pdf, write_issued),
+    )
+    writing = (("--remake", options.remake), *((option, path) for option, path, _ in files))
     for option, path in writing:
         if path is not None and options.number is None:
             raise InputError(
@@ -171,7 +181,7 @@ def _show(options: Namespace) -> int:
             )
     if options.remake is not None:
         return _remake(options)
-    for path, write in ((options.dcc, write_digital), (options.pdf, write_issued)):
+    for _, path, write in files:
         if path is not None:
             with opened(options) as db:
                 written = write(db, CertificateFileRequest(options.number, path))

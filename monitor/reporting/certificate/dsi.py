@@ -50,6 +50,17 @@ def _power_of(factor: str, name: str) -> str:
     return _UNITS[stem] + ("" if power is None else rf"\tothe{{{_POWERS.get(power, power[-1])}}}")
 
 
+def written_unit(notation: str) -> str:
+    """A unit in the notation of D-SI as it is printed: ``\\micro\\metre\\per\\metre`` is µm/m."""
+    names = {notation: name for name, notation in _UNITS.items()}
+    signs = {power: sign for sign, power in _POWERS.items()}
+    factors = []
+    for factor in notation.split(r"\per"):
+        stem, _, power = factor.partition(r"\tothe")
+        factors.append(names[stem] + (signs[power.strip("{}")] if power else ""))
+    return "/".join(factors)
+
+
 def real(parent: ET.Element, value: float, unit: str) -> ET.Element:
     """One value with its display unit."""
     element = add(parent, "real", space=SI)
