@@ -25,6 +25,7 @@ TEMPLATE = """# The configuration of monitor. Take the # away from what you need
 # language = "en"                  # of `certificate template`: en or de
 # mail = "mail.toml"               # what `report --mail` without a file sends by
 # time_zone = "Europe/Berlin"      # of moments that are typed without an offset from UTC; else that of this computer
+# timestamp_url = "https://tsa.example.org"  # authority whose time stamp (RFC 3161) signed certificates get
 """
 
 
@@ -38,6 +39,7 @@ class Configuration:
     language: str | None = None
     mail: Path | None = None
     time_zone: str | None = None
+    timestamp_url: str | None = None
 
 
 def place() -> Path | None:
@@ -73,7 +75,7 @@ def read(file: Path) -> Configuration:
     paths = {
         key: file.parent / document[key] for key in ("database", "laboratory", "mail") if key in document
     }
-    texts = {key: document[key] for key in ("language", "time_zone") if key in document}
+    texts = {key: document[key] for key in ("language", "time_zone", "timestamp_url") if key in document}
     return Configuration(file, **paths, **texts)
 
 
@@ -108,10 +110,15 @@ def _zone(value: str, file: Path) -> str:
     return ""
 
 
+def _address(value: str, file: Path) -> str:
+    return "" if value.startswith(("http://", "https://")) else "write an address with http:// or https://"
+
+
 _CHECKS: dict[str, Callable[[str, Path], str]] = {
     "database": _database,
     "laboratory": _file,
     "language": _language,
     "mail": _file,
     "time_zone": _zone,
+    "timestamp_url": _address,
 }

@@ -82,6 +82,10 @@ def add_issuing(parser: ArgumentParser) -> None:
         metavar="LIBRARY",
         help="sign with a key on a PKCS#11 token: its maker's library",
     )
+    signing.add_argument(
+        "--timestamp-url", metavar="URL",
+        help="put a time stamp of this authority (RFC 3161) on the signature (else that of the configuration)",
+    )  # fmt: skip
     signing.add_argument("--token-label", metavar="LABEL", help="the label of the token")
     signing.add_argument("--token-slot", type=int, metavar="N", help="or its slot, counted from 0")
     signing.add_argument("--token-key", metavar="LABEL", help="the label of the key")
@@ -149,6 +153,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "key": _key(options),
         "accept": dict(options.accept),
         "dcc_version": options.dcc_version,
+        "timestamp_url": options.timestamp_url or configuration().timestamp_url,
     }
 
 

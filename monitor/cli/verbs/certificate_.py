@@ -228,6 +228,8 @@ def _verify(options: Namespace) -> int:
     if answer.signer is not None:
         output.say(f"signed by {answer.signer}{'' if options.trust else ' (not checked against --trust)'}")
         output.say(f"           its certificate has the SHA-256 {answer.signer_sha256}")
+    if answer.stamped_at is not None:
+        output.say(f"           time stamp of {answer.stamped_at:%Y-%m-%d %H:%M:%S %Z}")
     for fault in answer.faults:
         output.say(f"  {fault}")
     name = options.file if answer.number is None else f"certificate {answer.number}"

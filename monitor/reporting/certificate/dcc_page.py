@@ -42,12 +42,16 @@ class CorrelationRow:
 
 @dataclass(frozen=True)
 class ShownResult:
-    """A result: its words, its values, what U is of, and the correlations where it is a vector."""
+    """A result: its words, its values, what the coverage factor is, and the correlations where it is a vector.
+
+    ``symbol`` of the uncertainty: u beside an ellipsoid, whose factor is of no single parameter, else U = k u.
+    """
 
     name: str
     description: str
     text: str
     rows: tuple[ValueRow, ...]
+    symbol: str
     coverage: str
     correlations: tuple[CorrelationRow, ...]
 
@@ -165,6 +169,7 @@ def _result(result: ET.Element, texts: Texts) -> ShownResult:
         description=_said(result, "dcc:description"),
         text=_said(result, "dcc:data/dcc:text"),
         rows=rows,
+        symbol="u" if _ellipsoidal(result) else "U",
         coverage=coverage,
         correlations=correlations,
     )
@@ -185,10 +190,10 @@ def _vector(vector: ET.Element, texts: Texts) -> tuple[tuple[ValueRow, ...], str
     units = [written_unit(unit) for unit in _text(vector, "si:unitXMLList").split()]
     covariance = _covariance(vector)
     u = np.sqrt(np.diag(covariance))
-    factor = float(_any(vector, "coverageFactorXMLList", "coverageFactor"))
+    factor = 1.0 if _ellipsoidal(vector) else float(_any(vector, "coverageFactorXMLList", "coverageFactor"))
     rows = []
-    for label, value, expanded, unit in zip(labels, values, factor * u, units, strict=True):
-        rounded = round_result(value, float(expanded), direction="up")
+    for label, value, uncertainty, unit in zip(labels, values, factor * u, units, strict=True):
+        rounded = round_result(value, float(uncertainty), direction="up")
         rows.append(ValueRow(label, texts.number(rounded.estimate), texts.number(rounded.uncertainty), unit))
     correlation = covariance / np.outer(u, u)
     correlations = tuple(
@@ -204,6 +209,11 @@ def _vector(vector: ET.Element, texts: Texts) -> tuple[tuple[ValueRow, ...], str
         for row, label in enumerate(labels)
     )
     return tuple(rows), _coverage(vector, "XMLList", texts), correlations
+
+
+def _ellipsoidal(parent: ET.Element) -> bool:
+    tags = ("ellipsoidalRegionMUXMLList", "ellipsoidalRegionXMLList")
+    return any(parent.find(f".//si:{tag}", _SPACES) is not None for tag in tags)
 
 
 def _covariance(vector: ET.Element) -> Array:

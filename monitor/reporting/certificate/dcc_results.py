@@ -25,7 +25,12 @@ def geometric_errors(parent: ET.Element, record: CertificateRecord, result: Resu
     version = version_of(record)
     say(parent, "name", texts("dcc.result", state=result.state), texts.language)
     sentences = () if result.budget is None else behind_sentences(result, result.budget, texts)
-    results = _results(parent, record, ". ".join([result.evaluation, *sentences]), texts, result.state)
+    said = [result.evaluation, *sentences]
+    # Sentences bring their full stops; 3.2.1 was released here with two behind some.
+    evaluation = (
+        " ".join(f"{words.rstrip('.')}." for words in said) if version.by_vocabulary else ". ".join(said)
+    )
+    results = _results(parent, record, evaluation, texts, result.state)
     regions = (
         ("ellipsoidal", result.k_p, result.k_p_error > 0.0),
         ("rectangular", result.k_q, result.k_q_error > 0.0),

@@ -55,7 +55,7 @@ def written_unit(notation: str) -> str:
     names = {notation: name for name, notation in _UNITS.items()}
     signs = {power: sign for sign, power in _POWERS.items()}
     factors = []
-    for factor in notation.split(r"\per"):
+    for factor in re.split(r"\\per(?=\\)", notation):
         stem, _, power = factor.partition(r"\tothe")
         factors.append(names[stem] + (signs[power.strip("{}")] if power else ""))
     return "/".join(factors)

@@ -63,6 +63,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         signer=None if signature.signer is None else signature.signer.name,
         signer_sha256=None if signature.signer is None else signature.signer.sha256,
         faults=(*([] if invalid is None else [invalid]), *other, *signature.faults, *chain.faults),
+        stamped_at=signature.stamped_at,
     )
 
 
