@@ -59,8 +59,8 @@ def sign(pdf: bytes, key: Key, timestamp_url: str | None = None) -> bytes:
 
     The authority gets the hash of the signature, and nothing of the document.
 
-    Raises InputError where the authority gives no time stamp, where the extra is not installed, the key cannot be opened, or is not there, and where its
-    certificate is not valid today.
+    Raises InputError where the authority gives no time stamp, where the extra is not installed, the key cannot be
+    opened, or is not there, and where its certificate is not valid today.
     """
     need_pyhanko()
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
