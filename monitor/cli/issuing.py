@@ -153,7 +153,7 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "key": _key(options),
         "accept": dict(options.accept),
         "dcc_version": options.dcc_version,
-        "timestamp_url": options.timestamp_url or configuration().timestamp_url,
+        "timestamp_url": _timestamp_url(options),
     }
 
 
@@ -177,6 +177,17 @@ def _process(texts: list[str]) -> dict[str, float]:
                 f"--process {text}: write a parameter, = and a standard deviation, for example EA0B=5"
             ) from error
     return process
+
+
+def _timestamp_url(options: Namespace) -> str | None:
+    """The authority that was typed, else that of the configuration, which holds for what is signed."""
+    if options.timestamp_url is None:
+        return configuration().timestamp_url
+    if options.sign is None and options.token is None:
+        raise InputError(
+            "a time stamp is put on a signature: --timestamp-url needs --sign or --token, which say by which key"
+        )
+    return str(options.timestamp_url)
 
 
 def _key(options: Namespace) -> Key | None:

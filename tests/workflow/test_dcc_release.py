@@ -63,6 +63,23 @@ def test_a_release_that_there_is_not_and_an_address_that_is_none_are_refused(tmp
         CertificateRequest("c", 1, laboratory=LABORATORY, timestamp_url="tsa.example.org")
 
 
+def test_a_time_stamp_needs_a_signature(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    typed = [
+        "certificate",
+        "issue",
+        "c",
+        "--laboratory",
+        str(LABORATORY),
+        "--timestamp-url",
+        "http://127.0.0.1:9",
+    ]
+    path = tmp_path / "t.duckdb"
+    Database(path).close()
+    assert main(["--db", str(path), *typed]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "--timestamp-url needs --sign or --token" in said
+
+
 def test_the_page_is_written_beside_the_file(
     db: Database, tmp_path: Path, pdf_unread: Callable[[], AbstractContextManager[None]]
 ) -> None:
