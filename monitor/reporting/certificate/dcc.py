@@ -159,31 +159,36 @@ def _contact(parent: ET.Element, party: Party, language: str) -> None:
         add(further, "content", line).set("lang", language)
 
 
+def _conformity(parent: ET.Element, conformity: ConformityStatement, texts: Texts) -> None:
+    """A statement for each verdict, with the rule and the numbers that it rests on."""
+    for verdict in conformity.verdicts:
+        statement = add(parent, "statement", ref="basic_conformity")
+        say(
+            statement,
+            "name",
+            texts("dcc.conformity_of", name=verdict.name, state=conformity.state),
+            texts.language,
+        )
+        banded = verdict.guard_band is not None
+        declaration = texts(
+            "dcc.verdict_band" if banded else "dcc.verdict",
+            band=guard_band(verdict, texts) if banded else "",
+            verdict=verdict_words(verdict.verdict, texts),
+            tolerance=texts.number(decimal_of(verdict.tolerance)),
+            unit=verdict.unit,
+            probability=texts.number(decimal_of(verdict.probability)),
+            rule=conformity.rule,
+            risk=conformity.risk,
+            basis=" ".join(filter(None, [conformity.basis, conformity.process])),
+        )
+        say(statement, "declaration", declaration, texts.language)
+        add(statement, "conformity", _STATUS[verdict.verdict])
+
+
 def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> None:
     conformity = record.conformity
     if isinstance(conformity, ConformityStatement):
-        for verdict in conformity.verdicts:
-            statement = add(parent, "statement", ref="basic_conformity")
-            say(
-                statement,
-                "name",
-                texts("dcc.conformity_of", name=verdict.name, state=conformity.state),
-                texts.language,
-            )
-            banded = verdict.guard_band is not None
-            declaration = texts(
-                "dcc.verdict_band" if banded else "dcc.verdict",
-                band=guard_band(verdict, texts) if banded else "",
-                verdict=verdict_words(verdict.verdict, texts),
-                tolerance=texts.number(decimal_of(verdict.tolerance)),
-                unit=verdict.unit,
-                probability=texts.number(decimal_of(verdict.probability)),
-                rule=conformity.rule,
-                risk=conformity.risk,
-                basis=" ".join(filter(None, [conformity.basis, conformity.process])),
-            )
-            say(statement, "declaration", declaration, texts.language)
-            add(statement, "conformity", _STATUS[verdict.verdict])
+        _conformity(parent, conformity, texts)
     statements = [
         ("title", record.title),
         ("place", record.place),
