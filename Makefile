@@ -57,6 +57,7 @@ manual: setup  ## the manual as a site in manual-output/, and every block of cod
 
 trials: setup  ## slow trials over many seeds, an hour; their last results are in docs/trials-*.md
 	@$(PYTEST) $(PARALLEL) --all-seeds --timeout 3600
+	@$(PYTEST) $(PARALLEL) tests/benchmarks/trial_dcc_examples.py
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_discovery.py --seeds 10 --empties 500 --processes 2 $(ARGS)
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_unknown.py --seeds 3 --empties 60
 	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/trial_empty.py --seeds 300 --seconds 1200

@@ -1,4 +1,4 @@
-"""A Digital Calibration Certificate (PTB DCC 3.2.1, D-SI 2.1) from numbers of one's own: no campaign, no database.
+"""A Digital Calibration Certificate (PTB DCC 3.3.0, D-SI 2.2.1) from numbers of one's own: no campaign, no database.
 
     python examples/write_dcc.py certificate.dcc.xml
 
@@ -55,6 +55,7 @@ RECORD = CertificateRecord(
     title="Calibration certificate",
     laboratory=Party("Made-up Laboratory", ("1 Example Road", "00000 Nowhere"), "laboratory@example.org"),
     country="XX",  # ISO 3166-1, two letters
+    dcc_version="3.3.0",  # or 3.2.1
     place="hall 1",
     number="K-2026-0042",
     customer=Party("Made-up Customer", ("2 Example Street", "00000 Nowhere"), "quality@example.org"),

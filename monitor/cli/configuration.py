@@ -29,6 +29,7 @@ TEMPLATE = """# The configuration of monitor. Take the # away from what you need
 # language = "en"                  # of `certificate template`: en or de
 # mail = "mail.toml"               # what `report --mail` without a file sends by
 # time_zone = "Europe/Berlin"      # of moments that are typed without an offset from UTC; else that of this computer
+# timestamp_url = "https://tsa.example.org"  # authority whose time stamp (RFC 3161) signed certificates get
 
 # Tolerances by machine type ([machine] model of campaign.toml; "*" for all others): limits of absolute values in µm,
 # µrad or µm/m for trend, fleet and report, where the machine's campaign states none of its own. A certificate states
@@ -49,6 +50,7 @@ class Configuration:
     language: str | None = None
     mail: Path | None = None
     time_zone: str | None = None
+    timestamp_url: str | None = None
     tolerances: Mapping[str, Mapping[str, float]] | None = None
 
 
@@ -85,7 +87,7 @@ def read(file: Path) -> Configuration:
     paths = {
         key: file.parent / document[key] for key in ("database", "laboratory", "mail") if key in document
     }
-    texts = {key: document[key] for key in ("language", "time_zone") if key in document}
+    texts = {key: document[key] for key in ("language", "time_zone", "timestamp_url") if key in document}
     return Configuration(file, **paths, **texts, tolerances=document.get("tolerances"))
 
 
@@ -143,10 +145,15 @@ def _zone(value: str, file: Path) -> str:
     return ""
 
 
+def _address(value: str, file: Path) -> str:
+    return "" if value.startswith(("http://", "https://")) else "write an address with http:// or https://"
+
+
 _CHECKS: dict[str, Callable[[str, Path], str]] = {
     "database": _database,
     "laboratory": _file,
     "language": _language,
     "mail": _file,
     "time_zone": _zone,
+    "timestamp_url": _address,
 }

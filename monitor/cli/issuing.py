@@ -14,6 +14,7 @@ from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.cli.behind import add_behind, further_sources
 from monitor.cli.configuration import configuration
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.dcc_elements import DccVersion
 from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import FileKey, Key, TokenKey
 from monitor.workflow.certificate.request import METHODS, RULES
@@ -65,6 +66,10 @@ def add_issuing(parser: ArgumentParser) -> None:
         help="issue it although this ground speaks against it, for a reason that is printed; may be repeated: "
         + ", ".join(kind.value for kind in GroundKind),
     )  # fmt: skip
+    parser.add_argument(
+        "--dcc-version", choices=[str(version) for version in DccVersion],
+        help="release of the digital certificate (default: that of the laboratory's file, else the newest)",
+    )  # fmt: skip
     add_fonts(parser)
     signing = parser.add_argument_group("signature (extra [sign]; for a token, extra [token])")
     signing.add_argument("--sign", type=Path, metavar="P12", help="sign with the key of a PKCS#12 file")
@@ -77,6 +82,10 @@ def add_issuing(parser: ArgumentParser) -> None:
         metavar="LIBRARY",
         help="sign with a key on a PKCS#11 token: its maker's library",
     )
+    signing.add_argument(
+        "--timestamp-url", metavar="URL",
+        help="put a time stamp of this authority (RFC 3161) on the signature (else that of the configuration)",
+    )  # fmt: skip
     signing.add_argument("--token-label", metavar="LABEL", help="the label of the token")
     signing.add_argument("--token-slot", type=int, metavar="N", help="or its slot, counted from 0")
     signing.add_argument("--token-key", metavar="LABEL", help="the label of the key")
@@ -143,6 +152,8 @@ def issuing(options: Namespace) -> dict[str, Any]:
         "fonts": tuple(options.font),
         "key": _key(options),
         "accept": dict(options.accept),
+        "dcc_version": options.dcc_version,
+        "timestamp_url": _timestamp_url(options),
     }
 
 
@@ -166,6 +177,17 @@ def _process(texts: list[str]) -> dict[str, float]:
                 f"--process {text}: write a parameter, = and a standard deviation, for example EA0B=5"
             ) from error
     return process
+
+
+def _timestamp_url(options: Namespace) -> str | None:
+    """The authority that was typed, else that of the configuration, which holds for what is signed."""
+    if options.timestamp_url is None:
+        return configuration().timestamp_url
+    if options.sign is None and options.token is None:
+        raise InputError(
+            "a time stamp is put on a signature: --timestamp-url needs --sign or --token, which say by which key"
+        )
+    return str(options.timestamp_url)
 
 
 def _key(options: Namespace) -> Key | None:

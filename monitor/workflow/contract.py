@@ -57,6 +57,7 @@ QUESTIONS = {
         "certificates": "certificate.states:list_certificates",
         "compare": "explain.compare:compare",
         "digital certificate": "certificate.states:write_digital",
+        "digital certificate page": "certificate.states:write_digital_page",
         "effects": "effects:effects",
         "effects of campaign": "effects:campaign_effects",
         "event": "events:event",

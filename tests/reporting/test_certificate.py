@@ -48,6 +48,8 @@ def test_17025_every_letter_of_both_clauses_has_a_field() -> None:
         "accredited",
         "mark",
         "standards",
+        "anchor",
+        "signer",
         "country",
         "replaces",
         "volumetric",

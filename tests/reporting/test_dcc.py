@@ -1,13 +1,13 @@
-"""The digital certificate: valid by PTB's schemas (where at hand), the record's numbers to the last bit."""
+"""The digital certificate: valid by PTB's schemas, the record's numbers to the last bit."""
 
 from __future__ import annotations
 
 import dataclasses
 import io
-import os
 import subprocess
 import sys
 from collections.abc import Callable
+from datetime import date
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -20,12 +20,16 @@ from scipy.stats import chi2, norm
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.completeness import IncompleteCertificateError
 from monitor.reporting.certificate.dcc import dcc_xml
-from monitor.reporting.certificate.dcc_results import DCC, SI, unit_of
+from monitor.reporting.certificate.dcc_elements import DCC, SI, DccVersion
+from monitor.reporting.certificate.dsi import unit_of
 from monitor.reporting.certificate.record import (
+    Accreditation,
     CertificateRecord,
     ConformityStatement,
     ConformityVerdict,
+    NotApplicable,
     Replaced,
+    Standard,
     Verdict,
 )
 from monitor.reporting.pdf.render import certificate_pdf
@@ -33,15 +37,7 @@ from monitor.reporting.refused import RefusedParameters
 
 Make = Callable[..., CertificateRecord]
 SPACES = {"dcc": DCC, "si": SI}
-#: PTB's schemas are not ours to ship: they lie beside the checkout, or where this variable says.
-SCHEMAS = Path(
-    os.environ.get(
-        "MONITOR_DCC_SCHEMAS", Path(__file__).resolve().parents[3] / "shared" / "references" / "dcc"
-    )
-)
-#: The signature schema of the W3C, which the DCC's imports and this writer does not use: an element of any content.
-SIGNATURE = """<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" targetNamespace="http://www.w3.org/2000/09/xmldsig#">
-<xs:element name="Signature" type="xs:anyType"/></xs:schema>"""
+schema_of = load("dcc_schemas", Path(__file__).with_name("dcc_schemas.py")).schema_of
 #: The writer as somebody uses it who has nothing but numbers of his own.
 EXAMPLE = load("write_dcc", Path(__file__).resolve().parents[2] / "examples" / "write_dcc.py")
 
@@ -66,32 +62,27 @@ def tree(record: CertificateRecord) -> ET.Element:
     return ET.fromstring(dcc_xml(record))
 
 
-def test_ptb_dcc_3_2_1_schema_validates_every_part(record: CertificateRecord, make_record: Make) -> None:
+@pytest.mark.parametrize("release", list(DccVersion))
+def test_ptb_dcc_schema_validates_every_part(
+    record: CertificateRecord, make_record: Make, release: DccVersion
+) -> None:
     etree = pytest.importorskip("lxml.etree", reason="lxml validates XML schemas")
-    if not (SCHEMAS / "dcc-3.2.1.xsd").is_file():
-        pytest.skip(f"PTB's schemas are not in {SCHEMAS}; $MONITOR_DCC_SCHEMAS names another folder")
-
-    class Local(etree.Resolver):  # type: ignore[misc, name-defined]
-        def resolve(self, url: str, public_id: str, context: object) -> object:
-            if "xmldsig" in url:
-                return self.resolve_string(SIGNATURE, context)
-            if "SI_Format" in url:
-                return self.resolve_filename(str(SCHEMAS / "SI_Format-2.1.0.xsd"), context)
-            return None
-
-    parser = etree.XMLParser()
-    parser.resolvers.add(Local())
-    schema = etree.XMLSchema(etree.parse(str(SCHEMAS / "dcc-3.2.1.xsd"), parser))
+    schema = schema_of(release)
     old = Replaced("K-2026-0041", record.issued_on, "wrong customer", "0" * 64)
-    for one in (
+    standard = Standard(
+        "scale bar", "SB-1", "2026-77", "Institute", date(2026, 1, 7), NotApplicable("recalled")
+    )
+    for certificate in (
         record,
         dataclasses.replace(make_record(13, language="de", maps=1), country="DE", replaces=old),
-        dataclasses.replace(make_record(30), country="FR"),
-        dataclasses.replace(make_record(1), country="US"),
+        dataclasses.replace(make_record(30), country="FR", standards=(standard,)),
+        dataclasses.replace(make_record(1), country="US", accredited=Accreditation("DAkkS", "D-K-0")),
         EXAMPLE.RECORD,
     ):
-        schema.assertValid(etree.fromstring(dcc_xml(one)))
-    broken = dcc_xml(record).replace(b"coverageFactor>", b"coverFactor>")
+        schema.assertValid(etree.fromstring(dcc_xml(dataclasses.replace(certificate, dcc_version=release))))
+    broken = dcc_xml(dataclasses.replace(record, dcc_version=release)).replace(
+        b"coverageFactor", b"coverFactor"
+    )
     assert not schema.validate(etree.fromstring(broken))
 
 

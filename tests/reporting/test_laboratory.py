@@ -66,7 +66,7 @@ def test_the_examples_answer_every_question(name: str, made_up: str) -> None:
     # What the campaign knows (the machine, the bar's certificate) and what only some laboratories have.
     optional = {
         "accreditation", "accredited", "item_description", "item_identification", "mark", "scale_bar", "standards",
-        "temperature",
+        "temperature", "dcc_version",
     }  # fmt: skip
     unanswered = {name for name in found.__dataclass_fields__ if getattr(found, name) is None}
     assert unanswered == optional
@@ -101,7 +101,8 @@ def test_all_faults_are_listed_together(tmp_path: Path) -> None:
         "standards, temperature, statements, "
         "authorised_by",
         "statements is a section: write [statements] and its keys below",
-        "[laboratory] has no key nam; it has name, address, contact, accreditation, country, language, mark",
+        "[laboratory] has no key nam; it has name, address, contact, accreditation, country, dcc_version, "
+        "language, mark",
         "laboratory.language is one of de, en, but is 'tlh'",
         'laboratory.address is a list of lines, for example ["1 Example Road", "Town"], but is \'one line\'',
         "customer.name is a text in quotes, but is 3",

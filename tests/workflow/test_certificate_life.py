@@ -18,7 +18,7 @@ from monitor.exceptions import InputError
 from monitor.readers import read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.dcc import dcc_xml
-from monitor.reporting.certificate.dcc_results import DCC
+from monitor.reporting.certificate.dcc_elements import DCC
 from monitor.reporting.certificate.record import CertificateRecord, Replaced, Signer
 from monitor.reporting.pdf.render import certificate_pdf
 from monitor.reporting.signature.signature import SignatureFinding, check_signature
@@ -317,7 +317,7 @@ def test_a_signature_is_judged_on_the_day_on_which_the_database_received_it(
     made = issue(
         db,
         CertificateRequest(
-            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="S-2", issued_on=DAY, key=key
+            "five-days", 20, laboratory=LABORATORY, out=tmp_path, number="S-4", issued_on=DAY, key=key
         ),
     )
     file = Path(made.file)
@@ -332,7 +332,7 @@ def test_a_signature_is_judged_on_the_day_on_which_the_database_received_it(
     file.write_bytes(file.read_bytes() + b"x")
     assert verify_file(db, VerificationRequest(file)).ok is False
     # A file that is not the stored one was never seen here: it is judged as of now.
-    assert asked == [load_certificate(db, "S-2").made_at.replace(tzinfo=UTC), None]
+    assert asked == [load_certificate(db, "S-4").made_at.replace(tzinfo=UTC), None]
 
 
 class Killed(BaseException):

@@ -16,6 +16,7 @@ import pytest
 from monitor.documents import to_document
 from monitor.exceptions import StoreError
 from monitor.readers import read_campaign, read_linear_axes
+from monitor.records import AuditAnchor
 from monitor.store import Database, import_campaign, load_analysis, load_campaign, load_certificate
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
@@ -55,6 +56,10 @@ def pages_and_files(file: str) -> tuple[list[bytes], dict[str, bytes]]:
 def test_from_a_stored_result_it_is_the_same_as_evaluated_for_it(
     db: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wishes: dict[str, bool]
 ) -> None:
+    # The second one would state a later entry of the audit.
+    monkeypatch.setattr(
+        "monitor.workflow.certificate.issue.last_anchor", lambda db: AuditAnchor(7, "ab" * 32)
+    )
     fresh = issue(
         db,
         CertificateRequest(

@@ -32,6 +32,7 @@ from monitor.workflow.certificate.states import (
     list_certificates,
     show_certificate,
     write_digital,
+    write_digital_page,
     write_issued,
 )
 from monitor.workflow.certificate.template import TemplateRequest, write_template
@@ -67,7 +68,11 @@ def options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     shown.add_argument(
         "--dcc", type=Path, metavar="PATH",
-        help="write the digital certificate, PTB DCC 3.2.1 (a folder, or a file ending in .xml)",
+        help="write the digital certificate, PTB DCC (a folder, or a file ending in .xml)",
+    )  # fmt: skip
+    shown.add_argument(
+        "--dcc-html", type=Path, metavar="PATH",
+        help="write what the digital certificate says as a page to read (a folder, or a file ending in .html)",
     )  # fmt: skip
     shown.add_argument(
         "--pdf", type=Path, metavar="PATH",
@@ -166,7 +171,12 @@ def _issued(answer: CertificateFileAnswer, as_json: bool) -> int:
 
 
 def _show(options: Namespace) -> int:
-    writing = (("--remake", options.remake), ("--dcc", options.dcc), ("--pdf", options.pdf))
+    files = (
+        ("--dcc", options.dcc, write_digital),
+        ("--dcc-html", options.dcc_html, write_digital_page),
+        ("--pdf", options.pdf, write_issued),
+    )
+    writing = (("--remake", options.remake), *((option, path) for option, path, _ in files))
     for option, path in writing:
         if path is not None and options.number is None:
             raise InputError(
@@ -174,7 +184,7 @@ def _show(options: Namespace) -> int:
             )
     if options.remake is not None:
         return _remake(options)
-    for path, write in ((options.dcc, write_digital), (options.pdf, write_issued)):
+    for _, path, write in files:
         if path is not None:
             with opened(options) as db:
                 written = write(db, CertificateFileRequest(options.number, path))
@@ -222,6 +232,8 @@ def _verify(options: Namespace) -> int:
     if answer.signer is not None:
         output.say(f"signed by {answer.signer}{'' if options.trust else ' (not checked against --trust)'}")
         output.say(f"           its certificate has the SHA-256 {answer.signer_sha256}")
+    if answer.stamped_at is not None:
+        output.say(f"           time stamp of {answer.stamped_at:%Y-%m-%d %H:%M:%S %Z}")
     for fault in answer.faults:
         output.say(f"  {fault}")
     name = options.file if answer.number is None else f"certificate {answer.number}"

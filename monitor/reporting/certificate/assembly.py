@@ -13,12 +13,19 @@ from monitor import __version__
 from monitor.exceptions import NotFoundError
 from monitor.records import Campaign, Machine, Run
 from monitor.reporting.certificate.laboratory import LaboratoryFile
-from monitor.reporting.certificate.record import CertificateRecord, Condition, Item, MethodUsed, Reference
+from monitor.reporting.certificate.record import (
+    CertificateRecord,
+    Condition,
+    Item,
+    MeasuredCondition,
+    MethodUsed,
+    Reference,
+)
 from monitor.reporting.certificate.results import ResultSet
 from monitor.reporting.certificate.volumetric_result import VolumetricResult
 from monitor.reporting.numbers import decimal_of
 from monitor.reporting.texts import ENGLISH, Texts, texts_of
-from monitor.units import COLUMN_UNITS
+from monitor.units import COLUMN_UNITS, column_unit
 
 #: What a condition's name says in words; other names are printed as recorded.
 _CONDITION_WORDS = {"ambient_degC": "ambient", "humidity_percent": "humidity", "pressure_hPa": "pressure"}
@@ -127,7 +134,7 @@ def _conditions_of(
         return each[0]
     shared = set(each[0]).intersection(*each[1:])
     of_one_state = [
-        Condition(f"{condition.name}, {state}", condition.value)
+        Condition(f"{condition.name}, {state}", condition.value, condition.measured, state)
         for conditions, state in zip(each, states, strict=True)
         for condition in conditions
         if condition not in shared
@@ -140,6 +147,7 @@ def _conditions(campaign: Campaign, run: Run, texts: Texts) -> tuple[Condition, 
         Condition(
             texts(f"record.{_CONDITION_WORDS[name]}") if name in _CONDITION_WORDS else _in_words(name),
             _with_unit(name, value, texts),
+            _measured(name, value),
         )
         for name, value in run.conditions.items()
     ]
@@ -184,9 +192,18 @@ def _temperatures(laboratory: LaboratoryFile, texts: Texts) -> tuple[Condition, 
             Condition(
                 texts(f"record.{subject}_temperature"),
                 texts("record.with_uncertainty", value=value, expanded=expanded),
+                _measured(
+                    f"{subject}_degC", float(stated[f"{subject}_degC"]), float(stated[f"{subject}_U_degC"])
+                ),
             )
         )
     return (*values, Condition(texts("record.reference_temperature"), str(stated["reference"])))
+
+
+def _measured(name: str, value: float, expanded: float | None = None) -> MeasuredCondition | None:
+    """The number of a condition whose column names its unit; None for another."""
+    unit = column_unit(name)
+    return None if unit is None else MeasuredCondition(name, value, unit.name, expanded)
 
 
 def _in_words(name: str) -> str:

@@ -1,9 +1,10 @@
-"""Digital Calibration Certificates: PTB DCC 3.2.1 with values in D-SI 2.1, from a certificate's record.
+"""Digital Calibration Certificates: PTB DCC 3.3.0 with values in D-SI 2.2.1, or 3.2.1 with 2.1, from a record.
 
 ``dcc_xml`` needs nothing but a record. The parameters stand in lists twice, each with the full covariance matrix:
 once with the ellipsoidal region (k_p), once with the rectangular region (k_q), both of JCGM 102:2011. What the
 record says in words goes where the schema has a place for it; nothing is invented, so a record without the
-laboratory's country (ISO 3166-1) is refused.
+laboratory's country (ISO 3166-1) is refused. A record that names no release was written before 3.3.0 was: it is
+written in 3.2.1, byte for byte as then.
 
 The writer stands alone: it loads neither the database nor what draws pages. ``results.result_set`` makes the results
 from an estimate and a covariance; ``examples/write_dcc.py`` is a whole program.
@@ -17,7 +18,16 @@ from xml.etree import ElementTree as ET
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.completeness import check_complete
-from monitor.reporting.certificate.dcc_results import DCC, SI, add, geometric_errors, say, volumetric_error
+from monitor.reporting.certificate.dcc_elements import (
+    DCC,
+    SI,
+    add,
+    define_vocabulary,
+    say,
+    strip_vocabulary,
+    version_of,
+)
+from monitor.reporting.certificate.dcc_results import geometric_errors, volumetric_error
 from monitor.reporting.certificate.grounds import accepted_statements
 from monitor.reporting.certificate.record import (
     CertificateRecord,
@@ -31,8 +41,6 @@ from monitor.reporting.certificate.words import amendment, answer, verdict_words
 from monitor.reporting.numbers import decimal_of
 from monitor.reporting.texts import Texts, texts_of
 
-SCHEMA_VERSION = "3.2.1"
-
 #: The schema's word for a verdict (stringConformityStatementStatusType).
 _STATUS = {
     Verdict.PASS: "pass",
@@ -41,6 +49,9 @@ _STATUS = {
     Verdict.CONDITIONAL_FAIL: "conditionalFail",
     Verdict.UNDECIDED: "noPass",
 }
+
+#: The refType of a statement, where the vocabulary has one.
+_REFS = {"traceability": "basic_metrologicallyTraceableToSI", "amendment": "basic_revision"}
 
 
 def dcc_xml(record: CertificateRecord) -> bytes:
@@ -56,9 +67,10 @@ def dcc_xml(record: CertificateRecord) -> bytes:
             f'country = "DE" in the section [laboratory] of its file; it has {record.country!r}'
         )
     _check_software(record)
+    version = version_of(record)
     ET.register_namespace("dcc", DCC)
     ET.register_namespace("si", SI)
-    root = ET.Element(f"{{{DCC}}}digitalCalibrationCertificate", {"schemaVersion": SCHEMA_VERSION})
+    root = ET.Element(f"{{{DCC}}}digitalCalibrationCertificate", {"schemaVersion": version})
     texts = texts_of(record.language)
     _administrative(add(root, "administrativeData"), record, texts)
     results = add(root, "measurementResults")
@@ -66,6 +78,8 @@ def dcc_xml(record: CertificateRecord) -> bytes:
         geometric_errors(add(results, "measurementResult"), record, result, texts)
     for volumetric in record.volumetric:
         volumetric_error(add(results, "measurementResult"), record, volumetric, texts)
+    if not version.by_vocabulary:
+        strip_vocabulary(root)
     ET.indent(root, " ")
     return bytes(ET.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
 
@@ -90,6 +104,8 @@ def _administrative(parent: ET.Element, record: CertificateRecord, texts: Texts)
     name, _, release = str(record.method.software).rpartition(" ")
     say(software, "name", name, "en")
     add(software, "release", release)
+    if version_of(record).by_vocabulary:
+        define_vocabulary(parent, texts)
     core = add(parent, "coreData")
     add(core, "countryCodeISO3166_1", record.country)
     add(core, "usedLangCodeISO639_1", language)
@@ -143,31 +159,36 @@ def _contact(parent: ET.Element, party: Party, language: str) -> None:
         add(further, "content", line).set("lang", language)
 
 
+def _conformity(parent: ET.Element, conformity: ConformityStatement, texts: Texts) -> None:
+    """A statement for each verdict, with the rule and the numbers that it rests on."""
+    for verdict in conformity.verdicts:
+        statement = add(parent, "statement", ref="basic_conformity")
+        say(
+            statement,
+            "name",
+            texts("dcc.conformity_of", name=verdict.name, state=conformity.state),
+            texts.language,
+        )
+        banded = verdict.guard_band is not None
+        declaration = texts(
+            "dcc.verdict_band" if banded else "dcc.verdict",
+            band=guard_band(verdict, texts) if banded else "",
+            verdict=verdict_words(verdict.verdict, texts),
+            tolerance=texts.number(decimal_of(verdict.tolerance)),
+            unit=verdict.unit,
+            probability=texts.number(decimal_of(verdict.probability)),
+            rule=conformity.rule,
+            risk=conformity.risk,
+            basis=" ".join(filter(None, [conformity.basis, conformity.process])),
+        )
+        say(statement, "declaration", declaration, texts.language)
+        add(statement, "conformity", _STATUS[verdict.verdict])
+
+
 def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> None:
     conformity = record.conformity
     if isinstance(conformity, ConformityStatement):
-        for verdict in conformity.verdicts:
-            statement = add(parent, "statement")
-            say(
-                statement,
-                "name",
-                texts("dcc.conformity_of", name=verdict.name, state=conformity.state),
-                texts.language,
-            )
-            banded = verdict.guard_band is not None
-            declaration = texts(
-                "dcc.verdict_band" if banded else "dcc.verdict",
-                band=guard_band(verdict, texts) if banded else "",
-                verdict=verdict_words(verdict.verdict, texts),
-                tolerance=texts.number(decimal_of(verdict.tolerance)),
-                unit=verdict.unit,
-                probability=texts.number(decimal_of(verdict.probability)),
-                rule=conformity.rule,
-                risk=conformity.risk,
-                basis=" ".join(filter(None, [conformity.basis, conformity.process])),
-            )
-            say(statement, "declaration", declaration, texts.language)
-            add(statement, "conformity", _STATUS[verdict.verdict])
+        _conformity(parent, conformity, texts)
     statements = [
         ("title", record.title),
         ("place", record.place),
@@ -184,14 +205,17 @@ def _statements(parent: ET.Element, record: CertificateRecord, texts: Texts) -> 
         ("accreditation", record.accreditation),
         ("amendment", amendment(record.replaces, texts)),
     ]
+    if version_of(record).by_vocabulary and record.accredited is not None:
+        statements += [("accreditation", f"{record.accredited.body}, {record.accredited.number}")]
     statements += [("accepted", accepted) for accepted in accepted_statements(record.accepted or (), texts)]
-    named = [(texts(f"dcc.{key}"), value) for key, value in statements]
-    named[3:3] = [
-        (texts("dcc.standard", name=statement.name), answer(statement.certificate, texts))
-        for statement in record.references or ()
-    ]
-    for name, value in named:
+    named = [(texts(f"dcc.{key}"), value, _REFS.get(key)) for key, value in statements]
+    if not version_of(record).by_vocabulary:  # later releases have them among the measuring equipment
+        named[3:3] = [
+            (texts("dcc.standard", name=statement.name), answer(statement.certificate, texts), None)
+            for statement in record.references or ()
+        ]
+    for name, value, ref in named:
         if value:
-            statement = add(parent, "statement")
+            statement = add(parent, "statement", ref=ref)
             say(statement, "name", name, texts.language)
             say(statement, "declaration", value, texts.language)

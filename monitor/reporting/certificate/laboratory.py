@@ -15,6 +15,7 @@ from typing import Any
 
 from monitor.bounded import LARGEST_SETTINGS, read_bounded
 from monitor.exceptions import InputError
+from monitor.reporting.certificate.dcc_elements import DccVersion
 from monitor.reporting.certificate.laboratory_keys import SECTIONS
 from monitor.reporting.certificate.mark import read_mark
 from monitor.reporting.certificate.record import Accreditation, NotApplicable, Party, Person, Standard
@@ -73,6 +74,7 @@ class LaboratoryFile:
     opinions: Statement | None
     authorised_by: tuple[Person, ...] | None
     country: str | None = None
+    dcc_version: str | None = None
     language: str | None = None
     accredited: Accreditation | None = None
     mark: str | None = None
@@ -106,6 +108,7 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
         customer=_party("customer", answers),
         accreditation=answers.get("laboratory.accreditation"),
         country=answers.get("laboratory.country"),
+        dcc_version=answers.get("laboratory.dcc_version"),
         language=answers.get("laboratory.language"),
         item_description=answers.get("item.description"),
         item_identification=answers.get("item.identification"),
@@ -240,12 +243,24 @@ def _language(value: Any) -> _Checked:
     )
 
 
+def _release(value: Any) -> _Checked:
+    return (
+        (value, "")
+        if value in list(DccVersion)
+        else (
+            None,
+            f"is the release of the digital certificate, one of {', '.join(DccVersion)}, but is {value!r}",
+        )
+    )
+
+
 #: Items that are answered by something else than any text.
 _RULES: Mapping[str, Callable[[Any], _Checked]] = {
     "laboratory.address": _address,
     "customer.address": _address,
     "item.received_on": _day,
     "laboratory.language": _language,
+    "laboratory.dcc_version": _release,
     "laboratory.accreditation": _text_or_left_out,
     "laboratory.country": _text_or_left_out,
     "standards.issued_on": _day,

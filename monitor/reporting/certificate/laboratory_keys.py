@@ -7,7 +7,16 @@ from collections.abc import Mapping
 
 #: Every section and its keys.
 SECTIONS: Mapping[str, tuple[str, ...]] = {
-    "laboratory": ("name", "address", "contact", "accreditation", "country", "language", "mark"),
+    "laboratory": (
+        "name",
+        "address",
+        "contact",
+        "accreditation",
+        "country",
+        "dcc_version",
+        "language",
+        "mark",
+    ),
     "accreditation": ("body", "number"),
     "customer": ("name", "address", "contact"),
     "item": ("description", "identification", "condition", "place", "received_on"),

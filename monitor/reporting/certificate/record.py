@@ -58,11 +58,30 @@ class MethodUsed:
 
 
 @dataclass(frozen=True)
+class MeasuredCondition:
+    """The number behind a condition: its ``column`` among those recorded (``ambient_degC``), value and display unit.
+
+    ``expanded`` is its uncertainty (k = 2) where the laboratory states one.
+    """
+
+    column: str
+    value: float
+    unit: str
+    expanded: float | None = field(default=None, metadata=OMITTED)
+
+
+@dataclass(frozen=True)
 class Condition:
-    """A condition as printed: ``ambient temperature``, ``22.1 °C``."""
+    """A condition as printed: ``ambient temperature``, ``22.1 °C``.
+
+    ``measured`` is the number where it has one; ``state`` the only state of the machine that it belongs to, None for
+    all. Records of earlier versions have neither.
+    """
 
     name: str
     value: str | None
+    measured: MeasuredCondition | None = field(default=None, metadata=OMITTED)
+    state: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -207,7 +226,8 @@ class CertificateRecord:
     printed where one was asked for. ``accepted`` are the grounds against it that the laboratory answers for; None where
     there were none. ``accredited`` and ``mark`` (a picture as a data address) are printed where the laboratory states
     them, ``standards`` with the traceability. ``anchor`` is the last entry of the audit when the certificate was made,
-    ``signer`` who signs the file; both None in records of earlier versions.
+    ``signer`` who signs the file; ``dcc_version`` the release of the digital certificate (3.2.1 without); all None in
+    records of earlier versions.
     """
 
     title: str | None
@@ -244,3 +264,4 @@ class CertificateRecord:
     standards: tuple[Standard, ...] | None = field(default=None, metadata=OMITTED)
     anchor: AuditAnchor | None = field(default=None, metadata=OMITTED)
     signer: Signer | None = field(default=None, metadata=OMITTED)
+    dcc_version: str | None = field(default=None, metadata=OMITTED)

@@ -21,11 +21,15 @@ _MARKS = (b"/ByteRange", b"/ETSI.CAdES.detached", b"/Adobe.PPKLite", b"/Type /Si
 
 @dataclass(frozen=True)
 class SignatureFinding:
-    """The finding about a file's signature: None for ``good`` where it carries none."""
+    """The finding about a file's signature: None for ``good`` where it carries none.
+
+    ``stamped_at`` is when a time stamp authority saw it; None without a time stamp that fits the signature.
+    """
 
     good: bool | None
     signer: Signer | None
     faults: tuple[str, ...]
+    stamped_at: datetime | None = None
 
 
 def is_signed(pdf: bytes) -> bool:
@@ -70,7 +74,12 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
     faults = _faults_of_file(status, clean)
     if trusted is not None:
         faults += _faults_of_signer(status, certificate, moment)
-    return SignatureFinding(not faults, certificate.signer, tuple(faults))
+    stamp, stamped_at = status.timestamp_validity, None
+    if stamp is not None and stamp.intact and stamp.valid:
+        stamped_at = stamp.timestamp
+    elif stamp is not None:
+        faults.append("the time stamp does not fit the signature")
+    return SignatureFinding(not faults, certificate.signer, tuple(faults), stamped_at)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Signs a certificate: PAdES baseline B-B (ETSI EN 319 142-1:2016, 6) by pyHanko, an optional extra.
+"""Signs a certificate: PAdES baseline B-B, with a time stamp B-T (ETSI EN 319 142-1:2016, 6), by pyHanko, an extra.
 
 With a ``FileKey`` (PKCS#12 file, extra ``sign``) or a ``TokenKey`` (PKCS#11: smart card, hardware module; extra
 ``token``), whose private key never leaves the token. The signature is appended to the PDF, which stays as it was below
@@ -23,6 +23,8 @@ from monitor.reporting.signature.signature import need_pyhanko, signer_in
 _FIELD = "Signature"
 #: Bytes reserved for the signature itself; a certificate chain of three with RSA 4096 needs about 12 000.
 _ROOM_BYTES = 32_768
+#: How long an authority may take for a time stamp, in seconds.
+_WAIT_S = 20
 
 
 @dataclass(frozen=True)
@@ -52,15 +54,17 @@ class TokenKey:
 Key = FileKey | TokenKey
 
 
-def sign(pdf: bytes, key: Key) -> bytes:
-    """Return the PDF with a signature by ``key``.
+def sign(pdf: bytes, key: Key, timestamp_url: str | None = None) -> bytes:
+    """Return the PDF with a signature by ``key``, and a time stamp of the authority at an address (RFC 3161).
 
-    Raises InputError where the extra is not installed, the key cannot be opened, or is not there, and where its
-    certificate is not valid today.
+    The authority gets the hash of the signature, and nothing of the document.
+
+    Raises InputError where the authority gives no time stamp, where the extra is not installed, the key cannot be
+    opened, or is not there, and where its certificate is not valid today.
     """
     need_pyhanko()
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
-    from pyhanko.sign import fields, signers
+    from pyhanko.sign import fields, signers, timestamps
 
     logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
     meta = signers.PdfSignatureMetadata(
@@ -73,13 +77,24 @@ def sign(pdf: bytes, key: Key) -> bytes:
     out = io.BytesIO()
     with _opened(key) as signer:
         _check_in_force(signer.signing_cert)
-        signers.sign_pdf(
-            IncrementalPdfFileWriter(io.BytesIO(pdf)),
-            meta,
-            signer=signer,
-            output=out,
-            bytes_reserved=_ROOM_BYTES,
+        stamper = (
+            None if timestamp_url is None else timestamps.HTTPTimeStamper(timestamp_url, timeout=_WAIT_S)
         )
+        try:
+            signers.sign_pdf(
+                IncrementalPdfFileWriter(io.BytesIO(pdf)),
+                meta,
+                signer=signer,
+                output=out,
+                bytes_reserved=_ROOM_BYTES,
+                timestamper=stamper,
+            )
+        except (timestamps.TimestampRequestError, OSError) as error:
+            if timestamp_url is None:
+                raise
+            raise InputError(
+                f"the time stamp authority {timestamp_url} gave no time stamp: {_why(error)}; nothing was issued"
+            ) from error
     return out.getvalue()
 
 

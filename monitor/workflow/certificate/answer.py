@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import Any
 
 from monitor.documents import INLINED, OMITTED
@@ -84,7 +85,8 @@ class CertificateChecks:
 class VerificationAnswer:
     """Whether a file is a genuine and valid certificate of this database; ``faults`` say why not.
 
-    ``signer_sha256`` is the fingerprint of the signer's certificate, None where the file is not signed.
+    ``signer_sha256`` is the fingerprint of the signer's certificate, None where the file is not signed; ``stamped_at``
+    when a time stamp authority saw the signature.
     """
 
     number: str | None
@@ -94,3 +96,4 @@ class VerificationAnswer:
     signer: str | None
     faults: tuple[str, ...]
     signer_sha256: str | None = None
+    stamped_at: datetime | None = field(default=None, metadata=OMITTED)

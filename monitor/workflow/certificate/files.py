@@ -39,6 +39,12 @@ def dcc_path_of(out: Path, number: str) -> Path:
     return out if out.suffix.lower() == ".xml" else out / name
 
 
+def dcc_page_path_of(out: Path, number: str) -> Path:
+    """The file of a digital certificate as a page: ``out`` itself, or a file in the folder ``out``."""
+    name = f"certificate-{number}.dcc.html".replace("/", "-").replace("\\", "-")
+    return out if out.suffix.lower() in (".html", ".htm") else out / name
+
+
 def font_hashes(fonts: Sequence[Path]) -> tuple[HashedFile, ...]:
     """Name and SHA-256 of fonts that are not ours: they are too large to be kept with every certificate."""
     try:

@@ -12,6 +12,7 @@ from monitor.documents import to_document
 from monitor.exceptions import InputError, TakenNumberError
 from monitor.methods import method_named
 from monitor.reporting.certificate.assembly import CertificateIdentity, certificate_record
+from monitor.reporting.certificate.dcc_elements import NEWEST
 from monitor.reporting.certificate.laboratory import LaboratoryFile, read_laboratory
 from monitor.reporting.certificate.record import CertificateRecord
 from monitor.reporting.certificate.results import ResultSet
@@ -84,7 +85,12 @@ def issue(db: Database, request: CertificateRequest) -> CertificateFileAnswer:
         )  # fmt: skip
         record = _record(stated, runs, request, identity)
         return dataclasses.replace(
-            record, replaces=replaced, accepted=accepted or None, anchor=last_anchor(db), signer=signer
+            record,
+            replaces=replaced,
+            accepted=accepted or None,
+            anchor=last_anchor(db),
+            signer=signer,
+            dcc_version=_dcc_version(request, stated),
         )
 
     for _ in range(_NUMBERS):
@@ -109,7 +115,7 @@ def _issued(
     keep_issued(db, path)
     pdf = certificate_pdf(record, request.fonts, to_document(inputs))
     if request.key is not None:
-        pdf = sign(pdf, request.key)
+        pdf = sign(pdf, request.key, request.timestamp_url)
     # The file is whole on the disk before the entry is, and gets its name after it: whenever this is killed, no file
     # bears the name of a certificate that the database does not know.
     part = prepared(path, pdf)
@@ -151,6 +157,13 @@ def _save(
         )
         if request.replaces is not None:
             mark_certificate(db, request.replaces, "amended", request.reason, record.number)
+
+
+def _dcc_version(request: CertificateRequest, stated: LaboratoryFile) -> str | None:
+    """The release of the digital certificate; None where there is none, because the laboratory names no country."""
+    if stated.country is None:
+        return None
+    return str(request.dcc_version or stated.dcc_version or NEWEST)
 
 
 def _method_name(name: str, texts: Texts) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from monitor.exceptions import InputError
 from monitor.records import LinearAxes
+from monitor.reporting.certificate.dcc_elements import dcc_version
 from monitor.reporting.certificate.grounds import GroundKind
 from monitor.reporting.signature.signing import Key
 from monitor.sources import Source
@@ -36,6 +37,8 @@ class CertificateOptions:
     of this kind scatter about zero: the statement then has the global risks of its rule. ``with_map`` adds the
     volumetric error. ``fonts`` are files with letters that DejaVu Sans lacks. ``key`` signs it. ``accept`` names the
     grounds against the certificate that the laboratory answers for, each with the reason that is printed on it.
+    ``dcc_version`` is the release of the digital certificate (else that of the laboratory's file, else the newest).
+    ``timestamp_url`` is the address of an authority that puts a time stamp (RFC 3161) on the signature.
 
     Raises InputError for a method or a rule that there is not, or a blank reason.
     """
@@ -57,6 +60,8 @@ class CertificateOptions:
     fonts: tuple[Path, ...] = ()
     key: Key | None = None
     accept: Mapping[GroundKind, str] = field(default_factory=dict)
+    dcc_version: str | None = None
+    timestamp_url: str | None = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -69,6 +74,12 @@ class CertificateOptions:
             if not 0.0 < spread < math.inf:
                 raise InputError(f"--process {name}={spread:g}: a standard deviation is positive")
         holds_for(self.holds_for)
+        if self.timestamp_url is not None and not re.match(r"https?://[^/]", self.timestamp_url):
+            raise InputError(
+                f"--timestamp-url {self.timestamp_url}: write the address of the authority, with http:// or https://"
+            )
+        if self.dcc_version is not None:
+            dcc_version(self.dcc_version)
         for kind, reason in self.accept.items():
             if not reason.strip():
                 raise InputError(f"--accept {kind}=REASON: say why the laboratory accepts it; it is printed")

@@ -59,6 +59,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         signer=None if signer is None else signer.name,
         signer_sha256=None if signer is None else signer.sha256,
         faults=(*filter(None, faults), *signature.faults, *chain.faults),
+        stamped_at=signature.stamped_at,
     )
 
 
