@@ -12,6 +12,9 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from monitor import __version__
 from monitor.documents import IN_UTC
 from monitor.records import AuditAnchor
@@ -121,6 +124,17 @@ def anchored_entry(db: Database, anchor: str) -> AuditEntry | None:
         [anchor.strip().lower()],
     )
     return entries[0] if entries else None
+
+
+def bits(values: npt.ArrayLike, *, signed_zeros: bool = False) -> bytes:
+    """Return numbers as the bytes that are hashed, with one kind of NaN and one zero.
+
+    DuckDB's compression takes the sign off a zero, or gives one (1.5.5: a run of equal values has that of its first).
+    ``signed_zeros`` leaves them as they are: versions before 0.2.0 hashed them so.
+    """
+    numbers = np.asarray(values, dtype="<f8")
+    numbers = np.where(np.isnan(numbers), np.nan, numbers)
+    return (numbers if signed_zeros else numbers + 0.0).tobytes()
 
 
 def _plain(value: Any) -> Any:

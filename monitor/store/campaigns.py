@@ -131,11 +131,14 @@ def load_campaign(db: Database, name: str) -> Campaign:
     return campaign
 
 
-def stored_content(db: Database, campaign_id: int) -> str:
-    """The content hash of a campaign, withdrawn or not, computed anew from everything that is stored of it."""
+def stored_content(db: Database, campaign_id: int, *, signed_zeros: bool = False) -> str:
+    """The content hash of a campaign, withdrawn or not, computed anew from everything that is stored of it.
+
+    ``signed_zeros`` as in ``audit.bits``.
+    """
     if is_curve_number(db, campaign_id):
-        return curve_content(curve_by_number(db, campaign_id))
-    return _content(*_load(db, campaign_id))
+        return curve_content(curve_by_number(db, campaign_id), signed_zeros=signed_zeros)
+    return _content(*_load(db, campaign_id), signed_zeros=signed_zeros)
 
 
 def _check_run(run: Run) -> None:
@@ -146,7 +149,8 @@ def _check_run(run: Run) -> None:
             raise DataError(f"condition {name} of run {run.run} must be a finite number, not {value}")
 
 
-def _content(campaign: Campaign, rows: probings.PrintedProbings) -> str:
+def _content(campaign: Campaign, rows: probings.PrintedProbings, *, signed_zeros: bool = False) -> str:
+    zero = -0.0 if signed_zeros else 0.0  # the one of the two that leaves the sign of a zero when it is added
     return audit.digest(
         campaign.name,
         campaign.method,
@@ -159,11 +163,11 @@ def _content(campaign: Campaign, rows: probings.PrintedProbings) -> str:
                 r.started_at.isoformat(),
                 r.day,
                 r.warm_up,
-                {k: float(v) for k, v in r.conditions.items()},
+                {k: float(v) + zero for k, v in r.conditions.items()},
             ]
             for r in campaign.runs
         ],
-        rows.sha256,
+        rows.sha256(signed_zeros=signed_zeros),
         [[file.name, file.sha256] for file in sorted(campaign.files, key=lambda file: file.name)],
     )
 

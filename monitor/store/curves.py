@@ -113,8 +113,11 @@ def curve_by_number(db: Database, campaign_id: int) -> CurveCampaign:
     )
 
 
-def curve_content(curve: CurveCampaign) -> str:
-    """The content hash of everything that is stored of a curve. Raises DataError for numbers that are not finite."""
+def curve_content(curve: CurveCampaign, *, signed_zeros: bool = False) -> str:
+    """The content hash of everything that is stored of a curve; ``signed_zeros`` as in ``audit.bits``.
+
+    Raises DataError for numbers that are not finite.
+    """
     for name, values in curve.columns.items():
         if not np.all(np.isfinite(values)):
             raise DataError(f"column {name} of campaign {curve.name} must hold finite numbers")
@@ -123,7 +126,7 @@ def curve_content(curve: CurveCampaign) -> str:
         curve.method,
         asdict(curve.instrument),
         [curve.response, curve.base, curve.time, curve.standard_uncertainty, dict(curve.units)],
-        [[name, np.asarray(values, dtype="<f8").tobytes()] for name, values in curve.columns.items()],
+        [[name, audit.bits(values, signed_zeros=signed_zeros)] for name, values in curve.columns.items()],
         [[name, [str(label) for label in labels]] for name, labels in curve.groups.items()],
         [int(line) for line in curve.lines],
         [[file.name, file.sha256] for file in sorted(curve.files, key=lambda file: file.name)],

@@ -140,7 +140,7 @@ def identification_numbers(db: Database, software_version: str) -> list[int]:
     ]
 
 
-def stored_identification_content(db: Database, number: int) -> str:
+def stored_identification_content(db: Database, number: int, *, signed_zeros: bool = False) -> str:
     """The content hash computed anew from what is stored; "" where the parameters stored beside it contradict it."""
     identification = identification_by_number(db, number)
     rows = db.rows(
@@ -154,7 +154,7 @@ def stored_identification_content(db: Database, number: int) -> str:
         for row in zip(*columns, strict=True)
     ]
     alike = rows == expected and identified_values.agrees(db, number, identification)
-    return identification_content(number, identification) if alike else ""
+    return identification_content(number, identification, signed_zeros=signed_zeros) if alike else ""
 
 
 def _insert_run(db: Database, number: int, run: StoredRun) -> None:

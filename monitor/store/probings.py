@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array, Machine, Probings
-from monitor.store.audit import digest
+from monitor.store.audit import bits, digest
 from monitor.store.connection import Database
 from monitor.units import DEGREE
 
@@ -35,17 +35,15 @@ class PrintedProbings:
     readings: Mapping[str, Array]
     channels: Mapping[str, Array]
 
-    @property
-    def sha256(self) -> str:
-        """The hash of all rows; an empty cell counts as one thing, however its NaN is made."""
+    def sha256(self, *, signed_zeros: bool = False) -> str:
+        """Return the hash of all rows; ``signed_zeros`` as in ``audit.bits``."""
         columns: list[object] = [self.target]
         for counted in (self.run, self.sequence):
             columns.append(np.asarray(counted, dtype="<i8").tobytes())
-        columns.append(np.asarray(self.time, dtype="<f8").tobytes())
+        columns.append(bits(self.time, signed_zeros=signed_zeros))
         for group in (self.readings, self.channels):
             for name in sorted(group):
-                values = np.where(np.isnan(group[name]), np.nan, group[name])
-                columns += [name, np.asarray(values, dtype="<f8").tobytes()]
+                columns += [name, bits(group[name], signed_zeros=signed_zeros)]
         return digest(columns)
 
 

@@ -52,8 +52,10 @@ class StoredIdentification:
     refers_to: Mapping[str, str] = field(default_factory=dict)
 
 
-def identification_content(number: int, identification: StoredIdentification) -> str:
-    """The hash of all that is stored of an identification."""
+def identification_content(
+    number: int, identification: StoredIdentification, *, signed_zeros: bool = False
+) -> str:
+    """The hash of all that is stored of an identification; ``signed_zeros`` as in ``audit.bits``."""
     return audit.digest(
         number,
         identification.campaign,
@@ -65,22 +67,18 @@ def identification_content(number: int, identification: StoredIdentification) ->
         [
             [
                 run.run,
-                _bits(run.estimate),
-                _bits(run.covariance),
+                audit.bits(run.estimate, signed_zeros=signed_zeros),
+                audit.bits(run.covariance, signed_zeros=signed_zeros),
                 run.refused,
                 [float(run.rms_mm), int(run.iterations), int(run.degrees_of_freedom), float(run.chi_square)],
                 [int(sequence) for sequence in run.sequence],
-                _bits(run.residuals),
+                audit.bits(run.residuals, signed_zeros=signed_zeros),
             ]
             for run in identification.runs
         ],
         # Nothing is added for those of before frames were stored: their hashes are the old ones.
         *([sorted(identification.refers_to.items())] if identification.refers_to else []),
     )
-
-
-def _bits(values: Array) -> bytes:
-    return np.where(np.isnan(values), np.nan, values).astype("<f8").tobytes()
 
 
 def check_identification(identification: StoredIdentification) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from monitor.exceptions import MonitorError
@@ -71,7 +71,7 @@ def verify_audit(db: Database) -> Verification:
             faults.append(f"{name} is in the audit, but no longer in the database")
         elif (subject, key) not in audited:
             faults.append(f"{name} is in the database, but not in the audit")
-        elif audited[subject, key] not in stored[subject, key].hashes(db):
+        elif not _fits(db, stored[subject, key], audited[subject, key]):
             faults.append(f"{name} was altered after it was stored")
     last = audit.last_anchor(db)
     return Verification(last.entry, last.sha256, tuple(faults))
@@ -88,9 +88,28 @@ class _Content:
 
     def hashes(self, db: Database) -> tuple[str, ...]:
         """Return the hashes that an entry may hold: with the books, and as before without; none of the unreadable."""
-        return (
-            (with_bookkeeping(db, self.subject, self.number, self.sha256), self.sha256) if self.sha256 else ()
-        )
+        return self._with_books(db, self.sha256) if self.sha256 else ()
+
+    def hashes_of_signed_zeros(self, db: Database) -> tuple[str, ...]:
+        """Return the same with zeros as they are signed, as versions before 0.2.0 hashed readings and results."""
+        if not self.sha256 or self.subject not in _OF_NUMBERS:
+            return ()
+        return self._with_books(db, _OF_NUMBERS[self.subject](db, int(self.number), signed_zeros=True))
+
+    def _with_books(self, db: Database, content: str) -> tuple[str, ...]:
+        return with_bookkeeping(db, self.subject, self.number, content), content
+
+
+#: Subjects whose content is mostly numbers, and the function that hashes them.
+_OF_NUMBERS: Mapping[str, Callable[..., str]] = {
+    "campaign": stored_content,
+    "identification": stored_identification_content,
+}
+
+
+def _fits(db: Database, content: _Content, audited: str) -> bool:
+    """Whether what is stored of a subject has the hash in the audit."""
+    return audited in content.hashes(db) or audited in content.hashes_of_signed_zeros(db)
 
 
 def _contents(db: Database) -> Iterator[_Content]:

@@ -49,6 +49,7 @@ def test_17025_every_letter_of_both_clauses_has_a_field() -> None:
         "mark",
         "standards",
         "anchor",
+        "dcc_version",
         "signer",
         "country",
         "replaces",

@@ -63,7 +63,8 @@ def machine(name: str, state: str, *parameters: ParameterHealth, **fields: objec
     measured = state != "not measured"
     return MachineHealth(
         **{
-            "machine": name, "description": "a machine", "location": "hall 1", "state": State(state), "changed": "nothing",
+            "machine": name, "description": "a machine", "location": "hall 1", "state": State(state),
+            "changed": "nothing",
             "since": parameters[0].out_since if parameters else None, "probability_out": None, "next_check": "now",
             "run": "run 1" if measured else "",
             "basis": "repeated runs", "factor": "U = 3.3 u", "parameters": parameters,
@@ -86,7 +87,9 @@ def fleet(*machines: MachineHealth) -> tuple[Fleet, list[MachineHealth]]:
 CHANGED = machine(
     "Stepped", "changed", parameter("EA0C", value=3.0, per_month=0.0),
     since=datetime(2026, 3, 4), next_check="by 2026-05-01: EA0C stays in tolerance with 95 % until then",
-    changes=(Change(ChangeKind.CHANGE, datetime(2026, 2, 27), datetime(2026, 3, 4), "EA0C stepped by +12 µrad", 1e-5, True),),
+    changes=(
+        Change(ChangeKind.CHANGE, datetime(2026, 2, 27), datetime(2026, 3, 4), "EA0C stepped by +12 µrad", 1e-5, True),
+    ),
 )  # fmt: skip
 DRIFTED = machine("Drifted", "out of tolerance", parameter(), probability_out=0.99)
 GOOD = machine("Good", "in tolerance", parameter(value=2.0, per_month=0.0))

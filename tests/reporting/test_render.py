@@ -19,7 +19,7 @@ from jinja2 import UndefinedError
 
 from monitor.documents import to_document
 from monitor.exceptions import InputError
-from monitor.reporting.certificate.record import CertificateRecord, Person
+from monitor.reporting.certificate.record import CertificateRecord, MeasuredCondition, Person
 from monitor.reporting.numbers import written_correlation
 from monitor.reporting.pdf.render import UnprintableError, certificate_html, certificate_pdf, html_of, pdf_of
 from monitor.reporting.refused import RefusedParameters
@@ -87,6 +87,8 @@ def test_17025_every_text_of_the_record_is_printed(usual: bytes, make_record: Ma
             return [value]
         if isinstance(value, tuple):
             return [text for part in value for text in texts(part)]
+        if isinstance(value, MeasuredCondition):
+            return []  # for the digital certificate: the page has it in words
         if dataclasses.is_dataclass(value):
             return [text for place in dataclasses.fields(value) for text in texts(getattr(value, place.name))]
         return []

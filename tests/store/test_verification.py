@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from monitor.records import Campaign
 from monitor.store import (
     Database,
+    audit,
+    import_campaign,
     verify_audit,
 )
 
@@ -76,3 +83,33 @@ def test_alteration_is_seen_and_named(filled: Database, sql: str, fault: str) ->
     verification = verify_audit(filled)
     assert not verification.ok
     assert any(fault in found for found in verification.faults), verification.faults
+
+
+def test_zeros_that_lose_or_get_a_sign_in_the_file_are_no_alteration(
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # DuckDB keeps a run of equal values with the sign of its first, and minus zero equals zero.
+    x = np.where(np.arange(len(campaign.probings)) % 3, 0.0, -0.0)
+    probings = dataclasses.replace(campaign.probings, readings={**campaign.probings.readings, "X": x})
+    file = tmp_path / "zeros.duckdb"
+    with Database(file) as db:
+        import_campaign(db, dataclasses.replace(campaign, name="zeros", probings=probings))
+    with Database(file) as db:
+        assert verify_audit(db).faults == ()
+    # A version that hashed the signs, in a file that still has them all: its entries hold.
+    plain = audit.bits
+    monkeypatch.setattr(
+        "monitor.store.probings.bits", lambda values, *, signed_zeros=False: plain(values, signed_zeros=True)
+    )
+    some = np.where(np.signbit(x), -0.0, 7.0 + np.arange(len(x)))
+    only = dataclasses.replace(campaign.probings, readings={**campaign.probings.readings, "X": some})
+    with Database(file) as db:
+        import_campaign(db, dataclasses.replace(campaign, name="signed", probings=only))
+    monkeypatch.undo()
+    with Database(file) as db:
+        signs = db.rows(
+            "SELECT count_if(signbit(readings['X'])) FROM probing JOIN imported_campaign USING (campaign_id) "
+            "WHERE campaign = 'signed'"
+        )
+        assert signs == [(2,)]
+        assert verify_audit(db).faults == ()
