@@ -237,6 +237,18 @@ def test_ilac_g8_and_jcgm_106_decide_by_their_rules(found: RunUncertainty) -> No
                 value = dict(zip(LIMITS, y, strict=True))[judged.name]
                 assert (judged.verdict == "pass") == (value <= LIMITS[judged.name] - w)
                 assert judged.verdict != "pass" or judged.probability >= 0.977
+    # The printed risk is the largest of a verdict at the edges of acceptance and rejection: both limits count.
+    for rule, quantile in (("simple", 0.5), ("ilac", 0.97725)):
+        largest = 0.0
+        for name, limit in LIMITS.items():
+            law = stats.t(freedoms[name], scale=u[name])
+            w = float(law.ppf(quantile))
+            within = [
+                float(law.cdf(limit - edge) - law.cdf(-limit - edge)) for edge in (limit - w, limit + w)
+            ]
+            largest = max(largest, within[1], 1.0 - within[0] if w <= limit else 0.0)
+        (printed,) = re.findall(r"probability of (?:up to|at most) ([\d.]+)\s%", stated(rule).risk)
+        assert float(printed) == pytest.approx(100.0 * largest, rel=0.01)
     for one in stated("probability").verdicts:
         assert (one.verdict == "pass") == (one.probability >= 0.95)
     joint = stated("simple").joint_probability
