@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from monitor.reporting.certificate.dcc import dcc_xml
 from monitor.reporting.certificate.dcc_page import dcc_context
-from monitor.reporting.pdf.render import pieces_of
 from monitor.store import Database, StoredCertificate, certificate_numbers, load_certificate
 from monitor.workflow.certificate.answer import (
     CertificateFileAnswer,
@@ -65,6 +64,9 @@ def write_digital_page(db: Database, request: CertificateFileRequest) -> Certifi
 
     Raises NotFoundError, InputError where the record names no country.
     """
+    # Loaded here: who lists certificates waits for no layout engine.
+    from monitor.reporting.pdf.render import pieces_of
+
     stored = load_certificate(db, request.number)
     path = dcc_page_path_of(request.path, request.number)
     page = "".join(pieces_of("dcc.html", dcc_context(dcc_xml(restored_record(stored.record)))))
