@@ -100,20 +100,30 @@ def _places(
     return better
 
 
+def frame_equations(
+    rotation: Array, origin: Array, arm: Array, at: npt.NDArray[np.int64], kinds: int
+) -> tuple[Array, Array]:
+    """Return matrix (3 n, 12 + 3 T) and right side (3 n,) of rotation_i place - turn arm_i - shift = -origin_i.
+
+    Unknown are the nine elements of turn, row by row, the shift and the T = ``kinds`` places; ``at`` (n,) says which.
+    """
+    count = len(arm)
+    columns = np.zeros((count, 3, 12 + 3 * kinds))
+    for row in range(3):
+        columns[:, row, 3 * row : 3 * row + 3] = -arm
+    columns[:, :, 9:12] = -np.eye(3)
+    for axis in range(3):
+        columns[np.arange(count), :, 12 + 3 * at + axis] = rotation[:, :, axis]
+    return columns.reshape(3 * count, -1), -origin.reshape(-1)
+
+
 def _linear(
     rotation: Array, origin: Array, points: Array, at: npt.NDArray[np.int64], kinds: int
 ) -> list[Array]:
     """Places (T, 3) from the linear equations, one guess, a few or none."""
-    count = len(points)
     arm = points - points.mean(axis=0)
     size = max(float(np.sqrt(np.mean(arm**2))), 1.0)
-    columns = np.zeros((count, 3, 12 + 3 * kinds))
-    for row in range(3):
-        columns[:, row, 3 * row : 3 * row + 3] = -arm / size
-    columns[:, :, 9:12] = -np.eye(3)
-    for axis in range(3):
-        columns[np.arange(count), :, 12 + 3 * at + axis] = rotation[:, :, axis]
-    flat, wanted = columns.reshape(3 * count, -1), -origin.reshape(-1)
+    flat, wanted = frame_equations(rotation, origin, arm / size, at, kinds)
     # Where all axes meet the equations fix everything but the length; else the scale is 1 already.
     meets = all_axes_meet(origin, size)
     if not meets:

@@ -21,7 +21,7 @@ from monitor.effects.catalogue import of_tracker
 from monitor.exceptions import DataError
 from monitor.machine import ChainPose, evaluate
 from monitor.machine.chain import rotation_about
-from monitor.methods.chain.first_frame import all_axes_meet, best_frame
+from monitor.methods.chain.first_frame import all_axes_meet, best_frame, frame_equations
 from monitor.methods.chain.least_squares import Solution
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
@@ -193,19 +193,13 @@ def _frame(
     """Rotation (3, 3) and shift (3,) of the tracker's frame and places (K, 3) such that
     rotation_i place + origin_i = turn point_i + shift, as well as may be. Where all axes meet in a point or there is
     only one, these equations have no right-hand side, and the guess is improved in turn."""
-    count, kinds = len(points), int(at.max()) + 1
+    kinds = int(at.max()) + 1
     middle = points.mean(axis=0)
     arm = points - middle
     size = max(float(np.sqrt(np.mean(arm**2))), 1.0)
     if all_axes_meet(origin, size):
         return best_frame(rotation, origin, points, at, np.zeros((kinds, 3)), False)
-    columns = np.zeros((count, 3, 9 + 3 + 3 * kinds))
-    for row in range(3):
-        columns[:, row, 3 * row : 3 * row + 3] = -arm / size
-    columns[:, :, 9:12] = -np.eye(3)
-    for axis in range(3):
-        columns[np.arange(count), :, 12 + 3 * at + axis] = rotation[:, :, axis]
-    flat, wanted = columns.reshape(3 * count, -1), -origin.reshape(-1)
+    flat, wanted = frame_equations(rotation, origin, arm / size, at, kinds)
     free, _, rank, _ = np.linalg.lstsq(flat, wanted, rcond=1e-8)
     u, stretch, vt = np.linalg.svd(free[:9].reshape(3, 3) / size)
     times = float(np.prod(stretch) ** (1.0 / 3.0))
