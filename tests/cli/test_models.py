@@ -89,6 +89,15 @@ def test_a_model_that_cannot_be_shown_on_its_campaign_is_not_kept(typed: Any, db
     ]
 
 
+def test_an_effect_that_the_readings_do_not_determine_is_to_blame_not_the_file(typed: Any, db: Path) -> None:
+    answer = typed(
+        "model", "add", "EZC1:const@warmup", "--to", "samba", "--as", "m", "--campaign", "five-days", db=db
+    )
+    assert (answer.status, answer.out) == (2, "")
+    assert "EZC1:const@warmup could not be fitted: beside the effects of model samba" in answer.err
+    assert "contradict" not in answer.err
+
+
 def test_a_model_before_any_comparison_has_no_history_yet(typed: Any, examples: Path, tmp_path: Path) -> None:
     path = tmp_path / "new.duckdb"
     assert typed("import", examples / "hidden-reversal-x", db=path).status == 0

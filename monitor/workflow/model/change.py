@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import DataError, EffectError, InputError, NotFoundError
 from monitor.methods import methods
 from monitor.store import (
     Database,
@@ -37,6 +37,15 @@ def add_effect(db: Database, request: AddEffectRequest) -> ChangeModelAnswer:
         if request.campaign is not None:
             raise
         steps = ()
+    except DataError as fault:
+        # Where the model without the effect fits, the readings are in order and the message is not about them.
+        parent = resolve(db, request.to)
+        fitted_version(db, parent, request.campaign)
+        raise EffectError(
+            f"{request.effect} could not be fitted: beside the effects of model {label(parent)} the readings do not "
+            "determine it. Nothing was stored; `monitor explain` names the effects that they show, and --campaign "
+            "takes the readings of another campaign"
+        ) from fault
     model = version_with(db, request)
     return _changed(db, model, request.new_name, steps)
 
