@@ -26,6 +26,7 @@ OTHERS = [CHECKOUT / "CONTRIBUTING.md", *sorted(CHECKOUT.glob("examples/*.md")),
 NOTE = re.compile(r"^```\s*\n\s*\n<!-- not run: (?P<why>.+?) -->$", re.MULTILINE)
 #: Page and first line of every block that is not run.
 NOT_RUN = {
+    ("command-line.md", "$ monitor watch /srv/measured --out reports-out --mail mail.toml"),
     ("howto-shop-floor.md", "$ monitor serve"),
     ("howto-sql-and-python.md", "$ monitor --db shop.duckdb serve"),
     (
