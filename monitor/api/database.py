@@ -142,9 +142,10 @@ def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s
 
 
 def simulate(out: str | Path, **options: Any) -> Answer[SimulateAnswer]:
-    """Write a virtual campaign folder with or without a hidden effect; ``effect``, ``peak_um``, ``noise_um``, ``seed``, ``robot``.
+    """Write a virtual campaign folder with or without a hidden effect.
 
-    Raises InputError for an option that there is not or a value that cannot be.
+    ``options`` are ``effect``, ``peak_um``, ``noise_um``, ``seed`` and ``robot``. Raises InputError for another option
+    or a value that cannot be.
     """
     from monitor.workflow.simulation import SimulateRequest, simulate
 
