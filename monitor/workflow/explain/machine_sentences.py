@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from monitor.discovery import Explanation, Mistake
-from monitor.discovery.machine.explain import Limit
+from monitor.discovery.machine.rounds import Limit
 from monitor.discovery.machine.suspects import MOST_BAD_POINTS
 from monitor.records import Verdict
 from monitor.units import MICROMETRE
