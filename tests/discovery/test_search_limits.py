@@ -22,7 +22,7 @@ from monitor.discovery.search.sign_flips import effective_number
 from monitor.effects import parse_effect
 from monitor.methods.chain.least_squares import COMMON_RANK_TOLERANCE, _common_step
 from monitor.methods.samba.method import problem_of
-from monitor.workflow.explain.machine_sentences import LIMITS
+from monitor.reporting.machine_finding import LIMITS
 
 
 @pytest.fixture(scope="module")
