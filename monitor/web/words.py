@@ -9,7 +9,7 @@ from datetime import datetime
 
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
-from monitor.workflow.fleet import ATTENTION, Attention, FleetTableRow
+from monitor.workflow.fleet.answer import ATTENTION, Attention, FleetTableRow
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ _SOON = Urgency("soon", "▲", "plan", "")
 _LOOK = Urgency("look", "◆", "look", "")
 _GOOD = Urgency("good", "●", "as usual", "")
 _OPEN = Urgency("open", "○", "not judged", "")
-#: The classes of the fleet (``monitor.workflow.fleet.ATTENTION``, the most urgent first) as people read them.
+#: The classes of the fleet (``monitor.workflow.fleet.answer.ATTENTION``, the most urgent first) as people read them.
 URGENCIES = dict(
     zip(
         ATTENTION,

@@ -14,7 +14,8 @@ from by_path import load
 from monitor.reporting.health.records import Fleet
 from monitor.reporting.health.render import health_html
 from monitor.store import Database, record_event
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.health.weeks import week_named
 from monitor.workflow.history.weekly_looks import NoticeKind, sentence, weekly_notices
 from monitor.workflow.trend.request import TrendRequest
