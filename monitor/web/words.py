@@ -9,6 +9,7 @@ from datetime import datetime
 
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
+from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.fleet.answer import ATTENTION, Attention, FleetTableRow
 
 
@@ -120,8 +121,8 @@ def since(row: FleetTableRow) -> str:
 
 
 def _span(years: float) -> str:
-    if years * 365.25 < 60.0:
-        return f"{max(years * 365.25, 0.0):.0f} days"
+    if years * DAYS_PER_YEAR < 60.0:
+        return f"{max(years * DAYS_PER_YEAR, 0.0):.0f} days"
     return f"{12.0 * years:.0f} months"
 
 

@@ -56,6 +56,8 @@ def _not_plain(kind: Any, path: str, seen: frozenset[type] = frozenset()) -> Ite
             yield f"{path}: {kind.__name__} is not frozen"
         hints = typing.get_type_hints(kind)
         for field in dataclasses.fields(kind):
+            if field.name.startswith("why_no_") and hints[field.name] in (str, str | None):
+                yield f"{path}.{field.name}: a sentence, where a kind is wanted"
             yield from _not_plain(hints[field.name], f"{path}.{field.name}", seen | {kind})
     elif not (isinstance(kind, type) and issubclass(kind, Enum)):
         yield f"{path}: {kind}"

@@ -20,11 +20,11 @@ from monitor.store import (
     not_identified,
     tolerance_types,
 )
+from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.fleet.answer import ATTENTION, FleetAnswer, FleetTableRow
 from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
-from monitor.workflow.history.calendar import DAYS_PER_YEAR
 from monitor.workflow.history.weekly_looks import weekly_notices
 from monitor.workflow.models import resolve
 

@@ -17,7 +17,7 @@ from monitor.statistics.sufficient import (
     drift_in_blocks,
 )
 from monitor.store import BlockCut, FleetSums
-from monitor.workflow.history.calendar import DAYS_PER_YEAR
+from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.drift import SHORTEST_DAYS
 
 #: How histories are cut into blocks: as those of `monitor trend`.

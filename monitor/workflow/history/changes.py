@@ -17,7 +17,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Lack, Part, refused
 from monitor.statistics import Change, History, find_changes
-from monitor.workflow.history.calendar import DAYS_PER_YEAR
+from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 
 #: Probability of any change where there is none, over all parameters and the whole history of a machine: a change that

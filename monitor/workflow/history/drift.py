@@ -11,7 +11,7 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import Trend, trend
-from monitor.workflow.history.calendar import DAYS_PER_YEAR
+from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 
 #: A slope a year is stated from so many days of history on. Over fewer, the scatter of a few days, multiplied by

@@ -7,7 +7,8 @@ from dataclasses import replace
 from monitor.exceptions import DataError
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import backtest
-from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
 from monitor.workflow.history.forecast import crossing_dates, drift_forecast
 from monitor.workflow.trend.answer import ForecastTest, LimitForecast

@@ -15,8 +15,8 @@ from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import Change, DependenceUnits, control_false_discoveries, dependence, warm_up
-from monitor.units import DEGREE_CELSIUS, ONE, Unit, column_unit
-from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
+from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
 from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import (

@@ -30,8 +30,8 @@ from monitor.statistics import (
     trend,
 )
 from monitor.store import Database, MachineHistory, load_campaign
-from monitor.units import MICROMETRE
-from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.units import DAYS_PER_YEAR, MICROMETRE
+from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import PieceDrift
 from monitor.workflow.history.forecast import crossing_dates, horizon_of, recommended
 from monitor.workflow.history.series import Series
