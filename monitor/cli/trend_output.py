@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 from monitor.cli import output
 from monitor.cli.agreement_output import agreement_line
 from monitor.reporting.lacks import Undecided
-from monitor.workflow.history import weekly_looks
+from monitor.reporting.weekly_notice import weekly_sentence
+from monitor.workflow.history.weekly_looks import WeeklyNotices
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
@@ -78,14 +79,10 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from answer.figures or ()
 
 
-def weekly_lines(looks: weekly_looks.WeeklyNotices, *, machines: bool = False) -> Iterator[str]:
+def weekly_lines(looks: WeeklyNotices, *, machines: bool = False) -> Iterator[str]:
     """What weekly looks noticed, a sentence each, with the name of the machine where there are several."""
     for notice in looks.notices:
-        yield (
-            f"{notice.machine}: {weekly_looks.sentence(notice)}"
-            if machines
-            else weekly_looks.sentence(notice)
-        )
+        yield (f"{notice.machine}: {weekly_sentence(notice)}" if machines else weekly_sentence(notice))
     yield (
         f"weekly looks: {looks.weeks} weeks, {looks.machines} machine{'' if looks.machines == 1 else 's'}, "
         f"{looks.series} series in the last; of all notices at most {100 * looks.false_discovery_rate:g} % false on "

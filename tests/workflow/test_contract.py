@@ -28,7 +28,6 @@ AS_STORED = ["show certificate.record[]: typing.Any"]
 BESIDES_QUESTIONS = {
     "demo:examples_folder",  # the demo types the verbs of the command line itself
     "demo:fresh_database",
-    "history.weekly_looks:sentence",
     "watching.letter:lines_of",  # the words of a letter, on a screen
     "health.mail:mail_report",  # sends what was written; nothing is asked
     "health.mail:read_mail_settings",
