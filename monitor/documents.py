@@ -2,9 +2,10 @@
 
 Every field is written under its name. A date is written in ISO 8601, an array as a list, an enumeration as its value,
 and a number that is not finite as null, because JSON has none. ``from_document`` reads the types of the fields, so that
-the same record is restored to the last bit of every number. Three marks of a field change how it is written: ``named``
-gives it a key that is no Python name, ``OMITTED`` leaves it out where it is None, and ``INLINED`` writes the fields of
-a record into the document of its owner. Of several kinds of record that may be inlined, the first is restored whose
+the same record is restored to the last bit of every number. Four marks of a field change how it is written: ``named``
+gives it a key that is no Python name, ``OMITTED`` leaves it out where it is None, ``INLINED`` writes the fields of a
+record into the document of its owner, and ``WORDED`` writes a kind as the sentence that people read and, beside it, as
+the data from which it is restored. Of several kinds of record that may be inlined, the first is restored whose
 keys the document has: name the one with most keys first.
 """
 
@@ -31,6 +32,8 @@ Record = TypeVar("Record")
 OMITTED: Mapping[str, Any] = {"omitted": True}
 #: Metadata of a field whose record, or mapping, is written key by key into the document of its owner.
 INLINED: Mapping[str, Any] = {"inlined": True}
+#: Metadata of a field that is written as its sentence (``str``) and, under a key that ends in ``_kind``, as its data.
+WORDED: Mapping[str, Any] = {"worded": True}
 #: Metadata of a field whose datetime is in UTC without its zone, as the store has it: it is written with Z.
 IN_UTC: Mapping[str, Any] = {"utc": True}
 
@@ -68,6 +71,11 @@ def _key(field: dataclasses.Field[Any]) -> str:
     return str(field.metadata.get("key", field.name))
 
 
+def data_key(field: dataclasses.Field[Any]) -> str:
+    """The key under which the data of a field stand."""
+    return f"{_key(field)}_kind" if field.metadata.get("worded") else _key(field)
+
+
 def _plain(value: object) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return _plain_record(value)
@@ -94,6 +102,9 @@ def _plain_record(record: Any) -> dict[str, Any]:
     document: dict[str, Any] = {}
     for field in dataclasses.fields(record):
         value = getattr(record, field.name)
+        if value is not None and field.metadata.get("worded"):
+            document |= {_key(field): str(value), data_key(field): _plain(value)}
+            continue
         if value is None and (field.metadata.get("omitted") or field.metadata.get("inlined")):
             continue
         if field.metadata.get("inlined"):
@@ -181,7 +192,7 @@ def _keys(kind: Any) -> tuple[set[str], set[str]]:
             if field.default is dataclasses.MISSING:
                 required |= set.intersection(*(keys for keys, _ in inlined))
             continue
-        allowed.add(_key(field))
+        allowed |= {_key(field), data_key(field)}
         if not field.metadata.get("omitted"):
             required.add(_key(field))
     return required, allowed
@@ -219,7 +230,7 @@ def _record(kind: Any, value: Mapping[str, Any], path: str) -> Any:
             if inlined is not None or field.default is dataclasses.MISSING:
                 arguments[field.name] = _record(inlined or kinds[0], value, path)
         elif _key(field) in value:
-            element = _typed(hints[field.name], value[_key(field)], f"{path}.{field.name}")
+            element = _typed(hints[field.name], value.get(data_key(field)), f"{path}.{field.name}")
             zoned = field.metadata.get("utc") and element is not None
             arguments[field.name] = element.replace(tzinfo=None) if zoned else element
         elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:

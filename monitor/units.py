@@ -29,6 +29,9 @@ class Unit:
         return Unit(f"{self.name}/{other.name}", self.factor / other.factor)
 
 
+#: Days of a Julian year (IAU), by which slopes are stated.
+DAYS_PER_YEAR = 365.25
+
 ONE = Unit("1", 1.0)
 MILLIMETRE = Unit("mm", 1.0)
 MICROMETRE = Unit("µm", 1e-3)

@@ -8,7 +8,8 @@ from typing import Any
 
 from monitor.documents import to_document
 from monitor.store import Database
-from monitor.workflow import fleet as fleet_question
+from monitor.workflow.fleet import fleet as fleet_question
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.health import report as report_question
 from monitor.workflow.health.request import ReportOptions, ReportRequest
 from monitor.workflow.trend.request import TrendRequest
@@ -22,7 +23,7 @@ def trends(db: Database, machine: str, **request: Any) -> dict[str, Any]:
 
 def fleet(db: Database, **request: Any) -> dict[str, Any]:
     """The answer of `monitor fleet`."""
-    return to_document(fleet_question.fleet(db, fleet_question.FleetRequest(**request)))
+    return to_document(fleet_question.fleet(db, FleetRequest(**request)))
 
 
 def report(

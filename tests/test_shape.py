@@ -1,4 +1,5 @@
-"""How the code is cut: branches and parameters of every function, and names that say what they hold.
+"""How the code is cut: branches, parameters and lines of every function, lines of every file, files of every folder;
+names that say what they hold; libraries that nobody patches.
 
 The limits are those of CONTRIBUTING.md. The numba kernels are let off: a call inside a kernel that is compiled anew
 for every set of types costs more to read than the branches do.
@@ -7,6 +8,7 @@ for every set of types costs more to read than the branches do.
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +19,8 @@ import monitor
 PACKAGE = Path(monitor.__file__).parent
 MOST_BRANCHES = 15
 MOST_PARAMETERS = 10
+#: What is there is within some lines of these: whoever needs more cuts first.
+MOST_LINES, MOST_FILE_LINES, MOST_FILES = 75, 450, 42
 #: Compiled functions, where every call and every tuple costs.
 KERNELS = {"uncertainty/kernel.py"}
 
@@ -81,6 +85,11 @@ def parameters(function: Function) -> int:
     return named + (arguments.vararg is not None) + (arguments.kwarg is not None)
 
 
+def lines(function: Function) -> int:
+    """Return the number of lines of a function, its decorators aside."""
+    return (function.end_lineno or function.lineno) - function.lineno + 1
+
+
 def too_large(package: Path) -> list[str]:
     """Return every function beyond a limit."""
     faults = []
@@ -92,6 +101,42 @@ def too_large(package: Path) -> list[str]:
             faults.append(f"{name} has {branches(function)} branches")
         if parameters(function) > MOST_PARAMETERS:
             faults.append(f"{name} has {parameters(function)} parameters")
+        if lines(function) > MOST_LINES:
+            faults.append(f"{name} has {lines(function)} lines")
+    return faults
+
+
+def too_long(package: Path) -> list[str]:
+    """Return every file with too many lines and every folder with too many files."""
+    faults = []
+    files: Counter[str] = Counter()
+    for path in sorted(package.rglob("*.py")):
+        file = path.relative_to(package)
+        files[file.parent.as_posix()] += 1
+        count = len(path.read_text(encoding="utf-8").splitlines())
+        if count > MOST_FILE_LINES and file.as_posix() not in KERNELS:
+            faults.append(f"{file.as_posix()} has {count} lines")
+    return faults + [f"{folder}: {count} files" for folder, count in files.items() if count > MOST_FILES]
+
+
+def patched(package: Path) -> list[str]:
+    """Return every assignment to a name of an imported module that is not ours, and to ``sys.modules``."""
+    faults = []
+    for file, tree in parsed(package):
+        modules = {
+            (name.asname or name.name).partition(".")[0]
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Import)
+            for name in node.names
+        }
+        for node in ast.walk(tree):
+            targets = node.targets if isinstance(node, ast.Assign) else []
+            for target in targets:
+                held = target.value if isinstance(target, ast.Attribute | ast.Subscript) else None
+                while isinstance(held, ast.Attribute):
+                    held = held.value
+                if isinstance(held, ast.Name) and held.id in modules:
+                    faults.append(f"{file}:{node.lineno}: {ast.unparse(target)}")
     return faults
 
 
@@ -113,6 +158,20 @@ def vague_names(package: Path) -> list[str]:
 
 def test_house_no_function_is_too_large() -> None:
     assert too_large(PACKAGE) == []
+
+
+def test_house_no_file_and_no_folder_is_too_long() -> None:
+    assert too_long(PACKAGE) == []
+
+
+def test_house_no_library_is_patched() -> None:
+    # The environment of the process is no library.
+    assert [fault for fault in patched(PACKAGE) if "os.environ" not in fault] == []
+
+
+def test_house_a_year_has_one_length() -> None:
+    files = [file for file in sorted(PACKAGE.rglob("*.py")) if "365.25" in file.read_text(encoding="utf-8")]
+    assert [file.name for file in files] == ["units.py"]
 
 
 def test_house_names_say_what_they_hold() -> None:
@@ -141,11 +200,32 @@ def test_house_every_key_that_is_let_off_is_there() -> None:
         ("def f(self, a, b, c, d, e, f, g, h, i, *j): pass", []),
         ("def f(a, b, c, d, e, /, f, g, *, h, i, j, k): pass", ["f has 11 parameters"]),
         ("def f(a, b, c, d, e, f, g, h, i, *j, **k): pass", ["f has 11 parameters"]),
+        ("def f():\n" + "    pass\n" * 75, ["f has 76 lines"]),
     ],
 )
 def test_house_what_is_too_large_is_named(tmp_path: Path, source: str, faults: list[str]) -> None:
     (tmp_path / "room.py").write_text(source, encoding="utf-8")
     assert [fault.partition(": ")[2] for fault in too_large(tmp_path)] == faults
+
+
+def test_house_what_is_too_long_is_named(tmp_path: Path) -> None:
+    (tmp_path / "room.py").write_text("x = 1\n" * 451, encoding="utf-8")
+    for number in range(42):
+        (tmp_path / f"room_{number}.py").write_text("", encoding="utf-8")
+    assert too_long(tmp_path) == ["room.py has 451 lines", ".: 43 files"]
+
+
+@pytest.mark.parametrize(
+    ("source", "faults"),
+    [
+        ('import sys\nsys.modules["pandas"] = None', ["sys.modules['pandas']"]),
+        ("import ctypes.util\nctypes.util.find_library = print", ["ctypes.util.find_library"]),
+        ("import numpy as np\nx.np = np.array\ny = np.pi", []),
+    ],
+)
+def test_house_a_patch_is_named(tmp_path: Path, source: str, faults: list[str]) -> None:
+    (tmp_path / "room.py").write_text(source, encoding="utf-8")
+    assert [fault.rpartition(": ")[2] for fault in patched(tmp_path)] == faults
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from monitor.exceptions import InputError, NotFoundError, did_you_mean
 if TYPE_CHECKING:
     import pandas as pd
 
-    from monitor.workflow.fleet import FleetAnswer
+    from monitor.workflow.fleet.answer import FleetAnswer
     from monitor.workflow.health.request import ReportAnswer
     from monitor.workflow.intake.importing import ImportAnswer
     from monitor.workflow.model.answer import ModelsAnswer

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from monitor.cli import output
 from monitor.cli.residual_output import four_digits, with_uncertainty
 from monitor.records import FrameOfReference
+from monitor.reporting.curve_finding import correlation
 from monitor.reporting.frames import frame_words
-from monitor.workflow.explain.correlation_words import correlation
 from monitor.workflow.identify.answer import CurveRun, Estimate, IdentifyAnswer, MachineRun, StepwiseAnswer
 
 # A screen holds so many runs beside the names of the parameters.
@@ -109,7 +109,7 @@ def _coefficients(answer: IdentifyAnswer, run: CurveRun) -> None:
         output.say(f"no number: {refusal.why}")
     if noise.noticed:
         output.say(
-            f"neighbouring rows resemble each other ({correlation(noise)}); u allows for it: "
+            f"neighbouring rows resemble each other ({correlation(noise.lag_one, noise.slow)}); u allows for it: "
             f"{noise.effective_rows:.0f} of {noise.rows} rows for a mean"
         )
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from monitor.cli import output
+from monitor.reporting.curve_finding import correlation
 from monitor.workflow.explain.compare_answer import CurveComparison, MachineComparison
-from monitor.workflow.explain.correlation_words import correlation
 
 
 def four_digits(value: float | None) -> str:
@@ -51,9 +51,10 @@ def summary(comparison: MachineComparison | CurveComparison) -> None:
     if test.f is not None:
         output.say(f"lack of fit over repeatability: F = {test.f:.2f}, {output.stated('p', test.p)}")
     if curve is not None and curve.autocorrelation.noticed:
+        noise = curve.autocorrelation
         output.say(
-            f"neighbouring rows resemble each other under this model: {correlation(curve.autocorrelation)} (a missing "
-            "effect or correlated noise; explain tells which)"
+            "neighbouring rows resemble each other under this model: "
+            f"{correlation(noise.lag_one, noise.slow)} (a missing effect or correlated noise; explain tells which)"
         )
     output.say(f"verdict: {comparison.verdict.value}")
 

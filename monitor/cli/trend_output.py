@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from monitor.cli import output
-from monitor.workflow.history import agreement, weekly_looks
+from monitor.cli.agreement_output import agreement_line
+from monitor.reporting.lacks import Undecided
+from monitor.reporting.weekly_notice import weekly_sentence
+from monitor.workflow.history.weekly_looks import WeeklyNotices
 from monitor.workflow.trend.answer import (
     FEW_DAYS,
     Between,
@@ -32,7 +35,7 @@ def say(answer: TrendAnswer) -> None:
     for note in answer.notes:
         output.say(f"note: {note}")
     for pair in answer.agreement:
-        output.say(agreement.sentence(pair))
+        output.say(agreement_line(pair))
     if answer.why is not None:
         output.say(answer.why)
         return
@@ -68,7 +71,7 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from _next_check(answer)
     yield from _backtest(answer)
     yield from _resemblance(answer)
-    yield from dict.fromkeys(parameter.drift.why for _, parameter in parameters if parameter.drift.why)
+    yield from dict.fromkeys(str(parameter.drift.why) for _, parameter in parameters if parameter.drift.why)
     if answer.weekly_looks is not None:
         yield from weekly_lines(answer.weekly_looks)
     for event in answer.events:
@@ -76,14 +79,10 @@ def _sentences(answer: TrendAnswer) -> Iterator[str]:
     yield from answer.figures or ()
 
 
-def weekly_lines(looks: weekly_looks.WeeklyNotices, *, machines: bool = False) -> Iterator[str]:
+def weekly_lines(looks: WeeklyNotices, *, machines: bool = False) -> Iterator[str]:
     """What weekly looks noticed, a sentence each, with the name of the machine where there are several."""
     for notice in looks.notices:
-        yield (
-            f"{notice.machine}: {weekly_looks.sentence(notice)}"
-            if machines
-            else weekly_looks.sentence(notice)
-        )
+        yield (f"{notice.machine}: {weekly_sentence(notice)}" if machines else weekly_sentence(notice))
     yield (
         f"weekly looks: {looks.weeks} weeks, {looks.machines} machine{'' if looks.machines == 1 else 's'}, "
         f"{looks.series} series in the last; of all notices at most {100 * looks.false_discovery_rate:g} % false on "
@@ -167,9 +166,9 @@ def _event_step(name: str, step: StepAtEvent) -> str:
     if step.decided:
         return f"{name} stepped by {size} at {event} (p = {output.probability(step.p_value)})"
     if step.scatter_of == "days":
-        return f"{name} differs by {size} before and after {event}, {agreement.DAYS_MAY_DO}"
+        return f"{name} differs by {size} before and after {event}, {Undecided.DAYS_MAY_DO}"
     return (
-        f"{name} differs by {size} before and after {event}; u is of the runs alone, {agreement.NOT_DECIDED}"
+        f"{name} differs by {size} before and after {event}; u is of the runs alone, {Undecided.ONE_DAY_EACH}"
     )
 
 
@@ -220,7 +219,7 @@ def _charts(answer: TrendAnswer) -> Iterator[str]:
     if control is None or all(whys):
         # Of histories of a few runs the other sentences say enough.
         if whys and answer.runs >= FEWEST_RUNS:
-            yield whys[0] or ""
+            yield str(whys[0] or "")
         return
     period, vector = control.period, control.vector
     yield (
@@ -231,7 +230,7 @@ def _charts(answer: TrendAnswer) -> Iterator[str]:
     if len(answer.parameters) == 1:
         return
     if vector.why is not None:
-        yield vector.why
+        yield str(vector.why)
         return
     for name, state in (("T²", vector.t_squared), ("MEWMA", vector.mewma)):
         if state is not None:
@@ -255,7 +254,7 @@ def _volumetric(ahead: VolumetricForecast | None, latest: str) -> Iterator[str]:
         return
     if ahead.why is not None or ahead.predicted_interval_um is None:
         if ahead.limit_um is not None and ahead.why is not None:
-            yield ahead.why
+            yield str(ahead.why)
         return
     low, high = ahead.predicted_interval_um
     beyond = None not in (ahead.latest_um, ahead.limit_um) and (ahead.latest_um or 0.0) > (

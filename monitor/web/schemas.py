@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from monitor.documents import data_key
+
 Schema = dict[str, Any]
 
 _SCALARS: Mapping[Any, Schema] = {
@@ -95,7 +97,9 @@ class Schemas:
                 parts.append({"anyOf": [*part["anyOf"][:-1], {}]} if may_lack else part)
                 continue
             key = str(field.metadata.get("key", field.name))
-            properties[key] = self.of(hints[field.name])
+            if field.metadata.get("worded"):
+                properties[key] = self.of(str | None)
+            properties[data_key(field)] = self.of(hints[field.name])
             if not field.metadata.get("omitted"):
                 required.append(key)
         record = {"type": "object", "description": inspect.getdoc(kind) or "", "properties": properties}

@@ -9,7 +9,8 @@ from datetime import datetime
 
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
-from monitor.workflow.fleet import ATTENTION, Attention, FleetTableRow
+from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.fleet.answer import ATTENTION, Attention, FleetTableRow
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ _SOON = Urgency("soon", "▲", "plan", "")
 _LOOK = Urgency("look", "◆", "look", "")
 _GOOD = Urgency("good", "●", "as usual", "")
 _OPEN = Urgency("open", "○", "not judged", "")
-#: The classes of the fleet (``monitor.workflow.fleet.ATTENTION``, the most urgent first) as people read them.
+#: The classes of the fleet (``monitor.workflow.fleet.answer.ATTENTION``, the most urgent first) as people read them.
 URGENCIES = dict(
     zip(
         ATTENTION,
@@ -120,8 +121,8 @@ def since(row: FleetTableRow) -> str:
 
 
 def _span(years: float) -> str:
-    if years * 365.25 < 60.0:
-        return f"{max(years * 365.25, 0.0):.0f} days"
+    if years * DAYS_PER_YEAR < 60.0:
+        return f"{max(years * DAYS_PER_YEAR, 0.0):.0f} days"
     return f"{12.0 * years:.0f} months"
 
 

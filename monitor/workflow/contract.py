@@ -63,7 +63,7 @@ QUESTIONS = {
         "event": "events:event",
         "explain": "explain.explain:explain",
         "export": "keeping:export",
-        "fleet": "fleet:fleet",
+        "fleet": "fleet.fleet:fleet",
         "identify": "identify.identify:identify",
         "identify all": "identify.every:identify_all",
         "identify stepwise": "identify.stepwise:identify_stepwise",

@@ -22,7 +22,7 @@ from scipy import stats
 from monitor.store import Database, fleet_sums
 from monitor.store.campaign_runs import gather_runs
 from monitor.store.identified_values import gather_values
-from monitor.workflow.fleet import CUT, cell_tests
+from monitor.workflow.fleet.ranking import CUT, cell_tests
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
 

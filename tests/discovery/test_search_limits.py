@@ -10,18 +10,19 @@ from by_path import simulator
 
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.correlation import Correlation, caution
-from monitor.discovery.machine.explain import Limit, _Noise
 from monitor.discovery.machine.refine import refine_all
+from monitor.discovery.machine.rounds import Limit, most_cautious
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.variants import part_of_period, variants_of
 from monitor.discovery.search.candidate import Candidate, Variant
 from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.remainder import Remainders
+from monitor.discovery.search.rounds import Turns, in_rounds
 from monitor.discovery.search.sign_flips import effective_number
 from monitor.effects import parse_effect
 from monitor.methods.chain.least_squares import COMMON_RANK_TOLERANCE, _common_step
 from monitor.methods.samba.method import problem_of
-from monitor.workflow.explain.machine_sentences import LIMITS
+from monitor.reporting.machine_finding import LIMITS
 
 
 @pytest.fixture(scope="module")
@@ -118,15 +119,34 @@ def test_an_effect_of_few_runs_counts_as_so_many():
 
 def test_correlations_that_go_round_in_a_circle_end_at_the_most_cautious():
     """White, then 0.9, whose effects leave 0.6, whose effects leave 0.9 again."""
-    noise = _Noise()
-    searches = {name: object() for name in ("white", "slow", "fast")}
+    turns = Turns()
     slow, fast = Correlation(0.9, 1.0), Correlation(0.6, 1.0)
-    assert noise.settled(slow, searches["white"]) is None
-    assert noise.settled(fast, searches["slow"]) is None
-    assert noise.settled(slow, searches["fast"]) is searches["slow"]
-    assert noise.correlation == slow
+    assert turns.circle(None, "white", slow) == []
+    assert turns.circle(slow, "slow", fast) == []
+    circle = turns.circle(fast, "fast", slow)
+    assert circle == [(slow, "slow"), (fast, "fast")]
+    assert most_cautious(circle) == (slow, "slow")
     assert caution(None) < caution(fast) < caution(slow)
-    assert _Noise().settled(None, searches["white"]) is searches["white"]
+    assert Turns().circle(None, "white", None) == [(None, "white")]
+
+
+class Halved:
+    """A search whose rounds halve a number until it is odd."""
+
+    def __init__(self, number):
+        self.number = number
+
+    def round(self):
+        return self.number
+
+    def judged(self, current):
+        self.number = current // 2
+        return current if current % 2 else None
+
+
+def test_rounds_end_where_one_stands_or_after_the_most():
+    assert in_rounds(Halved(12), 4) == (3, True)
+    assert in_rounds(Halved(12), 2) == (6, False)
 
 
 def test_every_end_of_a_search_is_said():

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from monitor.store import Database, Holder, Patience, SharedDatabase, list_campaigns, verify_audit
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.intake.campaigns import RunsRequest, campaigns, runs

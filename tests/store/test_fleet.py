@@ -22,7 +22,7 @@ from monitor.store import Database, FleetSums, fleet_sums, machine_history
 from monitor.store.campaign_runs import gather_runs
 from monitor.store.events import record_event
 from monitor.store.identified_values import gather_values
-from monitor.workflow.fleet import CUT
+from monitor.workflow.fleet.ranking import CUT
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd"
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)

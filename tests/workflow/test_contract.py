@@ -28,9 +28,6 @@ AS_STORED = ["show certificate.record[]: typing.Any"]
 BESIDES_QUESTIONS = {
     "demo:examples_folder",  # the demo types the verbs of the command line itself
     "demo:fresh_database",
-    "explain.correlation_words:correlation",  # a sentence that two verbs print
-    "history.agreement:sentence",
-    "history.weekly_looks:sentence",
     "watching.letter:lines_of",  # the words of a letter, on a screen
     "health.mail:mail_report",  # sends what was written; nothing is asked
     "health.mail:read_mail_settings",
@@ -58,6 +55,8 @@ def _not_plain(kind: Any, path: str, seen: frozenset[type] = frozenset()) -> Ite
             yield f"{path}: {kind.__name__} is not frozen"
         hints = typing.get_type_hints(kind)
         for field in dataclasses.fields(kind):
+            if field.name.startswith("why_no_") and hints[field.name] in (str, str | None):
+                yield f"{path}.{field.name}: a sentence, where a kind is wanted"
             yield from _not_plain(hints[field.name], f"{path}.{field.name}", seen | {kind})
     elif not (isinstance(kind, type) and issubclass(kind, Enum)):
         yield f"{path}: {kind}"

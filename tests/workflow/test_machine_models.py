@@ -12,7 +12,8 @@ from by_path import load, simulator
 
 from monitor.exceptions import EffectError, InputError, NotFoundError
 from monitor.store import Database, import_campaign, verify_audit
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest
 from monitor.workflow.model.change import add_effect, affected

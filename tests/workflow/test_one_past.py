@@ -14,7 +14,8 @@ from scipy import stats
 
 from monitor.readers import read_campaign
 from monitor.store import Database, import_campaign, machine_history
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.health.report import report, stored_health
 from monitor.workflow.health.request import ReportRequest
 from monitor.workflow.health.weeks import week_named

@@ -13,7 +13,8 @@ from monitor.readers import read_campaign
 from monitor.reporting.health.page import _map
 from monitor.reporting.health.records import VolumetricMap
 from monitor.store import Database, import_campaign
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.health.map import probability_beyond, stated_map
 from monitor.workflow.health.verdict import Conformity, state_of, with_volumetric
 from monitor.workflow.identify.identify import identify

@@ -13,10 +13,12 @@ from by_path import load
 
 from monitor.reporting.health.records import Fleet
 from monitor.reporting.health.render import health_html
+from monitor.reporting.weekly_notice import NoticeKind, weekly_sentence
 from monitor.store import Database, record_event
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.health.weeks import week_named
-from monitor.workflow.history.weekly_looks import NoticeKind, sentence, weekly_notices
+from monitor.workflow.history.weekly_looks import weekly_notices
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
 
@@ -61,11 +63,11 @@ def test_the_first_page_of_the_report_says_it(db: Database) -> None:
     day = date(2024, 7, 29)
     fleet_page = Fleet(
         noticed.week, day, day, datetime(2024, 8, 5), "monitor", 0.05, (),
-        noticed=((noticed.machine, sentence(noticed)),),
+        noticed=((noticed.machine, weekly_sentence(noticed)),),
     )  # fmt: skip
     text = "".join(health_html(fleet_page, []))
     assert "Noticed this week under weekly looks" in text
-    assert f"N{sentence(noticed)[1:]}" in text
+    assert f"N{weekly_sentence(noticed)[1:]}" in text
     assert "weekly looks" not in "".join(health_html(replace(fleet_page, noticed=()), []))
 
 

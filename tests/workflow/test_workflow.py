@@ -20,7 +20,8 @@ from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.explain.request import CompareRequest, ExplainRequest
 from monitor.workflow.explain.versions import latest_campaign
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
 from monitor.workflow.identify.identify import identify
 from monitor.workflow.identify.request import IdentifyRequest

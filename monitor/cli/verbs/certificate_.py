@@ -44,7 +44,13 @@ def options(parser: ArgumentParser) -> None:
     verbs = parser.add_subparsers(
         dest="what", metavar="issue|show|verify|amend|withdraw|template", required=True
     )
-    issued = verbs.add_parser("issue", **described("a certificate for one run", EXAMPLE))
+    for name, (add, says, example) in _VERBS.items():
+        verb = verbs.add_parser(name, **described(says, example))
+        add(verb)
+        common(verb, database=name != "template")
+
+
+def _issue_options(issued: ArgumentParser) -> None:
     issued.add_argument("campaign", metavar="CAMPAIGN")
     issued.add_argument(
         "--run", type=int, metavar="N", dest="number_of_run",
@@ -57,9 +63,9 @@ def options(parser: ArgumentParser) -> None:
     )
     issued.add_argument("--reason", default="", help="why it is replaced")
     issued.set_defaults(run=_issue)
-    shown = verbs.add_parser(
-        "show", **described("one certificate, or all", "monitor certificate show 2026-0001")
-    )
+
+
+def _show_options(shown: ArgumentParser) -> None:
     shown.add_argument("number", nargs="?", metavar="NUMBER")
     shown.add_argument(
         "--remake", type=Path, metavar="PATH",
@@ -80,13 +86,9 @@ def options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     add_fonts(shown)
     shown.set_defaults(run=_show)
-    verified = verbs.add_parser(
-        "verify",
-        **described(
-            "is a file an unaltered certificate of this database?",
-            "monitor certificate verify certificate-2026-0001.pdf",
-        ),
-    )
+
+
+def _verify_options(verified: ArgumentParser) -> None:
     verified.add_argument("file", type=Path, metavar="FILE")
     verified.add_argument(
         "--trust", type=Path, metavar="PEM", help="certificates that the signer's has to lead to"
@@ -95,13 +97,9 @@ def options(parser: ArgumentParser) -> None:
         "--expect", metavar="SHA256", help="the hash of the file as it was noted elsewhere when it was issued"
     )
     verified.set_defaults(run=_verify)
-    amended = verbs.add_parser(
-        "amend",
-        **described(
-            "a new certificate that replaces another and says so; the old one is marked",
-            "monitor certificate amend 2026-0001 --laboratory laboratory.toml --reason 'wrong customer'",
-        ),
-    )
+
+
+def _amend_options(amended: ArgumentParser) -> None:
     amended.add_argument("replaces", metavar="NUMBER")
     amended.add_argument("--reason", required=True, help="why it is replaced, as printed")
     amended.add_argument("--campaign", metavar="CAMPAIGN", help="default: that of the old certificate")
@@ -110,22 +108,15 @@ def options(parser: ArgumentParser) -> None:
     )
     add_issuing(amended)
     amended.set_defaults(run=_amend)
-    withdrawn = verbs.add_parser(
-        "withdraw",
-        **described(
-            "mark as withdrawn", "monitor certificate withdraw 2026-0001 --reason 'the bar was damaged'"
-        ),
-    )
+
+
+def _withdraw_options(withdrawn: ArgumentParser) -> None:
     withdrawn.add_argument("number", metavar="NUMBER")
     withdrawn.add_argument("--reason", required=True, help="why it is withdrawn")
     withdrawn.set_defaults(run=_withdraw)
-    templated = verbs.add_parser(
-        "template",
-        **described(
-            "the file that a laboratory fills in, with every key and no answer yet",
-            "monitor certificate template --language de --out laboratory.toml",
-        ),
-    )
+
+
+def _template_options(templated: ArgumentParser) -> None:
     templated.add_argument(
         "--language", metavar="de|en", help="of the file (default: that of the configuration, else en)"
     )
@@ -133,9 +124,33 @@ def options(parser: ArgumentParser) -> None:
         "--out", type=Path, default=Path("laboratory.toml"), metavar="FILE", help="default: laboratory.toml"
     )
     templated.set_defaults(run=_template)
-    common(templated, database=False)
-    for verb in (issued, shown, verified, amended, withdrawn):
-        common(verb)
+
+
+#: The verbs: options, what each does, an example.
+_VERBS = {
+    "issue": (_issue_options, "a certificate for one run", EXAMPLE),
+    "show": (_show_options, "one certificate, or all", "monitor certificate show 2026-0001"),
+    "verify": (
+        _verify_options,
+        "is a file an unaltered certificate of this database?",
+        "monitor certificate verify certificate-2026-0001.pdf",
+    ),
+    "amend": (
+        _amend_options,
+        "a new certificate that replaces another and says so; the old one is marked",
+        "monitor certificate amend 2026-0001 --laboratory laboratory.toml --reason 'wrong customer'",
+    ),
+    "withdraw": (
+        _withdraw_options,
+        "mark as withdrawn",
+        "monitor certificate withdraw 2026-0001 --reason 'the bar was damaged'",
+    ),
+    "template": (
+        _template_options,
+        "the file that a laboratory fills in, with every key and no answer yet",
+        "monitor certificate template --language de --out laboratory.toml",
+    ),
+}
 
 
 def _issue(options: Namespace) -> int:

@@ -13,7 +13,9 @@ from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
 from monitor.cli.trend_output import weekly_lines
-from monitor.workflow.fleet import FleetRequest, FleetTableRow, fleet
+from monitor.workflow.fleet.answer import FleetTableRow
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 
 EXAMPLE = "monitor fleet --top 50"
 

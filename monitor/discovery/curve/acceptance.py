@@ -12,8 +12,8 @@ import numpy as np
 from monitor.discovery.curve.candidates import at_best_value
 from monitor.discovery.curve.noise_evidence import HALF, NoiseEvidence
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene
-from monitor.discovery.search.acceptance import Acceptance, lowers_held_out_error
-from monitor.discovery.search.evidence import Evidence, Pool, weigh_beside
+from monitor.discovery.search.acceptance import Acceptance
+from monitor.discovery.search.evidence import Evidence, Pool, pool_of, weigh_beside
 from monitor.discovery.search.projection import orthonormal_to_full_precision, without
 from monitor.discovery.search.scene import family_count
 from monitor.effects.curve import SEARCHED, CurveEffect
@@ -40,8 +40,10 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
     """The rules of a search in a curve; ``doubts`` says by family how often noise alone would do as well as each effect
     that stood."""
 
+    scene: CurveScene
+
     def __init__(self, scene: CurveScene, rate: float) -> None:
-        self.scene = scene
+        super().__init__(scene)
         self.rate = rate
         self.families = family_count(scene)
         self.evidence = NoiseEvidence(scene)
@@ -55,7 +57,7 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
             return False
         if not self.stands(others, candidate) or not self._lowers_bic(others, candidate):
             return False
-        return not self._is_a_bend(others, candidate) and lowers_held_out_error(self.scene, others, candidate)
+        return not self._is_a_bend(others, candidate) and self.predicts(others, candidate)
 
     def at_best_value(self, selected: Sequence[CurveCandidate], index: int) -> CurveCandidate:
         """The selected candidate at an index with its period or constant at the best value."""
@@ -154,7 +156,7 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
 
     @cached_property
     def _pool(self) -> Pool[CurveCandidate]:
-        return Pool(tuple(candidate for candidate in self.scene.candidates if candidate.visible))
+        return pool_of(self.scene)
 
     def _line(self, others: Sequence[CurveCandidate], candidate: CurveCandidate) -> CurveCandidate | None:
         """The straight line in the same input, where it is not in the model yet: a bend must say something beside it,
@@ -180,9 +182,10 @@ class CurveAcceptance(Acceptance[CurveCandidate]):
         """Whether a polynomial in the same input does as well at its price as a cycle, an exponential or a step: then
         it is the simpler answer and has its turn."""
         effect = candidate.effect
-        x = self.scene.curve.problem.inputs.numbers.get(effect.column, np.zeros(1))
-        many = effect.shape == "sin" and float(np.ptp(x)) > MOST_BENDS * float(effect.value or 1.0)
-        if effect.shape not in SEARCHED or many:
+        if effect.shape not in SEARCHED:
+            return False
+        span = float(np.ptp(self.scene.curve.problem.inputs.numbers[effect.column]))
+        if effect.shape == "sin" and span > MOST_BENDS * float(effect.value or 1.0):
             return False
         count, selected = len(self.scene.residual), [other.effect for other in others]
         polynomials = [CurveEffect(effect.column, f"poly{power}") for power in POWERS[1:]]

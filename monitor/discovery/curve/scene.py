@@ -6,14 +6,14 @@ neither origin nor unit of the input matters and a line is not mistaken for a pa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
 
-from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
+from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant, side_by_side
 from monitor.discovery.search.held_out import folds_of, held_out_rms
 from monitor.discovery.search.projection import orthonormal_to_full_precision, without
 from monitor.discovery.search.remainder import Remainders
@@ -102,16 +102,19 @@ class CurveScene:
 
     def columns(self, candidates: Sequence[Candidate[object]]) -> Array:
         """The columns (m, c) of candidates; those of the model are taken out of everything."""
-        none = np.empty((len(self.residual), 0))
-        return np.concatenate([none, *(candidate.columns for candidate in candidates)], axis=1)
+        return side_by_side(len(self.residual), candidates)
 
     @cached_property
     def remainders(self) -> Remainders:
         """What selected effects leave of the residual."""
         return Remainders(self.residual, self.degrees_of_freedom, self.columns)
 
-    def held_out_error(self, columns: Array) -> float | None:
+    @property
+    def held_out_errors(self) -> tuple[Callable[[Array], float | None], ...]:
         """Root mean square error on folds of rows left out in turn."""
+        return (self._held_out_error,)
+
+    def _held_out_error(self, columns: Array) -> float | None:
         return held_out_rms(
             self.residual, columns, folds_of(len(self.residual)), self.degrees_of_freedom, 1.0
         )

@@ -11,6 +11,7 @@ from monitor.discovery.curve.acceptance import CurveAcceptance
 from monitor.discovery.curve.candidates import scene_of
 from monitor.discovery.curve.outliers import Outlier, outliers
 from monitor.discovery.curve.scene import CurveCandidate, CurveScene, whitened_curve
+from monitor.discovery.search.rounds import in_rounds
 from monitor.discovery.search.scan import Finding, ScanResult, except_for, reduced, scan
 from monitor.methods.curve.fit import CurveFit, fit
 from monitor.methods.curve.problem import CurveProblem
@@ -79,7 +80,7 @@ class CurveSearch:
             self._rules[key] = CurveAcceptance(scene_of(curve), self.rate)
         return self._rules[key]
 
-    def _round(self, suspect: Sequence[Outlier], most: int) -> SearchRound:
+    def scanned(self, suspect: Sequence[Outlier], most: int) -> SearchRound:
         """One scan, and the model with its findings."""
         acceptance = self._rules_without(suspect)
         scanned = scan(acceptance.scene, acceptance, rate=self.rate, most=most)
@@ -95,14 +96,12 @@ class CurveSearch:
         A drift over several days hides a daily cycle and looks like correlated noise until the cycle is in the model:
         what the scan finds but does not stand alone is tried beside others in the next round, before it is given up.
         """
-        latest = self._round(suspect, 0)
+        latest = self.scanned(suspect, 0)
         short: tuple[SearchRound, tuple[Outlier, ...]] | None = None
         for count in range(1, most + 1):
-            for _ in range(MOST_ROUNDS):
-                latest = self._round(suspect, count)
-                before, suspect = suspect, () if latest.under.exact else outliers(latest.under)
-                if {outlier.row for outlier in before} == {outlier.row for outlier in suspect}:
-                    break
+            rounds = _Rounds(self, suspect, count)
+            latest, _ = in_rounds(rounds, MOST_ROUNDS)
+            suspect = rounds.suspect
             standing = len(latest.result.findings)
             if short is not None and standing <= len(short[0].result.findings):
                 return short
@@ -110,3 +109,22 @@ class CurveSearch:
                 break
             short = (latest, suspect) if standing < count else None
         return latest, suspect
+
+
+@dataclass
+class _Rounds:
+    """The rounds of a search of at most so many effects: they and the outliers in turn."""
+
+    search: CurveSearch
+    suspect: tuple[Outlier, ...]
+    most: int
+
+    def round(self) -> SearchRound:
+        """One scan without the present outliers."""
+        return self.search.scanned(self.suspect, self.most)
+
+    def judged(self, current: SearchRound) -> SearchRound | None:
+        """Judge the outliers under the effects that were found."""
+        before, self.suspect = self.suspect, () if current.under.exact else outliers(current.under)
+        unchanged = {outlier.row for outlier in before} == {outlier.row for outlier in self.suspect}
+        return current if unchanged else None

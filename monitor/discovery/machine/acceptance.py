@@ -24,6 +24,7 @@ from monitor.discovery.search.evidence import (
     Evidence,
     Pool,
     best_of_families,
+    pool_of,
     weigh_beside,
 )
 from monitor.discovery.search.memory import Memory
@@ -31,7 +32,6 @@ from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import except_for
 from monitor.discovery.search.scene import family_count
 from monitor.discovery.search.sign_flips import p_value_by_flips
-from monitor.records import Array
 
 # Readings of one block of a run: some minutes, beyond what neighbours share once their correlation is taken out.
 BLOCK = 15
@@ -55,10 +55,12 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
     """The rules of a search on a chain; ``drivers`` are those that the recorded columns allow, ``shared`` effects that
     the scene takes for granted."""
 
+    scene: ChainScene
+
     def __init__(
         self, scene: ChainScene, drivers: Sequence[str], rate: float, shared: Sequence[ChainCandidate] = ()
     ) -> None:
-        self.scene = scene
+        super().__init__(scene)
         self.shared = shared
         self.drivers = drivers
         self.rate = rate
@@ -71,7 +73,6 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self._refined: Memory[ChainCandidate] = Memory()
         self._pool: Pool[ChainCandidate] | None = None
         self._flipped: Memory[float | None] = Memory()
-        self._errors: Memory[tuple[float | None, float | None]] = Memory()
 
     def accepts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
         """Whether an effect stands out with every pose as one observation and from how its size scatters from run to
@@ -93,12 +94,12 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
                 return False
         if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
             return False
-        return self._predicts(others, candidate)
+        return self.predicts(others, candidate)
 
     def within_shapes(self, selected: Sequence[ChainCandidate]) -> list[tuple[str, ...]]:
         """For each selected effect the families that stand out beside all selected ones, but not beside its error in
         any shape."""
-        pool = Pool(tuple(candidate for candidate in self.scene.candidates if candidate.visible))
+        pool = pool_of(self.scene)
         families = {candidate.family for candidate in selected}
         within: list[list[str]] = [[] for _ in selected]
         for evidence in best_of_families(weigh_beside(self.scene, pool, selected)):
@@ -164,23 +165,6 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         sizes, spread = fitted.estimate[-size:], np.sqrt(np.diag(fitted.covariance)[-size:])
         sure = np.maximum(np.abs(sizes) - STANDS_OUT * spread, 0.0)
         return float(np.linalg.norm(sure)) <= BEYOND * candidate.largest
-
-    def _predicts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
-        """Whether an effect beside others lowers the error on runs left out (blocks of poses where there is one run)
-        and that at poses left out of every run; true where there are too few."""
-        columns = self.scene.columns(others)
-        before = self._errors.answer(others, None, lambda: self._held_out(columns))
-        more = np.concatenate([columns, candidate.columns], axis=1)
-        return all(
-            without is None or (error := held_out(more)) is None or error < without
-            for without, held_out in zip(
-                before, (self.scene.held_out_error, self.scene.held_out_error_by_poses), strict=True
-            )
-        )
-
-    def _held_out(self, columns: Array) -> tuple[float | None, float | None]:
-        """The errors by runs and by poses with ``columns`` (M, c)."""
-        return self.scene.held_out_error(columns), self.scene.held_out_error_by_poses(columns)
 
     def stands_among(
         self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]

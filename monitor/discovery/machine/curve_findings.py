@@ -11,9 +11,8 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.refine import Refined
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.tables import ChainScan
-from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.projection import orthonormal, without
-from monitor.discovery.search.scan import Finding, ScanResult, except_for
+from monitor.discovery.search.scan import ScanResult, findings_without_rivals
 from monitor.discovery.search.scene import family_count
 
 
@@ -21,12 +20,11 @@ def with_curves(
     base: Fit,
     curves: Sequence[ChainVariant],
     scene: ChainScene,
-    result: ChainScan,
     refined: Sequence[Refined],
 ) -> tuple[ChainScene, ChainScan, list[Refined]]:
     """The findings of a search and the ``curves`` under which it went, together under ``base``, a fit with neither.
 
-    ``scene`` and ``result`` are those of the search, ``refined`` its findings at their best values.
+    ``scene`` is that of the search, ``refined`` its findings at their best values.
     """
     pool = scene_of(base, [candidate.variant for candidate in scene.candidates])
     selected = scene_of(base, [*curves, *(finding.candidate.variant for finding in refined)]).candidates
@@ -40,12 +38,8 @@ def with_curves(
     ]
     ordered = _by_error_taken_away(pool, entries)
     candidates = [entry.candidate for entry in ordered]
-    families = family_count(pool) + len(curves)
-    findings = []
-    for index, candidate in enumerate(candidates):
-        (evidence,) = weigh_beside(pool, [candidate], except_for(candidates, index))
-        findings.append(Finding(evidence, min(1.0, evidence.p_value * families), (evidence,)))
-    return pool, ScanResult(tuple(findings), result.remaining), ordered
+    findings = findings_without_rivals(pool, candidates, family_count(pool) + len(curves))
+    return pool, ScanResult(tuple(findings)), ordered
 
 
 def _by_error_taken_away(scene: ChainScene, entries: Sequence[Refined]) -> list[Refined]:

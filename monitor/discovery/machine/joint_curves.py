@@ -24,7 +24,7 @@ from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.gears import FEWEST_POSITIONS, HIGHEST, in_rows
 from monitor.discovery.machine.held_out import of_numbers, pose_blocks, poses_of
 from monitor.discovery.machine.scene import ChainVariant, scene_of
-from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.candidate import Variant, side_by_side
 from monitor.discovery.search.projection import orthonormal, without
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.drivers import WarmUp
@@ -172,8 +172,7 @@ def columns_of(fit: Fit, texts: Sequence[str]) -> Array:
     """Whitened columns (M, c) of effects, with what is free in every run taken out."""
     chain = fit.problem.context.chain
     variants = [Variant(text, parse_effect(text, chain)) for text in texts]
-    none = np.zeros((fit.solution.last.residual.size, 0))
-    return np.concatenate([none, *(c.columns for c in scene_of(fit, variants).candidates)], axis=1)
+    return side_by_side(fit.solution.last.residual.size, scene_of(fit, variants).candidates)
 
 
 def joint_curves(fit: Fit, variants: Sequence[ChainVariant], rate: float) -> tuple[ChainVariant, ...]:

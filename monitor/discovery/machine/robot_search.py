@@ -8,7 +8,7 @@ links take the place of the load at the flange that they contain, and what later
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -18,9 +18,11 @@ from monitor.discovery.machine.joint_curves import Pursuit, protecting
 from monitor.discovery.machine.refine import refine
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
 from monitor.discovery.machine.tables import ChainScan
-from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.candidate import side_by_side
+from monitor.discovery.search.evidence import pool_of
 from monitor.discovery.search.projection import orthonormal, without
-from monitor.discovery.search.scan import Finding, ScanResult, except_for
+from monitor.discovery.search.scan import ScanResult, except_for, findings_without_rivals
+from monitor.discovery.search.steps import step_by_step
 from monitor.records import Array
 
 # More effects beside the curves than this are beyond what one session separates.
@@ -37,36 +39,51 @@ def search_beside_curves(
 ) -> tuple[ChainScene, ChainScan]:
     """The scene of a fit that has the joint curves, and what is found in it at the false-alarm probability ``rate``."""
     scene = scene_of(fit, protecting(fit, variants))
-    pool = [candidate for candidate in scene.candidates if candidate.visible]
-    selected: list[ChainCandidate] = []
-    fallen: set[str] = set()
-    while len(selected) < MOST_EFFECTS:
-        pursuit = _beside(fit, selected)
-        rest = [
-            candidate for candidate in pool if candidate.family not in fallen and candidate not in selected
-        ]
-        best = _best(pursuit, rest, rate / len(pool))
-        if best is None:
-            break
-        fallen.add(best.family)
+    steps = _StepsBesideCurves(scene, rate)
+    tests = len(steps.pool)
+    selected = step_by_step(steps, [], most=MOST_EFFECTS, most_steps=tests + 1)
+    findings = findings_without_rivals(scene, selected, tests)
+    return scene, ScanResult(tuple(sorted(findings, key=lambda finding: -finding.evidence.score)))
+
+
+class _StepsBesideCurves:
+    """The steps of a search; a family is selected once at most."""
+
+    def __init__(self, scene: ChainScene, rate: float) -> None:
+        self.scene = scene
+        self.pool = pool_of(scene).candidates
+        self.level = rate / max(len(self.pool), 1)
+        self._selected_once: set[str] = set()
+
+    def best(self, selected: Sequence[ChainCandidate], fallen: Collection[str]) -> ChainCandidate | None:
+        """The candidate that explains most at its price and stands."""
+        rest = [candidate for candidate in self.pool if candidate.family not in self._selected_once]
+        return _best(self._beside(selected), rest, self.level)
+
+    def admitted(self, selected: Sequence[ChainCandidate], best: ChainCandidate) -> list[ChainCandidate]:
+        """The selected candidates that stand beside another one and are not part of it."""
+        self._selected_once.add(best.family)
         # What the new effect contains has nothing of its own.
-        selected = [other for other in selected if not _contains(best, other)]
-        selected.append(best)
+        more = [*(other for other in selected if not _contains(best, other)), best]
         # At a time constant of the grid a warm-up leaves a bend, which the next step would take for an effect.
-        selected[-1] = refine(scene, selected, len(selected) - 1).candidate
-        selected = _standing(fit, selected, rate / len(pool))
-    evidence = [
-        weigh_beside(scene, [candidate], except_for(selected, index))[0]
-        for index, candidate in enumerate(selected)
-    ]
-    findings = [Finding(each, min(1.0, each.p_value * len(pool)), (each,)) for each in evidence]
-    return scene, ScanResult(tuple(sorted(findings, key=lambda finding: -finding.evidence.score)), ())
+        more[-1] = refine(self.scene, more, len(more) - 1).candidate
+        index = 0
+        while index < len(more) - 1:
+            pursuit = self._beside(except_for(more, index))
+            new = pursuit.new(more[index].columns[pursuit.order])
+            if _stands(pursuit, more[index], new, self.level):
+                index += 1
+            else:
+                more = except_for(more, index)
+        return more
 
+    def standing(self, selected: Sequence[ChainCandidate]) -> list[ChainCandidate]:
+        """All of them: they were asked when the last one was admitted."""
+        return list(selected)
 
-def _beside(fit: Fit, selected: Sequence[ChainCandidate]) -> Pursuit:
-    none = np.zeros((fit.solution.last.residual.size, 0))
-    columns = np.concatenate([none, *(candidate.columns for candidate in selected)], axis=1)
-    return Pursuit(fit, columns, poses_of(fit))
+    def _beside(self, selected: Sequence[ChainCandidate]) -> Pursuit:
+        fit = self.scene.fit
+        return Pursuit(fit, side_by_side(fit.solution.last.residual.size, selected), poses_of(fit))
 
 
 def _best(pursuit: Pursuit, rest: Sequence[ChainCandidate], level: float) -> ChainCandidate | None:
@@ -105,16 +122,3 @@ def _contains(whole: ChainCandidate, part: ChainCandidate) -> bool:
     lengths = np.linalg.norm(part.columns, axis=0)
     rest = np.linalg.norm(without(orthonormal(whole.columns), part.columns), axis=0)
     return bool(np.all(rest <= 1e-3 * lengths))
-
-
-def _standing(fit: Fit, selected: list[ChainCandidate], level: float) -> list[ChainCandidate]:
-    """The selected candidates without those that do not stand beside the others, the last one first."""
-    index = 0
-    while index < len(selected) - 1:
-        pursuit = _beside(fit, except_for(selected, index))
-        new = pursuit.new(selected[index].columns[pursuit.order])
-        if _stands(pursuit, selected[index], new, level):
-            index += 1
-        else:
-            selected = except_for(selected, index)
-    return selected

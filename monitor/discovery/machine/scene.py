@@ -6,7 +6,7 @@ causes, with the nuisance (base parameters, targets and tip, free in every run) 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -91,6 +91,11 @@ class ChainScene:
     def remainders(self) -> Remainders:
         """What selected effects, beside ``shared``, leave of the residual."""
         return Remainders(self.residual, self.degrees_of_freedom, self.columns)
+
+    @property
+    def held_out_errors(self) -> tuple[Callable[[Array], float | None], ...]:
+        """Those of runs (of blocks of poses where there is one run), and of poses left out of every run."""
+        return self.held_out_error, self.held_out_error_by_poses
 
     def held_out_error(self, columns: Array) -> float | None:
         """Root mean square error in mm of runs left out in turn, of blocks of poses where there is one run."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,8 @@ from monitor.methods.chain.problem import ChainProblem
 MOST_BAD_POINTS = 40
 # More effects that vary, each with a coefficient a run, than this are beyond what a plan can separate.
 MOST_VARYING = 2
+
+SuspectNames: TypeAlias = tuple[frozenset[int], frozenset[tuple[str, int]], tuple[MachineEffect, ...]]
 
 
 def with_effects(problem: ChainProblem, effects: Sequence[MachineEffect]) -> ChainProblem:
@@ -68,11 +71,12 @@ class Suspects:
 
     def same_as(self, other: Suspects) -> bool:
         """Whether both name the same ones."""
-        return (
-            set(self.bad) == set(other.bad)
-            and set(self.moves) == set(other.moves)
-            and self.varying == other.varying
-        )
+        return self.names == other.names
+
+    @property
+    def names(self) -> SuspectNames:
+        """What they are, without how far off."""
+        return frozenset(self.bad), frozenset(self.moves), self.varying
 
     def left_out(self, problem: ChainProblem) -> npt.NDArray[np.bool_]:
         """Marks (n,) the bad points."""

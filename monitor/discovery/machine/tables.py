@@ -102,9 +102,9 @@ def with_tables(scene: ChainScene, result: ChainScan, scan: Scan) -> tuple[Chain
             beside = scan(replace(scene, shared=scene.columns([table])), others, [table])
             more = [table, *beside.candidates]
             if len(more) < len(selected) and _score(scene, more) > worth:
-                best, worth = (more, beside.remaining), _score(scene, more)
+                best, worth = more, _score(scene, more)
         if best is None:
             break
         scene = replace(scene, candidates=(*scene.candidates, *tables))
-        result = ScanResult(findings_of(scene, best[0]), best[1])
+        result = ScanResult(findings_of(scene, best))
     return scene, result

@@ -71,7 +71,7 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
         _is_among(shape, result.candidates) for shape in selected
     ):
         return scene, result
-    return scene, ScanResult(findings_of(scene, selected), result.remaining)
+    return scene, ScanResult(findings_of(scene, selected))
 
 
 def _is_among(candidate: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:

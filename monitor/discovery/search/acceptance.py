@@ -7,13 +7,28 @@ from typing import Generic
 
 import numpy as np
 
-from monitor.discovery.search.candidate import Candidate
 from monitor.discovery.search.evidence import Evidence, Pool
+from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.scene import CandidateT, Scene
 
 
 class Acceptance(Generic[CandidateT]):
     """The particular rules of a search; a search without any of its own uses this class itself."""
+
+    def __init__(self, scene: Scene[CandidateT]) -> None:
+        self.scene = scene
+        self._errors: Memory[tuple[float | None, ...]] = Memory()
+
+    def predicts(self, others: Sequence[CandidateT], candidate: CandidateT) -> bool:
+        """Whether a candidate beside others lowers every error on what was left out; true where too little can be."""
+        columns = self.scene.columns(others)
+        errors = self.scene.held_out_errors
+        before = self._errors.answer(others, None, lambda: tuple(error(columns) for error in errors))
+        more = np.concatenate([columns, candidate.columns], axis=1)
+        return all(
+            without is None or (after := error(more)) is None or after < without
+            for without, error in zip(before, errors, strict=True)
+        )
 
     def alternatives(self, candidate: CandidateT) -> Sequence[CandidateT]:
         """Further candidates to compare with one that was found (its drivers)."""
@@ -43,13 +58,3 @@ class Acceptance(Generic[CandidateT]):
     def outdoes(self, selected: Sequence[CandidateT], rival: CandidateT) -> bool:
         """Whether a rival with better evidence may replace one of the selected candidates."""
         return True
-
-
-def lowers_held_out_error(
-    scene: Scene[Candidate[object]], others: Sequence[Candidate[object]], candidate: Candidate[object]
-) -> bool:
-    """Whether a candidate beside others lowers the error on rows left out; true where too few can be left out."""
-    columns = scene.columns(others)
-    before = scene.held_out_error(columns)
-    after = scene.held_out_error(np.concatenate([columns, candidate.columns], axis=1))
-    return before is None or after is None or after < before

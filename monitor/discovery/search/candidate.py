@@ -7,8 +7,11 @@ are blind to the effect.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
+
+import numpy as np
 
 from monitor.methods.chain.least_squares import COMMON_RANK_TOLERANCE
 from monitor.records import Array
@@ -60,3 +63,8 @@ class Candidate(Generic[Effect]):
     def visible(self) -> bool:
         """Whether the data see anything of the effect."""
         return self.share > SMALLEST_SHARE
+
+
+def side_by_side(count: int, candidates: Sequence[Candidate[object]]) -> Array:
+    """The columns (M, c) of candidates over so many rows, none where there is no candidate."""
+    return np.concatenate([np.empty((count, 0)), *(candidate.columns for candidate in candidates)], axis=1)

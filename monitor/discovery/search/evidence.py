@@ -128,6 +128,11 @@ class Pool(Generic[CandidateT]):
         )
 
 
+def pool_of(scene: Scene[CandidateT]) -> Pool[CandidateT]:
+    """The candidates of which the data see anything."""
+    return Pool(tuple(candidate for candidate in scene.candidates if candidate.visible))
+
+
 def weigh(
     candidates: Sequence[CandidateT] | Pool[CandidateT],
     residual: Array,

@@ -15,9 +15,10 @@ from typing import Generic
 import numpy as np
 
 from monitor.discovery.search.acceptance import Acceptance
-from monitor.discovery.search.evidence import Evidence, Pool, best_of_families, weigh_beside
+from monitor.discovery.search.evidence import Evidence, best_of_families, pool_of, weigh_beside
 from monitor.discovery.search.memory import Memory
 from monitor.discovery.search.scene import CandidateT, Scene, family_count
+from monitor.discovery.search.steps import step_by_step
 from monitor.statistics import control_false_discoveries
 
 # More than this many effects hidden together in one campaign are beyond what a plan can separate.
@@ -48,10 +49,9 @@ class Finding(Generic[CandidateT]):
 
 @dataclass(frozen=True)
 class ScanResult(Generic[CandidateT]):
-    """The findings of a scan, the most convincing first, and the evidence for all that remains."""
+    """The findings of a scan, the most convincing first."""
 
     findings: tuple[Finding[CandidateT], ...]
-    remaining: tuple[Evidence[CandidateT], ...]
 
     @property
     def candidates(self) -> list[CandidateT]:
@@ -72,101 +72,78 @@ def scan(
     ``rate`` is the false discovery rate over each scan; ``most`` how many effects at most; ``acceptance`` the rules
     of the search, none where it is None; ``begin`` what an earlier scan of fewer candidates selected.
     """
-    steps = _Steps(scene, Acceptance() if acceptance is None else acceptance)
-    pool = _pool(scene)
-    selected = list(begin)
-    fallen: set[str] = set()
-    for _ in range(MOST_STEPS):
-        weighed = best_of_families(steps.weighed(pool, selected))
-        best = steps.best(pool, weighed, selected, rate, fallen) if len(selected) < most else None
-        if best is None:
-            # What an exchange, a merger or a later effect has made doubtful is no finding; others have their turn.
-            standing = steps.standing(pool, selected, rate)
-            if len(standing) == len(selected):
-                break
-            fallen |= {candidate.family for candidate in selected} - {
-                candidate.family for candidate in standing
-            }
-            selected = standing
-            continue
-        selected.append(best)
-        selected[-1] = steps.rules.at_best_value(selected, len(selected) - 1)
-        pool = pool.with_more([other for other in steps.rules.alternatives(best) if other.visible])
-        selected = steps.exchanged(pool, selected)
-        selected = steps.merged(pool, selected)
-    selected = steps.standing(pool, selected, rate)
-    return ScanResult(findings_of(scene, selected, pool, steps.rules), tuple(weighed))
+    steps = _Steps(scene, acceptance or Acceptance(scene), rate)
+    selected = step_by_step(steps, begin, most=most, most_steps=MOST_STEPS)
+    return ScanResult(steps.findings(selected))
 
 
-def _pool(scene: Scene[CandidateT]) -> Pool[CandidateT]:
-    return Pool(tuple(candidate for candidate in scene.candidates if candidate.visible))
+def findings_of(scene: Scene[CandidateT], selected: Sequence[CandidateT]) -> tuple[Finding[CandidateT], ...]:
+    """The selected effects with their evidence given the others and their rivals of all candidates, most convincing
+    first."""
+    return _Steps(scene, Acceptance(scene)).findings(selected)
 
 
-def findings_of(
-    scene: Scene[CandidateT],
-    selected: Sequence[CandidateT],
-    pool: Pool[CandidateT] | None = None,
-    rules: Acceptance[CandidateT] | None = None,
-) -> tuple[Finding[CandidateT], ...]:
-    """The selected effects with their evidence given the others and their rivals of ``pool`` (of all candidates where
-    there is none), most convincing first."""
-    steps = _Steps(scene, Acceptance() if rules is None else rules)
-    families = family_count(scene)
-    pool = _pool(scene) if pool is None else pool
-    findings = [steps.finding(pool, selected, index, families) for index in range(len(selected))]
-    return tuple(sorted(findings, key=lambda finding: -finding.evidence.score))
+def findings_without_rivals(
+    scene: Scene[CandidateT], selected: Sequence[CandidateT], families: int
+) -> list[Finding[CandidateT]]:
+    """The selected effects with their evidence given the others, of a search among so many families."""
+    weighed = [
+        weigh_beside(scene, [candidate], except_for(selected, index))[0]
+        for index, candidate in enumerate(selected)
+    ]
+    return [Finding(each, min(1.0, each.p_value * families), (each,)) for each in weighed]
 
 
 class _Steps(Generic[CandidateT]):
     """The steps of a scan of a scene under the rules of its search; what was weighed is not weighed again."""
 
-    def __init__(self, scene: Scene[CandidateT], rules: Acceptance[CandidateT]) -> None:
+    def __init__(self, scene: Scene[CandidateT], rules: Acceptance[CandidateT], rate: float = 1.0) -> None:
         self.scene = scene
         self.rules = rules
+        self.rate = rate
+        self.families = family_count(scene)
+        self.pool = pool_of(scene)
         self._weighed: Memory[list[Evidence[CandidateT]]] = Memory()
         self._alone: Memory[Evidence[CandidateT]] = Memory()
-        self._pool: Pool[CandidateT] | None = None
 
-    def weighed(self, pool: Pool[CandidateT], selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
-        """Evidence for the candidates of a pool that can be separated from the selected ones, given these."""
-        if pool is not self._pool:
-            self._pool, self._weighed = pool, Memory()
-        weighed = self._weighed.answer(selected, None, lambda: weigh_beside(self.scene, pool, selected))
+    def weighed(self, selected: Sequence[CandidateT]) -> list[Evidence[CandidateT]]:
+        """Evidence for the candidates of the pool that can be separated from the selected ones, given these."""
+        weighed = self._weighed.answer(selected, None, lambda: weigh_beside(self.scene, self.pool, selected))
         return self.rules.separable(selected, weighed)
 
     def evidence(self, candidate: CandidateT, others: Sequence[CandidateT]) -> Evidence[CandidateT]:
         """Evidence for one candidate beside others."""
         return self._alone.answer(others, candidate, lambda: weigh_beside(self.scene, [candidate], others)[0])
 
-    def best(
-        self,
-        pool: Pool[CandidateT],
-        weighed: Sequence[Evidence[CandidateT]],
-        selected: Sequence[CandidateT],
-        rate: float,
-        fallen: Collection[str],
-    ) -> CandidateT | None:
+    def best(self, selected: Sequence[CandidateT], fallen: Collection[str]) -> CandidateT | None:
         """The most convincing candidate that stands the control and is accepted beside the selected ones; families that
         have ``fallen`` are not selected again."""
         families = {candidate.family for candidate in selected}.union(fallen)
-        q_values = control_false_discoveries([evidence.p_value for evidence in weighed], rate=rate).q_value
+        weighed = best_of_families(self.weighed(selected))
+        p_values = [evidence.p_value for evidence in weighed]
+        q_values = control_false_discoveries(p_values, rate=self.rate).q_value
         for evidence, q_value in zip(weighed, q_values, strict=True):
             candidate = evidence.candidate
-            standing = q_value <= rate and candidate.family not in families
+            standing = q_value <= self.rate and candidate.family not in families
             if (
                 standing
                 and self.rules.accepts(selected, candidate)
-                and self.rules.stands_among(pool, selected, evidence)
+                and self.rules.stands_among(self.pool, selected, evidence)
             ):
                 return candidate
         return None
 
-    def standing(
-        self, pool: Pool[CandidateT], selected: Sequence[CandidateT], rate: float
-    ) -> list[CandidateT]:
+    def admitted(self, selected: Sequence[CandidateT], best: CandidateT) -> list[CandidateT]:
+        """The selected candidates with another one, exchanged for better ones and merged."""
+        selected = [*selected, best]
+        selected[-1] = self.rules.at_best_value(selected, len(selected) - 1)
+        self.pool = self.pool.with_more([other for other in self.rules.alternatives(best) if other.visible])
+        self._weighed = Memory()
+        return self.merged(self.exchanged(selected))
+
+    def standing(self, selected: Sequence[CandidateT]) -> list[CandidateT]:
         """The selected candidates without those that do not stand beside the others, the most doubtful first."""
         selected = list(selected)
-        families = family_count(self.scene)
         while selected:
             evidence = [
                 self.evidence(candidate, except_for(selected, index))
@@ -175,30 +152,28 @@ class _Steps(Generic[CandidateT]):
             doubtful = [
                 index
                 for index, weighed in enumerate(evidence)
-                if not self._stands(pool, except_for(selected, index), weighed, rate / families)
+                if not self._stands(except_for(selected, index), weighed)
             ]
             if not doubtful:
                 break
             del selected[max(doubtful, key=lambda index: evidence[index].p_value)]
         return selected
 
-    def _stands(
-        self, pool: Pool[CandidateT], others: list[CandidateT], evidence: Evidence[CandidateT], level: float
-    ) -> bool:
+    def _stands(self, others: list[CandidateT], evidence: Evidence[CandidateT]) -> bool:
         """Whether a selected candidate still stands beside the others."""
         return (
-            evidence.p_value <= level
+            evidence.p_value <= self.rate / self.families
             and self.rules.accepts(others, evidence.candidate)
-            and self.rules.stands_among(pool, others, evidence)
+            and self.rules.stands_among(self.pool, others, evidence)
         )
 
-    def exchanged(self, pool: Pool[CandidateT], selected: Sequence[CandidateT]) -> list[CandidateT]:
+    def exchanged(self, selected: Sequence[CandidateT]) -> list[CandidateT]:
         """Exchange effects for better ones, given the others, until nothing improves."""
         selected = list(selected)
         for _ in range(MOST_EFFECTS):
             changed = False
             for index in range(len(selected)):
-                evidence, others = self.replaceable(pool, selected, index)
+                evidence, others = self.replaceable(selected, index)
                 worth = others and others[0].score > evidence.score + WORTH_EXCHANGING
                 if worth and self.rules.outdoes(selected, others[0].candidate):
                     selected[index] = others[0].candidate
@@ -208,41 +183,42 @@ class _Steps(Generic[CandidateT]):
                 break
         return selected
 
-    def merged(self, pool: Pool[CandidateT], selected: list[CandidateT]) -> list[CandidateT]:
+    def merged(self, selected: list[CandidateT]) -> list[CandidateT]:
         """Replace two effects by one where it explains as much at its price: growth of a whole artefact may first be
         mistaken for that of two axes."""
         families = {candidate.family for candidate in selected}
         for first, second in combinations(range(len(selected)), 2):
             others = [candidate for index, candidate in enumerate(selected) if index not in (first, second)]
             weighed = [
-                evidence
-                for evidence in self.weighed(pool, others)
-                if evidence.candidate.family not in families
+                evidence for evidence in self.weighed(others) if evidence.candidate.family not in families
             ]
             pair = self.evidence(selected[first], others).score
             pair += self.evidence(selected[second], [*others, selected[first]]).score
             if weighed and weighed[0].score > pair and self.rules.outdoes(selected, weighed[0].candidate):
-                return self.merged(pool, [*others, weighed[0].candidate])
+                return self.merged([*others, weighed[0].candidate])
         return selected
 
     def replaceable(
-        self, pool: Pool[CandidateT], selected: Sequence[CandidateT], index: int
+        self, selected: Sequence[CandidateT], index: int
     ) -> tuple[Evidence[CandidateT], list[Evidence[CandidateT]]]:
         """Evidence for the selected effect at an index, given the other selected ones, and for all not selected."""
         others = except_for(selected, index)
         families = {candidate.family for candidate in selected}
-        weighed = best_of_families(self.weighed(pool, others))
+        weighed = best_of_families(self.weighed(others))
         evidence = self.evidence(selected[index], others)
         return evidence, [other for other in weighed if other.candidate.family not in families]
 
-    def finding(
-        self, pool: Pool[CandidateT], selected: Sequence[CandidateT], index: int, families: int
-    ) -> Finding[CandidateT]:
+    def findings(self, selected: Sequence[CandidateT]) -> tuple[Finding[CandidateT], ...]:
+        """The selected effects as findings, most convincing first."""
+        findings = [self._finding(selected, index) for index in range(len(selected))]
+        return tuple(sorted(findings, key=lambda finding: -finding.evidence.score))
+
+    def _finding(self, selected: Sequence[CandidateT], index: int) -> Finding[CandidateT]:
         """The selected effect at an index as a finding."""
-        evidence, others = self.replaceable(pool, selected, index)
+        evidence, others = self.replaceable(selected, index)
         # The smallest of m p-values times m bounds its q-value from above, whatever their dependence.
         rivals = sorted([evidence, *others], key=lambda rival: -rival.score)
-        return Finding(evidence, min(1.0, evidence.p_value * families), tuple(rivals))
+        return Finding(evidence, min(1.0, evidence.p_value * self.families), tuple(rivals))
 
 
 def reduced(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
 
 from monitor.discovery.search.candidate import Candidate
@@ -35,9 +35,10 @@ class Scene(Protocol[CandidateT_co]):
     def remainders(self) -> Remainders:
         """What selected effects, beside those that the model shares, leave of the residual."""
 
-    def held_out_error(self, columns: Array) -> float | None:
-        """Root mean square error on rows that took no part in the fit of ``columns`` (M, c); None where too few rows
-        can be left out."""
+    @property
+    def held_out_errors(self) -> tuple[Callable[[Array], float | None], ...]:
+        """Root mean square errors with columns (M, c) of shared effects on what took no part in their fit, one for
+        every way to leave out (rows, runs, poses); None where too few can be left out."""
 
 
 def family_count(scene: Scene[Candidate[object]]) -> int:

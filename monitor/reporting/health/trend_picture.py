@@ -12,6 +12,7 @@ from monitor.reporting.palette import BLUE, INK, MID, ORANGE
 from monitor.reporting.plain_names import plain_name
 from monitor.reporting.svg.plot import LETTER, SCALE, WIDE, Drawing, Panel, tick_words
 from monitor.reporting.svg.sparkline import value_range
+from monitor.units import DAYS_PER_YEAR
 
 WIDTH_MM, HEIGHT_MM = 104.0, 45.0
 #: Margins around the panel in tenths of a millimetre: numbers, words above, tolerances at the right, dates.
@@ -21,7 +22,7 @@ _AHEAD = 1.0
 #: Steps between dates along the axis, in days, and in months where a month is the least.
 _DAYS = (1, 2, 7, 14)
 _MONTHS = (1, 2, 3, 6, 12, 24, 60, 120)
-_DAYS_PER_MONTH = 365.25 / 12
+_DAYS_PER_MONTH = DAYS_PER_YEAR / 12
 
 
 def trend_picture(machine: str, parameter: ParameterHealth) -> str:
@@ -111,7 +112,7 @@ def _drift(on: Drawing, panel: Panel, drift: Drift, last: datetime, end: datetim
     """Draw the line of a drift through its value at the last run, cut off where it leaves the panel."""
     assert drift.at_last is not None
     assert drift.since is not None
-    level, slope, low, high = drift.at_last, drift.per_year / 365.25, *panel.up
+    level, slope, low, high = drift.at_last, drift.per_year / DAYS_PER_YEAR, *panel.up
     begin = max(_days(drift.since), panel.across[0])
     ahead = _days(end)
     if slope:

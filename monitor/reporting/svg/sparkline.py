@@ -15,13 +15,14 @@ import numpy.typing as npt
 from monitor.records import Array
 from monitor.reporting.health.records import ParameterHealth
 from monitor.reporting.palette import BLUE, FAINT, INK, MID, ORANGE
+from monitor.units import DAYS_PER_YEAR
 
 WIDTH_MM, HEIGHT_MM = 52.0, 7.6
 #: Units of the drawing a millimetre, and the empty frame around it in the same units.
 _SCALE, _EDGE = 10.0, 8.0
 #: Runs at most in one picture; of more, the latest.
 MOST = 80
-_SECONDS_PER_YEAR = 365.25 * 86400.0
+_SECONDS_PER_YEAR = DAYS_PER_YEAR * 86400.0
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from monitor.web.desk import Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
 from monitor.web.words import URGENCIES, Urgency, how_far, since
-from monitor.workflow.fleet import ATTENTION, Attention, FleetAnswer, FleetTableRow
+from monitor.workflow.fleet.answer import ATTENTION, Attention, FleetAnswer, FleetTableRow
 from monitor.workflow.history.values import ValuesAnswer
 from monitor.workflow.query import TableAnswer
 

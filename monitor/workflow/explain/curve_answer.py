@@ -12,9 +12,16 @@ from monitor.discovery.curve.explain import CurveExplanation as Explanation
 from monitor.discovery.curve.missing import CurveMissing as Missing
 from monitor.discovery.curve.quality import bic
 from monitor.discovery.search.comparison import Part
-from monitor.records import CurveCampaign
+from monitor.methods.curve.problem import problem_of
+from monitor.records import CurveCampaign, Verdict
+from monitor.reporting.curve_finding import (
+    CurveFinding,
+    Exchanged,
+    LikelyEffect,
+    NeighbourNoise,
+    curve_sentences,
+)
 from monitor.workflow.explain.compare_answer import CurveComparison, CurvePart
-from monitor.workflow.explain.curve_sentences import curve_sentences
 from monitor.workflow.explain.explain_answer import BadRow, CurveExplanation, CurveMissing
 from monitor.workflow.explain.shared_answer import (
     coefficients,
@@ -24,6 +31,9 @@ from monitor.workflow.explain.shared_answer import (
     searched_value,
 )
 from monitor.workflow.identify.curve import curve_noise, in_micrometres, response_unit
+
+#: So many rows on average at each value of a column make it look set rather than read.
+ROWS_A_SETTING = 4
 
 
 def _part(curve: CurveCampaign, part: Part) -> CurvePart:
@@ -139,6 +149,37 @@ def curve_explanation(explanation: Explanation, model: str) -> CurveExplanation:
         not_recorded=dict(explanation.refused),
         autocorrelation_after=noise,
         answer=curve_sentences(
-            explanation, comparison, missing, noise, [row.sequence for row in suspect_data]
+            CurveFinding(
+                response=comparison.response,
+                explained=comparison.verdict is not Verdict.SOMETHING_IS_MISSING,
+                exact=(explanation.final if missing else explanation.first).exact,
+                missing=[
+                    LikelyEffect(
+                        effect.effect,
+                        effect.description.meaning,
+                        effect.certain,
+                        effect.noise_alone_p,
+                        effect.indistinguishable_from,
+                    )
+                    for effect in missing
+                ],
+                exchanged=_exchanged(explanation.first.problem.curve),
+                noise=NeighbourNoise(noise.lag_one, noise.slow, noise.rows, noise.effective_rows)
+                if noise.noticed
+                else None,
+                outliers=[row.sequence for row in suspect_data],
+            )
         ),
     )
+
+
+def _exchanged(curve: CurveCampaign) -> Exchanged | None:
+    """Whether the response looks like what was set and an input of the base like what was read."""
+    values = len(np.unique(curve.measured))
+    if values * ROWS_A_SETTING > len(curve):
+        return None
+    for effect in problem_of(curve).base:
+        levels = len(np.unique(curve.columns[effect.column])) if effect.column in curve.columns else 0
+        if effect.column != curve.time and 2 * levels > len(curve):
+            return Exchanged(values, effect.column, levels)
+    return None

@@ -24,13 +24,13 @@ from monitor.documents import to_document
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, CurveCampaign, Verdict
+from monitor.reporting.machine_finding import mistake_sentence
 from monitor.store import Database, StoredModel, save_analysis
 from monitor.workflow.campaign_parts import kind_of, method_of
 from monitor.workflow.explain.compare import Draw
 from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
-from monitor.workflow.explain.machine_answer import machine_explanation
-from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sentence
+from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation, mistakes_found
 from monitor.workflow.explain.request import RATE, ExplainRequest
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.measured import load_measured
@@ -49,7 +49,9 @@ def first_fit(campaign: Campaign, model: StoredModel) -> RobustFit:
         return robust_fit(machine_problem(campaign, model))
     except DataError as error:
         mistakes = find_mistakes(campaign, lambda changed: machine_problem(changed, model), None)
-        raise DataError(f"{error}. {mistake_sentence(mistakes)}" if mistakes else str(error)) from error
+        raise DataError(
+            f"{error}. {mistake_sentence(mistakes_found(mistakes))}" if mistakes else str(error)
+        ) from error
 
 
 def explanation_of(

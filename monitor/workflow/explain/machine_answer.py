@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery import ChainComparison, ChainMissing, Explanation
+from monitor.discovery import ChainComparison, ChainMissing, Explanation, Mistake
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.steps import Step
+from monitor.discovery.machine.suspects import MOST_BAD_POINTS
 from monitor.records import Verdict
+from monitor.reporting.machine_finding import (
+    ONE_RUN,
+    MachineFinding,
+    MissingEffect,
+    MistakeFound,
+    Move,
+    machine_sentences,
+)
 from monitor.units import DEGREE, MICROMETRE, Unit
 from monitor.workflow.explain.compare_answer import MachineComparison, MachinePart
 from monitor.workflow.explain.explain_answer import (
@@ -25,7 +34,6 @@ from monitor.workflow.explain.explain_answer import (
     MovedTarget,
     Remaining,
 )
-from monitor.workflow.explain.machine_sentences import ONE_RUN, machine_sentences
 from monitor.workflow.explain.residuals_against import pictures_of
 from monitor.workflow.explain.shared_answer import (
     coefficients,
@@ -36,6 +44,9 @@ from monitor.workflow.explain.shared_answer import (
 )
 from monitor.workflow.explain.ties import ties_of
 from monitor.workflow.identify.answer import Estimate, reversal_value
+
+#: A residual beyond so many stated standard uncertainties after the search leaves no result of it standing.
+HOPELESS_TIMES = 100.0
 
 
 def micrometres(length: float | None) -> float | None:
@@ -165,6 +176,32 @@ def _remaining(final: Fit) -> Remaining:
     )
 
 
+def is_hopeless(explanation: Explanation) -> bool:
+    """Whether the search left a residual beyond anything that effects of a machine leave."""
+    return explanation.final.rms > HOPELESS_TIMES * explanation.final.sigma
+
+
+def mistakes_found(mistakes: Sequence[Mistake]) -> list[MistakeFound]:
+    """Mistakes as a sentence says them."""
+    return [MistakeFound(each.what, each.rms_as_recorded, each.rms_undone) for each in mistakes]
+
+
+def _as_said(effect: MachineMissing) -> MissingEffect:
+    """A missing effect as a sentence says it."""
+    nearest = (effect.nearest_shape or "") if effect.shape_unknown else None
+    return MissingEffect(
+        effect.effect, effect.description.meaning, nearest, effect.varies_from_run_to_run,
+        effect.indistinguishable_from,
+    )  # fmt: skip
+
+
+def _move(change: MovedTarget | ChangedTarget | ChangedParameter, target_word: str) -> Move:
+    """A change as a sentence says it."""
+    stepped = isinstance(change, ChangedParameter)
+    subject = change.parameter if isinstance(change, ChangedParameter) else f"{target_word} {change.target}"
+    return Move(subject, stepped, change.size, change.unit, change.run)
+
+
 def machine_explanation(explanation: Explanation) -> MachineExplanation:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
@@ -193,7 +230,19 @@ def machine_explanation(explanation: Explanation) -> MachineExplanation:
             for mistake in explanation.mistakes
         ),
         undecided=(ONE_RUN,) if len(problem.runs) == 1 else (),
-        answer=machine_sentences(explanation, comparison.verdict, missing, len(suspect_data), changes),
+        answer=machine_sentences(
+            MachineFinding(
+                explained=comparison.verdict is not Verdict.SOMETHING_IS_MISSING,
+                missing=[_as_said(effect) for effect in missing],
+                bad_points=len(suspect_data),
+                moves=tuple(_move(change, problem.target_word) for change in changes),
+                limits=explanation.limits,
+                most_bad_points=MOST_BAD_POINTS,
+                unfitted=explanation.unfitted,
+                hopeless=is_hopeless(explanation),
+                mistakes=mistakes_found(explanation.mistakes),
+            )
+        ),
         residual_map=residual_map,
         residual_against=residual_against,
         not_fitted=explanation.unfitted,

@@ -3,6 +3,7 @@ the pictures of an explanation are drawn from."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,12 +75,9 @@ def against_effect(explanation: Explanation, effect: str) -> Against | None:
     if size is not None and (not columns or (isinstance(drawn, ChainEffect) and len(columns) > 1)):
         moved = np.sum(fit.moved_by(basis) * size, axis=2)[acts]
         columns[f"what {effect} predicts / µm"] = -um * np.sum(moved * unit, axis=1)
-    columns = {
-        name: x for name, x in columns.items() if np.isfinite(x).all() and np.ptp(x) > 1e-9 * np.abs(x).max()
-    }
-    if not columns:
+    driver = _most_followed(columns, before)
+    if driver is None:
         return None
-    driver = max(columns, key=lambda name: _followed(columns[name], before))
     along = drawn.term.symbol if isinstance(drawn, ChainEffect) else drawn.text
     return Against(driver, along, columns[driver], before, after)
 
@@ -168,6 +166,14 @@ def _groups(values: Array) -> npt.NDArray[np.int64]:
         cuts = np.linspace(low, high, PARTS + 1)[1:-1]
         group = np.unique(np.searchsorted(cuts, values, side="right"), return_inverse=True)[1]
     return np.asarray(group, dtype=np.int64)
+
+
+def _most_followed(columns: Mapping[str, Array], residual: Array) -> str | None:
+    """The column that a residual follows most; None where none varies."""
+    varying = [
+        name for name, x in columns.items() if np.isfinite(x).all() and np.ptp(x) > 1e-9 * np.abs(x).max()
+    ]
+    return max(varying, key=lambda name: _followed(columns[name], residual), default=None)
 
 
 def _followed(driver: Array, residual: Array) -> float:

@@ -18,6 +18,7 @@ from monitor.reporting.health.records import (
     RefusedImport,
 )
 from monitor.reporting.health.words import in_words
+from monitor.reporting.lacks import Undecided
 from monitor.reporting.symbols import describe
 from monitor.statistics import Change as FoundChange
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
@@ -25,7 +26,6 @@ from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
 from monitor.workflow.health.forecast import stated_drift
 from monitor.workflow.health.weeks import Week
-from monitor.workflow.history.agreement import DAYS_MAY_DO, NOT_DECIDED
 from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.event_steps import EventStep
 from monitor.workflow.history.forecast import DriftForecast
@@ -141,10 +141,10 @@ def _step_in_words(step: EventStep) -> str:
         return f"{step.parameter} stepped by {size} {step.unit} at {event} (u = {u} {step.unit})"
     if step.by_days:
         differs = f"{step.parameter} differs by {size} {step.unit} before and after {event}"
-        return f"{differs} (u = {u} {step.unit}): {DAYS_MAY_DO}"
+        return f"{differs} (u = {u} {step.unit}): {Undecided.DAYS_MAY_DO}"
     return (
         f"{step.parameter} differs by {size} {step.unit} before and after {event} (u = {u} {step.unit} by the runs "
-        f"alone): {NOT_DECIDED}"
+        f"alone): {Undecided.ONE_DAY_EACH}"
     )
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from monitor.reporting.health.records import Drift
 from monitor.statistics import predict
-from monitor.workflow.history.calendar import DAYS_PER_YEAR, local_time
+from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.history.calendar import local_time
 from monitor.workflow.history.drift import PieceDrift
 from monitor.workflow.history.forecast import DriftForecast, horizon_of
 

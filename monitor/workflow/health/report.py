@@ -29,6 +29,7 @@ from monitor.reporting.health.records import (
     fleet_row,
 )
 from monitor.reporting.health.render import MACHINES_A_PART, health_html, health_pdf
+from monitor.reporting.weekly_notice import weekly_sentence
 from monitor.store import (
     Database,
     analysis_text,
@@ -47,7 +48,7 @@ from monitor.workflow.health.refusals import refused_elsewhere
 from monitor.workflow.health.request import ReportAnswer, ReportRequest
 from monitor.workflow.health.task import Task, computed
 from monitor.workflow.health.weeks import Week, week_before, week_named
-from monitor.workflow.history.weekly_looks import WeeklyNotices, sentence, weekly_notices
+from monitor.workflow.history.weekly_looks import WeeklyNotices, weekly_notices
 
 KIND = "health"
 #: Processes by default: at most so many (each needs up to 0.7 GB while it writes a part of the PDF), and one for so
@@ -91,7 +92,7 @@ def report(
             tuple(row for row, _ in rows),
             refused_elsewhere(db, {name.machine for name in every}, week),
             ended=today > week.last,
-            noticed=tuple((notice.machine, sentence(notice)) for notice in looks.notices),
+            noticed=tuple((notice.machine, weekly_sentence(notice)) for notice in looks.notices),
             attention=tuple(stored_health(db, number) for _, number in rows[:ATTENTION]),
             anchor=last_anchor(db),
         )  # fmt: skip

@@ -14,23 +14,13 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from monitor.documents import OMITTED
+from monitor.documents import OMITTED, WORDED
 from monitor.exceptions import DataError
+from monitor.reporting.lacks import Undecided
 from monitor.statistics.before_after import OtherDays, before_after
 from monitor.statistics.normalised_error import K, normalised_error, result_of_runs
 from monitor.store import Database, MachineEvent, MachineHistory, latest_documents
 from monitor.workflow.history.series import day_numbers
-
-#: Why nothing is said of a change where each side has one day and the machine no other that would say how days differ.
-NOT_DECIDED = (
-    "not decided: one day on each side cannot tell a change from days that differ; measure a second day"
-)
-
-#: Why nothing is said of what independent days of one scatter do not explain and other days do.
-DAYS_MAY_DO = (
-    "not decided: more than independent days that scatter alike explain, but days that follow each other, or that "
-    "scatter differently on the two sides, may do as much; more days on each side or further campaigns decide it"
-)
 
 
 class PairKind(Enum):
@@ -68,7 +58,7 @@ class ParameterAgreement:
     between_days: float | None = field(default=None, metadata=OMITTED)
     other_days: int | None = field(default=None, metadata=OMITTED)
     other_campaigns: int | None = field(default=None, metadata=OMITTED)
-    why_not_decided: str | None = field(default=None, metadata=OMITTED)
+    why_not_decided: Undecided | None = field(default=None, metadata={**WORDED, **OMITTED})
     expanded_cautious: float | None = field(default=None, metadata=OMITTED)
 
 
@@ -193,10 +183,11 @@ def _across_event(
         result = before_after(values[before], values[after], days[before], days[after], others)
     except DataError:
         return None
+    lack = Undecided.DAYS_MAY_DO if result.decided else Undecided.ONE_DAY_EACH
     return ParameterAgreement(
         unit, result.before, result.u_before, result.after, result.u_after, result.difference, result.expanded,
         result.k, result.e_n, result.agree, result.dof, result.between, result.other_days, result.other_campaigns,
-        None if result.agree is not None else DAYS_MAY_DO if result.decided else NOT_DECIDED, result.cautious,
+        lack if result.agree is None else None, result.cautious,
     )  # fmt: skip
 
 
@@ -225,48 +216,3 @@ def _compared(history: MachineHistory, comparison: _Comparison) -> AgreementPair
         )  # fmt: skip
     disagree = tuple(name for name, result in parameters.items() if result.agree is False)
     return replace(comparison.pair, parameters=parameters, disagree=disagree)
-
-
-def sentence(pair: AgreementPair) -> str:
-    """A pair as a line for people."""
-    first, second = pair.campaigns
-    errors = {name: abs(result.e_n) for name, result in pair.parameters.items() if result.e_n is not None}
-    worst = max(errors, key=errors.__getitem__, default="")
-    number = f"; largest |E_n| {errors[worst]:.2g} ({worst})" if errors else ""
-    if pair.methods is None:
-        subject = f"before and after the {pair.event} ({first}, {second}; {pair.method})"
-        return (
-            f"{subject}: {_moved(pair)}{number}{_judged_with(pair)}"
-            if errors
-            else f"{subject}: {NOT_DECIDED}"
-        )
-    subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
-    if not pair.disagree:
-        return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}"
-    return f"{subject} disagree in {', '.join(pair.disagree)}{number}"
-
-
-def _moved(pair: AgreementPair) -> str:
-    """The parameters that moved at an event, from which value to which."""
-    moved = [(name, pair.parameters[name]) for name in pair.disagree]
-    undecided = any(result.why_not_decided for result in pair.parameters.values())
-    quiet = "nothing decided" if undecided else "nothing moved beyond the scatter of runs and days"
-    return (
-        ", ".join(f"{name} {result.first:.3g} -> {result.second:.3g} {result.unit}" for name, result in moved)
-        or quiet
-    )
-
-
-def _judged_with(pair: AgreementPair) -> str:
-    """Which other days of the machine said how days differ, and the parameters that nothing is said of."""
-    results = pair.parameters.values()
-    days = max((result.other_days or 0 for result in results), default=0)
-    campaigns = max((result.other_campaigns or 0 for result in results), default=0)
-    lean = [f"{count} other {of}" for count, of in ((days, "days"), (campaigns, "campaigns")) if count]
-    judged = f"; judged with the scatter of {' and '.join(lean)} of the machine" if lean else ""
-    undecided = "".join(
-        f"; {', '.join(names)} {reason}"
-        for reason in (DAYS_MAY_DO, NOT_DECIDED)
-        if (names := [name for name, result in pair.parameters.items() if result.why_not_decided == reason])
-    )
-    return judged + undecided

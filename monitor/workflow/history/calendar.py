@@ -7,8 +7,6 @@ from datetime import datetime, timedelta
 import numpy as np
 
 SECONDS_PER_DAY = 86400.0
-#: Days of a Julian year, by which slopes are stated.
-DAYS_PER_YEAR = 365.25
 _EPOCH = datetime(1970, 1, 1)
 
 

@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.lacks import Lack, Part, refused
 from monitor.statistics import Change, History, find_changes
-from monitor.workflow.history.calendar import DAYS_PER_YEAR
+from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 
 #: Probability of any change where there is none, over all parameters and the whole history of a machine: a change that
@@ -40,7 +41,7 @@ class ChangeSearch:
 
     changes: tuple[Change, ...] = ()
     drifts: tuple[Change, ...] = ()
-    why_none: str | None = None
+    why_none: Lack | None = None
 
 
 def day_means(series: Series) -> tuple[Array, Array, Array | None, Array]:
@@ -106,7 +107,7 @@ def search_changes(
                 trials=max(TRIALS, ceil(5 * len(series) * pieces / false_alarm)),
             )  # fmt: skip
         except DataError as error:
-            results |= dict.fromkeys(plan.values, ChangeSearch(why_none=f"no search for changes: {error}"))
+            results |= dict.fromkeys(plan.values, ChangeSearch(why_none=refused(Part.CHANGES, error)))
             continue
         results |= {name: _of_parameter(history, name, plan.begins) for name in plan.values}
     return results

@@ -9,8 +9,9 @@ import numpy as np
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import Trend, trend
-from monitor.workflow.history.calendar import DAYS_PER_YEAR
+from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.series import Series
 
 #: A slope a year is stated from so many days of history on. Over fewer, the scatter of a few days, multiplied by
@@ -41,10 +42,10 @@ class PieceDrift:
         return float(np.ptp(self.piece.t)) if len(self.piece.t) else 0.0
 
     @cached_property
-    def _fit(self) -> Trend | str:
+    def _fit(self) -> Trend | Lack:
         piece = self.piece
         if len(piece.t) and np.ptp(piece.values) == 0.0:
-            return f"no drift of {piece.name}: it has the same value in every run"
+            return Lack(Part.DRIFT, Cause.SAME_VALUE, name=piece.name)
         try:
             return trend(
                 piece.values,
@@ -55,7 +56,7 @@ class PieceDrift:
                 beside=self._beside,
             )
         except DataError as error:
-            return f"no drift: {error}"
+            return refused(Part.DRIFT, error)
 
     @cached_property
     def _beside(self) -> Array | None:
@@ -84,18 +85,9 @@ class PieceDrift:
         return self.line if self.span >= SHORTEST_DAYS else None
 
     @property
-    def why_not_stated(self) -> str | None:
+    def why_not_stated(self) -> Lack | None:
         """Why no slope a year is stated; None where it is."""
         if self.span < SHORTEST_DAYS:
-            return too_short(self.span, bool(np.isfinite(self.begins)))
-        return self._fit if isinstance(self._fit, str) else None
-
-
-def too_short(span: float, split: bool) -> str:
-    """The sentence for a history of ``span`` days; ``split`` where it begins at a change or an event."""
-    count = max(round(span), 1)
-    since = " since the last change or event" if split else ""
-    return (
-        f"{count} day{'s' if count > 1 else ''} of history{since} {'are' if count > 1 else 'is'} too short for a "
-        f"slope a year; at least {SHORTEST_DAYS:g} are needed"
-    )
+            days, split = max(round(self.span), 1), bool(np.isfinite(self.begins))
+            return Lack(Part.DRIFT, Cause.TOO_SHORT, count=days, split=split, needed=(SHORTEST_DAYS,))
+        return self._fit if isinstance(self._fit, Lack) else None

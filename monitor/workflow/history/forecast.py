@@ -13,7 +13,8 @@ from datetime import timedelta
 from monitor.exceptions import DataError
 from monitor.statistics import Forecast, Trend, forecast
 from monitor.statistics.forecast import Crossing
-from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import PieceDrift
 
 #: A limit that is reached later than this many years ahead has no date.

@@ -8,15 +8,14 @@ noticed in the past, too.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import date
-from enum import Enum
 
 import numpy as np
 import numpy.typing as npt
 
-from monitor.documents import OMITTED
 from monitor.records import Array
+from monitor.reporting.weekly_notice import NoticeKind, WeeklyNotice
 from monitor.statistics.weekly_looks import RATE, Look, WeeklyLooks
 from monitor.store import (
     NOTE,
@@ -33,31 +32,6 @@ from monitor.workflow.history.series import steady_runs
 
 #: A change of the whole vector names so many parameters at most, those that moved most for their scatter first.
 NAMED = 3
-
-
-class NoticeKind(Enum):
-    """One parameter, or all of a machine together, which may show what none of them shows alone."""
-
-    PARAMETER = "parameter"
-    VECTOR = "vector"
-
-
-@dataclass(frozen=True)
-class WeeklyNotice:
-    """A change that was noticed in ``week``; it probably happened between the values of ``after`` and ``since``.
-
-    ``parameters`` is the one, or those that moved most for their scatter. ``size`` in ``unit`` is the mean since the
-    change less the mean before; None for a vector.
-    """
-
-    machine: str
-    week: str
-    kind: NoticeKind
-    parameters: tuple[str, ...]
-    after: str
-    since: str
-    size: float | None = field(default=None, metadata=OMITTED)
-    unit: str | None = field(default=None, metadata=OMITTED)
 
 
 @dataclass(frozen=True)
@@ -81,20 +55,6 @@ class WeeklyNotices:
             notice for notice in self.notices if notice.machine in machines and week in (None, notice.week)
         )
         return replace(self, notices=tuple(part))
-
-
-def sentence(notice: WeeklyNotice) -> str:
-    """What is said of a notice, wherever it is printed."""
-    when = f"between {notice.after} and {notice.since}"
-    if notice.kind is NoticeKind.VECTOR or notice.size is None:
-        return (
-            f"noticed in {notice.week} under weekly looks: all parameters together changed {when}, "
-            f"most of all {', '.join(notice.parameters)}"
-        )
-    return (
-        f"noticed in {notice.week} under weekly looks: {notice.parameters[0]} changed by {notice.size:+.3g} "
-        f"{notice.unit} {when}"
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from monitor.documents import OMITTED
+from monitor.documents import OMITTED, WORDED
 from monitor.records import Array
+from monitor.reporting.lacks import Lack
 
 #: Below this false discovery rate of ANOVA the groups differ in a parameter.
 DIFFERENT = 0.001
@@ -19,7 +20,7 @@ DIFFERENT = 0.001
 class NoVarianceComponents:
     """Why the components of variance of a parameter were not estimated."""
 
-    why: str
+    why: Lack = field(metadata=WORDED)
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ class ParameterDrift:
 class SessionDrift:
     """Which parameters drift within the days; empty, with the reason under ``why``, where the runs do not suffice."""
 
-    why: str | None
+    why: Lack | None = field(metadata=WORDED)
     drifts: tuple[str, ...]
     degrees_of_freedom: float | None = field(default=None, metadata=OMITTED)
     common_scatter: float | None = field(default=None, metadata=OMITTED)

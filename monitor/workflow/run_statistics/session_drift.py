@@ -6,6 +6,7 @@ import numpy as np
 
 from monitor.exceptions import DataError
 from monitor.records import Campaign
+from monitor.reporting.lacks import Part, refused
 from monitor.statistics.run_drift import run_drift
 from monitor.store import StoredIdentification
 from monitor.workflow.run_statistics.answer import ParameterDrift, SessionDrift
@@ -29,7 +30,7 @@ def session_drift(campaign: Campaign, identification: StoredIdentification, runs
     try:
         drift = run_drift(estimates[:, complete] / factors, hours, stated / np.outer(factors, factors), days)
     except DataError as error:
-        return SessionDrift(why=f"no drift within a day: {error}", drifts=(), parameters={})
+        return SessionDrift(why=refused(Part.DAY_DRIFT, error), drifts=(), parameters={})
     return SessionDrift(
         why=None,
         drifts=tuple(name for name, drifts in zip(names, drift.drifts, strict=True) if drifts),

@@ -11,6 +11,7 @@ import numpy as np
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.lacks import Part, refused
 from monitor.statistics import box_m, manova, normality, p_value_histogram, variance_components
 from monitor.statistics.multivariate import VectorTest
 from monitor.workflow.run_statistics.answer import (
@@ -49,7 +50,7 @@ def components(values: Array, groups: Sequence[str]) -> Sequence[VarianceCompone
     try:
         estimates = variance_components(values, np.array(groups))
     except DataError as error:
-        return [NoVarianceComponents(f"no components of variance: {error}")] * values.shape[1]
+        return [NoVarianceComponents(refused(Part.COMPONENTS, error))] * values.shape[1]
     return [
         VarianceComponents(
             why=None,

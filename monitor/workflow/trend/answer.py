@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from monitor.documents import INLINED, OMITTED, named
+from monitor.documents import INLINED, OMITTED, WORDED, named
+from monitor.reporting.lacks import Lack
 from monitor.statistics.changes import DAYS_THAT_SHOW
 from monitor.workflow.history.agreement import AgreementPair
 from monitor.workflow.history.weekly_looks import WeeklyNotices
@@ -78,7 +79,7 @@ class DriftStatement:
     n: int
     days: int
     span_days: float
-    why: str | None
+    why: Lack | None = field(metadata=WORDED)
 
 
 @dataclass(frozen=True)
@@ -187,7 +188,7 @@ class LimitForecast:
     next_check: str | None
     recommended_interval_days: float | None
     recommended_by: str | None
-    why_no_forecast: str | None
+    why_no_forecast: Lack | None = field(metadata=WORDED)
 
 
 @dataclass(frozen=True)
@@ -256,7 +257,7 @@ class VectorState(ChartState):
 class ParameterCharts:
     """The charts of one parameter, or ``why`` there are none."""
 
-    why: str | None
+    why: Lack | None = field(metadata=WORDED)
     centre: float | None = field(default=None, metadata=OMITTED)
     sd: float | None = field(default=None, metadata=OMITTED)
     shewhart: ShewhartState | None = field(default=None, metadata=OMITTED)
@@ -274,7 +275,7 @@ class ParameterCharts:
 class VectorCharts:
     """The charts of all parameters together, or ``why`` there are none."""
 
-    why: str | None
+    why: Lack | None = field(metadata=WORDED)
     parameters: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     t_squared: VectorState | None = field(default=None, metadata=OMITTED)
     mewma: VectorState | None = field(default=None, metadata=OMITTED)
@@ -308,16 +309,16 @@ class ParameterTrend:
     mean: LatestMean = field(metadata=INLINED)
     changes: tuple[DatedChange, ...]
     drifts: tuple[DatedChange, ...]
-    why_no_changes: str | None
+    why_no_changes: Lack | None = field(metadata=WORDED)
     conditions: tuple[ConditionEffect, ...]
-    why_no_conditions: str | None
+    why_no_conditions: Lack | None = field(metadata=WORDED)
     cycles: tuple[Cycle, ...]
-    why_no_cycles: str | None
+    why_no_cycles: Lack | None = field(metadata=WORDED)
     warm_up: WarmUp | None
-    why_no_warm_up: str | None
+    why_no_warm_up: Lack | None = field(metadata=WORDED)
     forecast: LimitForecast = field(metadata=INLINED)
     backtest: ForecastTest | None
-    why_no_backtest: str | None
+    why_no_backtest: Lack | None = field(metadata=WORDED)
     control: ParameterCharts
     q_value: float | None
     event_steps: tuple[StepAtEvent, ...] = ()
@@ -358,10 +359,10 @@ class VolumetricForecast:
     correlation_shrunk_by: float | None = None
     method: str
     backtest: VolumetricTest | None = None
-    why_no_backtest: str | None = None
+    why_no_backtest: Lack | None = field(default=None, metadata=WORDED)
     points: int | None = field(default=None, metadata=OMITTED)
     beyond_since: str | None = field(default=None, metadata=OMITTED)
-    why: str | None
+    why: Lack | None = field(metadata=WORDED)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import (
     correlated_reference,
     cusum_chart,
@@ -104,13 +105,14 @@ class Charts:
         after = finite & ~self.inside
         values, t = self.points.values[after, column], self.points.t[after]
         if not len(before):
-            return ParameterCharts("no chart: no run of the history lies in the reference period")
+            return ParameterCharts(Lack(Part.CHART, Cause.NONE_IN_REFERENCE))
         try:
             reference = correlated_reference(before)
         except DataError as error:
-            return ParameterCharts(f"no chart: {error}")
+            return ParameterCharts(refused(Part.CHART, error))
         if not len(values):
-            return ParameterCharts(f"no chart: all {len(before)} {self.points.kind} are the reference period")
+            lack = Lack(Part.CHART, Cause.ALL_IN_REFERENCE, count=len(before), name=self.points.kind)
+            return ParameterCharts(lack)
         plain = individuals_chart(values, reference, arl=RUN_LENGTH)
         path = ewma_chart(values, reference, arl=RUN_LENGTH)
         sums = cusum_chart(values, reference, arl=RUN_LENGTH)
@@ -141,11 +143,11 @@ class Charts:
         values = self.points.values[:, columns]
         before, after = values[rows & self.inside], values[rows & ~self.inside]
         if len(after) == 0 or len(before) < len(used) + 2:
-            return VectorCharts(
-                f"no chart of the vector: {len(before)} {self.points.kind} in the reference period and "
-                f"{len(after)} after it for {len(used)} parameters; at least {len(used) + 2} and one are needed "
-                "(--reference FROM..TO)"
-            )
+            lack = Lack(
+                Part.VECTOR_CHART, Cause.FEW_POINTS, len(before), len(after), len(used), (len(used) + 2,),
+                name=self.points.kind,
+            )  # fmt: skip
+            return VectorCharts(lack)
         t = self.points.t[rows & ~self.inside]
         try:
             single = t_squared_chart(after, before, arl=RUN_LENGTH, correlated=True)
@@ -153,7 +155,7 @@ class Charts:
                 after, before, rng=rng, arl=VECTOR_RUN_LENGTH, trials=VECTOR_TRIALS, correlated=True
             )
         except DataError as error:
-            return VectorCharts(f"no chart of the vector: {error}")
+            return VectorCharts(refused(Part.VECTOR_CHART, error))
         shares, path_shares = (
             dict(zip(used, map(float, chart.shares[-1]), strict=True)) for chart in (single, path)
         )

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from monitor.exceptions import DataError
+from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import backtest
-from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
 from monitor.workflow.history.forecast import crossing_dates, drift_forecast
 from monitor.workflow.trend.answer import ForecastTest, LimitForecast
@@ -24,10 +26,10 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
     """
     none = LimitForecast(limit, None, None, None, date(check, drift.whole.offset), None, None, None)
     if limit is None:
-        return replace(none, why_no_forecast="no forecast: the machine file states no tolerance for it")
+        return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_TOLERANCE))
     of_drift = drift_forecast(drift, limit, check, reliability)
     if of_drift is None or of_drift.ahead is None:
-        return replace(none, why_no_forecast="no forecast: there is no drift to extrapolate")
+        return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
     ahead = of_drift.ahead
     none = replace(
         none,
@@ -35,7 +37,7 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
         recommended_by=f"{ahead.method}: {reliability:g}",
     )
     if drift.stated is None:
-        return replace(none, why_no_forecast="no forecast: there is no drift to extrapolate")
+        return replace(none, why_no_forecast=Lack(Part.FORECAST, Cause.NO_DRIFT))
     at, interval = crossing_dates(ahead.crossing, ahead.horizon, of_drift.offset)
     return replace(
         none,
@@ -45,17 +47,14 @@ def limit_forecast(drift: PieceDrift, limit: float | None, check: float, reliabi
     )
 
 
-def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, str | None]:
+def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, Lack | None]:
     """How good forecasts of the present piece were: every day foretold by the days before it."""
     piece = drift.piece
     days = piece.day_count
     if drift.span < SHORTEST_DAYS:
-        return None, "no backtest: there is no drift whose forecasts could be looked at"
+        return None, Lack(Part.BACKTEST, Cause.NO_DRIFT_TO_TEST)
     if days < BACKTEST_DAYS:
-        return None, (
-            f"no backtest: {days} days since the last change or event are too few to hold any out; "
-            f"{BACKTEST_DAYS} are needed"
-        )
+        return None, Lack(Part.BACKTEST, Cause.FEW_DAYS, count=days, needed=(BACKTEST_DAYS,))
     try:
         test = backtest(
             piece.values,
@@ -67,7 +66,7 @@ def backtested(drift: PieceDrift) -> tuple[ForecastTest | None, str | None]:
             first=BACKTEST_DAYS - 1,
         )
     except DataError as error:
-        return None, f"no backtest: {error}"
+        return None, refused(Part.BACKTEST, error)
     return ForecastTest(
         made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
         bias=test.bias, rms=test.rms, unit=piece.unit,

@@ -1,6 +1,6 @@
 """What the history of one parameter says: drift, latest mean, changes, dependence, cycles, warm-up.
 
-Parts of `monitor trend`. Where the runs do not suffice for a part, there is a sentence that says why.
+Parts of `monitor trend`. Where the runs do not suffice for a part, a ``Lack`` says why.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import Change, DependenceUnits, control_false_discoveries, dependence, warm_up
-from monitor.units import DEGREE_CELSIUS, ONE, Unit, column_unit
-from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.units import DAYS_PER_YEAR, DEGREE_CELSIUS, ONE, Unit, column_unit
+from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import SHORTEST_DAYS, PieceDrift
 from monitor.workflow.history.series import Series
 from monitor.workflow.trend.answer import (
@@ -104,7 +105,7 @@ def dated_change(change: Change, series: Series) -> DatedChange:
 
 def conditions(
     series: Series, channels: Mapping[str, Array], since: float
-) -> tuple[tuple[ConditionEffect, ...], str | None]:
+) -> tuple[tuple[ConditionEffect, ...], Lack | None]:
     """Coefficients of the conditions, one at a time beside the drift; or why there are none.
 
     One at a time because the channels of one campaign move together: a joint fit of four thermometers would
@@ -117,7 +118,7 @@ def conditions(
         if (effect := _condition(series, name, channels, piece & np.isfinite(channels[name]))) is not None
     ]
     if not effects:
-        return (), "no dependence: no recorded condition varies over six runs or more"
+        return (), Lack(Part.CONDITIONS, Cause.NOTHING_VARIES)
     q = control_false_discoveries(
         [np.nan if effect.p_value is None else effect.p_value for effect in effects]
     ).q_value
@@ -162,7 +163,7 @@ def _together(a: Array, b: Array) -> bool:
     return bool(abs(np.corrcoef(a, b)[0, 1]) > COLLINEAR)
 
 
-def cycles(piece: Series) -> tuple[tuple[Cycle, ...], str | None]:
+def cycles(piece: Series) -> tuple[tuple[Cycle, ...], Lack | None]:
     """The cycles of day and year, where the record is long enough to see them beside the drift."""
     n = len(piece.t)
     periods = {}
@@ -171,17 +172,14 @@ def cycles(piece: Series) -> tuple[tuple[Cycle, ...], str | None]:
     if n >= FEWEST_OF_CYCLE["year"] and np.ptp(piece.t) >= YEAR_COVERAGE_D:
         periods["year"] = DAYS_PER_YEAR
     if not periods:
-        return (), (
-            f"no cycles: a daily one needs runs over {DAY_COVERAGE_H:g} hours of the clock, a yearly one "
-            f"{YEAR_COVERAGE_D:g} days of history"
-        )
+        return (), Lack(Part.CYCLES, Cause.NO_CYCLE_SEEN, needed=(DAY_COVERAGE_H, YEAR_COVERAGE_D))
     try:
         fit = dependence(
             piece.values, piece.t, {}, cycles=periods, drift=piece.day_count >= 3, u=piece.weights(),
             days=piece.days,
         )  # fmt: skip
     except DataError as error:
-        return (), f"no cycles: {error}"
+        return (), refused(Part.CYCLES, error)
     return tuple(
         Cycle(
             wave.name, wave.period, wave.amplitude, wave.u, piece.unit, date(wave.peak_at, piece.offset),
@@ -193,7 +191,7 @@ def cycles(piece: Series) -> tuple[tuple[Cycle, ...], str | None]:
 
 def warming(
     series: Series, campaigns: npt.NDArray[np.str_], rng: np.random.Generator
-) -> tuple[WarmUp | None, str | None]:
+) -> tuple[WarmUp | None, Lack | None]:
     """Warm-up of the latest campaign that was begun cold or hot: time constant and when the machine is stable.
 
     ``campaigns`` (n,) are those of the runs of the series.
@@ -207,7 +205,7 @@ def warming(
             try:
                 fit = warm_up(part.values, hours, u=part.weights(), rng=rng)
             except DataError as error:
-                return None, f"no warm-up: {error}"
+                return None, refused(Part.WARM_UP, error)
             tau, stable = fit.tau_interval, fit.stable_interval
             return WarmUp(
                 campaign=name, amplitude=fit.amplitude, u=fit.u_amplitude, unit=series.unit, tau_h=fit.tau,
@@ -215,4 +213,4 @@ def warming(
                 stable_interval_h=(number(stable[0]), number(stable[1])), stable_within=fit.tolerance,
                 p_value=fit.p_value,
             ), None  # fmt: skip
-    return None, "no warm-up: no campaign of six runs or more has runs marked warm_up"
+    return None, Lack(Part.WARM_UP, Cause.NO_WARM_UP_RUNS)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.reporting.lacks import Cause, Lack, Part, refused
 from monitor.statistics import (
     ErrorVectors,
     JointLines,
@@ -29,8 +30,8 @@ from monitor.statistics import (
     trend,
 )
 from monitor.store import Database, MachineHistory, load_campaign
-from monitor.units import MICROMETRE
-from monitor.workflow.history.calendar import DAYS_PER_YEAR, date
+from monitor.units import DAYS_PER_YEAR, MICROMETRE
+from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import PieceDrift
 from monitor.workflow.history.forecast import crossing_dates, horizon_of, recommended
 from monitor.workflow.history.series import Series
@@ -187,7 +188,7 @@ def _residuals(parameters: _Extrapolated) -> Array:
 
 def _backtest(
     parameters: _Extrapolated, vectors: _Vectors, rng: np.random.Generator
-) -> tuple[VolumetricTest | None, str | None]:
+) -> tuple[VolumetricTest | None, Lack | None]:
     """Days since the last change foretold by those before them; a parameter that is held now was held then."""
     names, t, days = list(parameters.lines), parameters.t, parameters.days
     values, u = np.full((len(t), len(names)), np.nan), np.full((len(t), len(names)), np.nan)
@@ -209,7 +210,7 @@ def _backtest(
         series = JointSeries(values, t, days)
         test = backtest_longest(series, fit, ErrorVectors(vectors.sensitivity, vectors.at_zero), rng=rng)
     except DataError as error:
-        return None, f"no backtest of the volumetric error: {error}"
+        return None, refused(Part.VOLUMETRIC_BACKTEST, error)
     return VolumetricTest(
         made=test.forecasts, inside=test.covered, share_inside=test.coverage, level=test.level,
         bias_um=test.bias, rms_um=test.rms,
@@ -249,21 +250,16 @@ def volumetric_forecast(
         limit_um=limit, next_check=date(question.check, offset), method=METHOD, why=None
     )
     if limit is None:
-        return replace(
-            none,
-            why="no forecast of the volumetric error: no limit is stated (volumetric in the machine's tolerances)",
-        )
+        return replace(none, why=Lack(Part.VOLUMETRIC_FORECAST, Cause.NO_LIMIT))
     if not any(drift.stated is not None for drift in drifts.values()):
-        return replace(
-            none, why="no forecast of the volumetric error: no parameter has a drift to extrapolate"
-        )
+        return replace(none, why=Lack(Part.VOLUMETRIC_FORECAST, Cause.NO_PARAMETER_DRIFTS))
     try:
         lines = {name: drift.stated or _held(drift.piece) for name, drift in drifts.items()}
         origin = max(float(drift.whole.t[-1]) for drift in drifts.values())
         levels = {name: float(predict(line, origin)[0]) for name, line in lines.items()}
         vectors = _vectors(db, history, question.model, levels)
     except DataError as error:
-        return replace(none, why=f"no forecast of the volumetric error: {error}")
+        return replace(none, why=refused(Part.VOLUMETRIC_FORECAST, error))
     parameters = _together(drifts, {name: lines[name] for name in vectors.names})
     correlation, shrunk, _ = residual_correlation(_residuals(parameters), parameters.days)
     ahead = forecast_longest(

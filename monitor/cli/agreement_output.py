@@ -1,0 +1,51 @@
+"""What `monitor trend` says of two results of one machine that should agree, or should not."""
+
+from __future__ import annotations
+
+from monitor.reporting.lacks import Undecided
+from monitor.workflow.history.agreement import AgreementPair
+
+
+def agreement_line(pair: AgreementPair) -> str:
+    """A pair as a line for people."""
+    first, second = pair.campaigns
+    errors = {name: abs(result.e_n) for name, result in pair.parameters.items() if result.e_n is not None}
+    worst = max(errors, key=errors.__getitem__, default="")
+    number = f"; largest |E_n| {errors[worst]:.2g} ({worst})" if errors else ""
+    if pair.methods is None:
+        subject = f"before and after the {pair.event} ({first}, {second}; {pair.method})"
+        return (
+            f"{subject}: {_moved(pair)}{number}{_judged_with(pair)}"
+            if errors
+            else f"{subject}: {Undecided.ONE_DAY_EACH}"
+        )
+    subject = f"{pair.methods[0]} ({first}) and {pair.methods[1]} ({second})"
+    if not pair.disagree:
+        return f"{subject} agree within their uncertainties in {', '.join(pair.parameters)}{number}"
+    return f"{subject} disagree in {', '.join(pair.disagree)}{number}"
+
+
+def _moved(pair: AgreementPair) -> str:
+    """The parameters that moved at an event, from which value to which."""
+    moved = [(name, pair.parameters[name]) for name in pair.disagree]
+    undecided = any(result.why_not_decided for result in pair.parameters.values())
+    quiet = "nothing decided" if undecided else "nothing moved beyond the scatter of runs and days"
+    return (
+        ", ".join(f"{name} {result.first:.3g} -> {result.second:.3g} {result.unit}" for name, result in moved)
+        or quiet
+    )
+
+
+def _judged_with(pair: AgreementPair) -> str:
+    """Which other days of the machine said how days differ, and the parameters that nothing is said of."""
+    results = pair.parameters.values()
+    days = max((result.other_days or 0 for result in results), default=0)
+    campaigns = max((result.other_campaigns or 0 for result in results), default=0)
+    lean = [f"{count} other {of}" for count, of in ((days, "days"), (campaigns, "campaigns")) if count]
+    judged = f"; judged with the scatter of {' and '.join(lean)} of the machine" if lean else ""
+    undecided = "".join(
+        f"; {', '.join(names)} {reason}"
+        for reason in (Undecided.DAYS_MAY_DO, Undecided.ONE_DAY_EACH)
+        if (names := [name for name, result in pair.parameters.items() if result.why_not_decided is reason])
+    )
+    return judged + undecided

@@ -1,0 +1,175 @@
+"""The rounds of a search on a chain: effects and suspects in turn, each under the others, and under the noise of
+neighbours that the effects leave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TypeAlias
+
+from monitor.discovery.machine.correlation import Correlation, caution
+from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
+from monitor.discovery.machine.poses import poses_of_rows
+from monitor.discovery.machine.refine import Refined, refine_all
+from monitor.discovery.machine.robot_search import MOST_EFFECTS as MOST_BESIDE_CURVES
+from monitor.discovery.machine.robot_search import search_beside_curves
+from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
+from monitor.discovery.machine.search import search_chain
+from monitor.discovery.machine.suspects import (
+    MOST_BAD_POINTS,
+    SuspectNames,
+    Suspects,
+    find_suspects,
+    with_effects,
+)
+from monitor.discovery.machine.tables import ChainScan
+from monitor.discovery.search.rounds import Turns, in_rounds
+from monitor.discovery.search.scan import MOST_EFFECTS
+from monitor.methods.chain.problem import ChainProblem
+
+# Suspects and effects are found in turn; a campaign that has not settled after so many rounds is reported as it is.
+MOST_ROUNDS = 4
+
+
+class Limit(StrEnum):
+    """What a search has an end of, whatever the data."""
+
+    EFFECTS = "effects"
+    BAD_POINTS = "bad_points"
+    ROUNDS = "rounds"
+
+
+@dataclass(frozen=True)
+class ChainRound:
+    """The findings of a round: ``under`` is the fit with them and the ``suspects``; ``unable`` are those that could not
+    be fitted, ``unfitted`` the families of earlier rounds that could not."""
+
+    scene: ChainScene
+    result: ChainScan
+    refined: Sequence[Refined]
+    suspects: Suspects
+    under: Fit
+    unable: tuple[str, ...] = ()
+    unfitted: tuple[str, ...] = ()
+    limits: tuple[Limit, ...] = ()
+
+    @property
+    def effects(self) -> list[MachineEffect]:
+        """The effects that were found."""
+        return [finding.candidate.effect for finding in self.refined]
+
+
+@dataclass(frozen=True)
+class ChainSearch:
+    """What is searched: the ``variants`` that a problem lacks, at a false discovery rate, with the ``drivers`` that the
+    recorded columns allow, and the ``gross`` readings that are left out whatever is found."""
+
+    problem: ChainProblem
+    variants: Sequence[ChainVariant]
+    drivers: Sequence[str]
+    rate: float
+    gross: Suspects
+
+    def under(self, first: Fit, beside_curves: Suspects | None = None) -> ChainRound:
+        """Search until nothing changes, from a fit that leaves the ``gross`` readings out; beside the curves of joints
+        one that leaves out the suspects so far."""
+        rounds = _Rounds(self, first, beside_curves)
+        latest, settled = in_rounds(rounds, MOST_ROUNDS)
+        if not settled:
+            latest = replace(latest, suspects=rounds.suspects, unfitted=(*rounds.unfitted,))
+        reached = {
+            Limit.EFFECTS: len(latest.refined) >= rounds.most_effects,
+            Limit.BAD_POINTS: len(latest.suspects.bad) >= MOST_BAD_POINTS,
+            Limit.ROUNDS: not settled,
+        }
+        return replace(latest, limits=tuple(limit for limit, is_reached in reached.items() if is_reached))
+
+
+NoiseTurns: TypeAlias = Turns[Correlation | None, ChainRound]
+
+
+class _Rounds:
+    """The rounds of a search on a chain, and the conditions of the present one: suspects, the correlation of neighbours
+    and the families that cannot be fitted."""
+
+    def __init__(self, search: ChainSearch, first: Fit, beside_curves: Suspects | None) -> None:
+        self.search = search
+        self.first = first
+        self.beside_curves = beside_curves is not None
+        self.most_effects = MOST_BESIDE_CURVES if self.beside_curves else MOST_EFFECTS
+        self.initial = self.suspects = search.gross if beside_curves is None else beside_curves
+        self.correlation: Correlation | None = None
+        self.unfitted: dict[str, None] = {}
+        self._noises: NoiseTurns = Turns()
+        self._earlier: Turns[SuspectNames, ChainRound] = Turns()
+
+    def round(self) -> ChainRound:
+        """Search effects under the present suspects and correlation, and fit those that can be."""
+        problem, suspects = self.search.problem, self.suspects
+        out, single = suspects.left_out(problem), suspects.effects(problem)
+        current = self.first
+        if not suspects.same_as(self.initial):
+            current = fit(with_effects(problem, single), out, self.first)
+        scene, result = self._scan(current.with_correlation(self.correlation))
+        refined = refine_all(scene, result.candidates)
+        effects = [finding.candidate.effect for finding in refined]
+        under, without = fit_those_possible(scene.fit.problem, effects, out, scene.fit)
+        unable = tuple(finding.candidate.family for finding in refined if finding.candidate.effect in without)
+        return ChainRound(scene, result, refined, suspects, under, unable, tuple(self.unfitted))
+
+    def judged(self, current: ChainRound) -> ChainRound | None:
+        """Judge what cannot be fitted, the noise of neighbours and, once these have settled, the suspects."""
+        if current.unable:
+            self.unfitted |= dict.fromkeys(current.unable)
+            return None
+        # What all runs share and what the effects explain is no noise of neighbours.
+        following = correlation_under(current.under)
+        circle = self._noises.circle(self.correlation, current, following)
+        if not circle:
+            self.correlation = following
+            return None
+        self.correlation, standing = most_cautious(circle)
+        more = self._suspects_anew(standing, current.scene.fit)
+        if self.beside_curves:
+            # The curves are pursued anew first: bad poses hide lines.
+            return replace(standing, suspects=more)
+        # Suspects that had their turn come again in a circle: what was found under the last ones stands.
+        if self._earlier.circle(self.suspects.names, standing, more.names):
+            return standing
+        self.suspects = more
+        self._noises = Turns()
+        return None
+
+    def _scan(self, under: Fit) -> tuple[ChainScene, ChainScan]:
+        """Search effects under a fit: beside the curves of joints, or those of the whole catalogue."""
+        if self.beside_curves:
+            return search_beside_curves(under, self._able, self.search.rate)
+        return search_chain(scene_of(under, self._able), self.search.drivers, self.search.rate)
+
+    @property
+    def _able(self) -> list[ChainVariant]:
+        """The variants of which nothing speaks against a fit."""
+        return [variant for variant in self.search.variants if variant.family not in self.unfitted]
+
+    def _suspects_anew(self, standing: ChainRound, start: Fit) -> Suspects:
+        """Judge the readings under the effects of a round, again from the ``gross`` ones where others were left out:
+        what looked bad without the effects may be good."""
+        problem, gross, begin = self.search.problem, self.search.gross, standing.under
+        if not self.beside_curves and not self.suspects.same_as(gross):
+            begin, _ = fit_those_possible(problem, standing.effects, gross.left_out(problem), start)
+        same_scene = standing.scene if begin is standing.scene.fit else None
+        return find_suspects(begin, problem, standing.effects, gross, self._able, same_scene)
+
+
+def most_cautious(
+    circle: Sequence[tuple[Correlation | None, ChainRound]],
+) -> tuple[Correlation | None, ChainRound]:
+    """The turn of the most cautious correlation: effects that are found under one may leave another, and so on in a
+    circle."""
+    return max(circle, key=lambda turn: caution(turn[0]))
+
+
+def correlation_under(under: Fit) -> Correlation | None:
+    """The correlation of neighbours under a model; None where readings share their poses and are counted by these."""
+    return under.correlation() if poses_of_rows(under) is None else None

@@ -1,0 +1,183 @@
+"""What a method says of its readings on a chain: its own unknowns, the ends of the chain, which part is measured.
+
+A method says where the two ends of the chain are (``ends``), how they depend on its own unknowns (``by_own``), which
+part of the vector between them a reading measures (``observe``), which calibrated quantities it has besides
+(``extras``), and what such readings can show. ``problem.py`` has what is the same whatever the method measures.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.effects import ChainEffect, Context, Effect
+from monitor.effects.catalogue import of_balls
+from monitor.machine import ChainPose
+from monitor.methods.chain.least_squares import Solution
+from monitor.records import Array
+
+# A wrong sign of an axis fits the readings perfectly with a gain of -2 and mirrored targets. A turn of 0.1 rad or
+# a gain of 100 mm/m is no error of a machine but another machine; real ones stay below a hundredth of that.
+LARGEST_ERROR = 0.1
+# The largest effect that a machine in use is likely to have: 50 µm at the tip, or an angle of 1 mrad. The
+# tolerances of geometric tests of machining centres (ISO 10791-1 to -3) are about 10 µm and 60 µrad. A plan that
+# leaves an uncertainty as large as that says nothing of the effect.
+LARGEST_DISPLACEMENT = 50e-3
+LARGEST_ANGLE = 1e-3
+
+
+@dataclass(frozen=True)
+class MeasuredChain(ABC):
+    """Readings on a chain: n rows, R runs, d numbers a row.
+
+    ``base`` effects are free in every run, ``added`` ones common to all. ``sigma`` (n, d) is the standard
+    uncertainty of each number in mm; infinite where a row has no weight.
+    """
+
+    context: Context
+    base: tuple[Effect, ...]
+    added: tuple[Effect, ...]
+    sigma: Array
+
+    @property
+    @abstractmethod
+    def own_names(self) -> tuple[str, ...]:
+        """Names of a run's q own unknowns, after the coefficients of the base effects."""
+
+    @property
+    @abstractmethod
+    def own_start(self) -> Array:
+        """Where the search for the own unknowns begins (R, q)."""
+
+    @abstractmethod
+    def ends(self, nuisance: Array) -> tuple[Array, Array]:
+        """Points (n, 3) mm at the work end, in the frame of the last work axis, and (n, 3) mm at the tool end, in
+        that of the last tool axis, for own unknowns (R, q). A fresh array each: effects shift the first in place."""
+
+    @abstractmethod
+    def by_own(self, nuisance: Array, pose: ChainPose) -> Array:
+        """Derivatives (n, 3, q) of the vector from the work end to the tool end by the own unknowns."""
+
+    def observe(self, rows: Array) -> Array:
+        """The part (n, d, ...) that is measured of vectors or their derivatives (n, 3, ...): all three components."""
+        return rows
+
+    def as_vectors(self, rows: Array) -> Array:
+        """Residuals (n, d) as the shortest vectors (n, 3) mm in the frame of the last work axis."""
+        if self.components == ("x", "y", "z"):
+            return rows
+        directions = self.observe(np.tile(np.eye(3), (len(self.context), 1, 1)))
+        return np.asarray(np.einsum("nik,nk->ni", np.linalg.pinv(directions), rows))
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the d numbers of a row."""
+        return ("x", "y", "z")
+
+    @property
+    def measured_joints(self) -> tuple[int, ...]:
+        """Indices of the joints whose readings are what is measured; the others stand where the plan says."""
+        return ()
+
+    @property
+    def extra_names(self) -> tuple[str, ...]:
+        """Names of the e calibrated quantities that every run has besides its rows."""
+        return ()
+
+    def extras(self, nuisance: Array) -> tuple[Array, Array]:
+        """Whitened residuals (R, e) of the calibrated quantities and derivatives (R, e, q) by the own unknowns."""
+        return np.zeros((len(self.runs), 0)), np.zeros((len(self.runs), 0, nuisance.shape[1]))
+
+    @property
+    def standard_lengths(self) -> Array:
+        """Change (e,) of each calibrated quantity with a strain of the measurement standard of 1, in the unit that its
+        deviation has as an input of the uncertainty: 0 where no standard expands."""
+        return np.zeros(len(self.extra_names))
+
+    @property
+    def touches_centres(self) -> bool:
+        """Whether a row is the centre of a ball, from touches all around it."""
+        return False
+
+    @property
+    def touch_normals(self) -> Array | None:
+        """Outward normals (n, 3) of the touched surface in the frame of the last work axis; None where a row is no
+        single touch."""
+        return None
+
+    @property
+    def touched_balls(self) -> npt.NDArray[np.bool_]:
+        """Whether (n,) a row is a touch of a ball."""
+        return np.full(len(self.context), self.touches_centres)
+
+    @property
+    def movable(self) -> tuple[str, ...]:
+        """The targets that may come loose and stand elsewhere, each with three coordinates of its own."""
+        return ()
+
+    @property
+    def resting(self) -> tuple[str, ...]:
+        """The targets that no axis moves: what they do is the observer's."""
+        return ()
+
+    @property
+    def moved_together(self) -> Array | None:
+        """The moves (q, s) of the own unknowns that placing all targets anew allows; None where they have no places."""
+        return None
+
+    @property
+    def far_off(self) -> npt.NDArray[np.bool_]:
+        """Rows (n,) that stand too far from the others of their target to be the same one; they have no say."""
+        return np.zeros(len(self.context), dtype=bool)
+
+    @property
+    def target_word(self) -> str:
+        """What a target is called."""
+        return "ball"
+
+    @property
+    def largest_effect(self) -> tuple[float, float]:
+        """Displacement (mm at the tool) and angle (rad) of the largest effect that such a machine is likely to hide."""
+        return LARGEST_DISPLACEMENT, LARGEST_ANGLE
+
+    @property
+    def observes_numbers(self) -> bool:
+        """Whether ``evaluated`` gives the numbers of a row themselves, not vectors of which they are a part."""
+        return False
+
+    def can_show(self, effect: Effect) -> bool:
+        """Whether readings of this kind could show an effect at all, whatever the plan."""
+        return True
+
+    @property
+    def needs_whole_periods(self) -> bool:
+        """Whether a harmonic has to repeat within the travel of its axis to be told apart from what bends once."""
+        return False
+
+    def method_effects(self, drivers: Sequence[str]) -> tuple[str, ...]:
+        """Effects of the catalogue that only such a method can see, with the drivers that the columns allow."""
+        return of_balls(drivers)
+
+    def contradiction(self, solution: Solution) -> str | None:
+        """Why the readings cannot come from this chain, in words; None where they may."""
+        return None
+
+    @property
+    def known_errors(self) -> tuple[tuple[ChainEffect, str], ...]:
+        """Errors of the machine that are own unknowns, because they were measured by other means: effect and name."""
+        return ()
+
+    @property
+    def largest_error(self) -> float:
+        """The location angle (rad) or gain from which on the readings contradict the machine file."""
+        return LARGEST_ERROR
+
+    @cached_property
+    def runs(self) -> npt.NDArray[np.int64]:
+        """The runs' numbers, in order."""
+        return np.unique(self.context.run)

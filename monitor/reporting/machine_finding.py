@@ -1,0 +1,142 @@
+"""What is said of a machine in a few sentences: what its model lacks, what looks wrong in the file, what changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.units import MICROMETRE
+
+
+@dataclass(frozen=True)
+class MissingEffect:
+    """A missing effect as a sentence says it; ``nearest_shape`` where the catalogue does not have its shape, ``others``
+    the effects that no data of this plan tell from it."""
+
+    effect: str
+    meaning: str
+    nearest_shape: str | None
+    varies: bool
+    others: Sequence[str]
+
+
+@dataclass(frozen=True)
+class MistakeFound:
+    """A likely mistake of the file, and the RMS in mm with it (not finite where the readings fit no machine) and
+    without."""
+
+    what: str
+    rms_as_recorded: float
+    rms_undone: float
+
+
+@dataclass(frozen=True)
+class Move:
+    """A target that moved, or a parameter that stepped, at a run."""
+
+    subject: str
+    stepped: bool
+    size: float
+    unit: str
+    run: int
+
+
+@dataclass(frozen=True)
+class MachineFinding:
+    """What an explanation has found: whether the model explains the measurements, what it lacks, how many bad points
+    were left out, what moved, at which ends of the search (``limits``) more may be there, and whether more is left than
+    any effect leaves (``hopeless``). Where the file looks wrong, ``mistakes`` says how."""
+
+    explained: bool
+    missing: Sequence[MissingEffect]
+    bad_points: int
+    moves: Sequence[Move]
+    limits: Sequence[str]
+    most_bad_points: int
+    unfitted: Sequence[str]
+    hopeless: bool
+    mistakes: Sequence[MistakeFound]
+
+
+# What is said first where more is left than any effect leaves, and no simple exchange brings it down.
+GROSS = (
+    "More is left than the effects of a machine leave: look first for exchanged columns or targets, a wrong sign or "
+    "unit, or the geometry in campaign.toml; of the simple mistakes that were tried none alone explains it. "
+)
+# What is said where the search ended at a limit, by its kind.
+LIMITS = {
+    "effects": (
+        "The search ended at the most effects that it looks for: more may be missing; add these to the model and "
+        "look again."
+    ),
+    "bad_points": "The search for bad points ended at {most}: there may be more.",
+    "rounds": (
+        "Effects and bad points had not settled when the search ended: look again with these effects in the model."
+    ),
+}
+ONE_RUN = (
+    "one run cannot show what varies from run to run, what stepped between runs, or how well a reading repeats; "
+    "measure the same plan again"
+)
+
+
+def machine_sentences(finding: MachineFinding) -> str:
+    """The finding in one or two sentences, for people who look rather than read."""
+    if finding.mistakes:
+        return (
+            mistake_sentence(finding.mistakes)
+            + " Nothing was changed, and no effect was looked for: correct the file first."
+        )
+    sentences = _missing_sentences(finding)
+    if finding.bad_points:
+        sentences.append(
+            f"{finding.bad_points} bad point{'s were' if finding.bad_points > 1 else ' was'} left out."
+        )
+    for move in finding.moves:
+        verb = "stepped" if move.stepped else "moved"
+        sentences.append(f"{move.subject} {verb} by {move.size:.1f} {move.unit} at run {move.run}.")
+    sentences += [LIMITS[limit].format(most=finding.most_bad_points) for limit in finding.limits]
+    if finding.unfitted:
+        sentences.append(
+            f"Could not be fitted and {'was' if len(finding.unfitted) == 1 else 'were'} skipped: "
+            f"{', '.join(finding.unfitted)}."
+        )
+    return (GROSS if finding.hopeless else "") + " ".join(sentences)
+
+
+def _missing_sentences(finding: MachineFinding) -> list[str]:
+    if not finding.missing:
+        return [
+            "Nothing is missing that this plan can see."
+            if finding.explained
+            else "The model does not explain the measurements, but no effect of the catalogue explains more."
+        ]
+    first = finding.missing[0]
+    sentences = [f"The model lacks {first.effect}: {first.meaning}."]
+    if first.nearest_shape is not None:
+        sentences.append(f"The catalogue does not have its shape; {first.nearest_shape} comes nearest.")
+        if len(finding.missing) > 1:
+            sentences.append("The other effects hold whatever its shape is.")
+    if first.varies:
+        sentences.append("It varies from run to run and no recorded column follows it.")
+    if first.others:
+        sentences.append(f"These data cannot tell it apart from {', '.join(first.others)}.")
+    return sentences
+
+
+def mistake_sentence(mistakes: Sequence[MistakeFound]) -> str:
+    """What looks wrong in the file, in one sentence."""
+    first = mistakes[0]
+    ways = " or ".join(mistake.what for mistake in mistakes)
+    before = (
+        f"residual {_length(first.rms_as_recorded)} as recorded"
+        if np.isfinite(first.rms_as_recorded)
+        else "as recorded the readings fit no machine of this file"
+    )
+    return f"It looks as if {ways}: {before}, residual {_length(first.rms_undone)} with that undone."
+
+
+def _length(mm: float) -> str:
+    return f"{mm:.2g} mm" if mm >= 0.1 else f"{MICROMETRE.to_display(mm):.2g} µm"

@@ -1,0 +1,251 @@
+"""The queries of the sums over the fleet, each a table that the next ones read: groups of runs, blocks of these, sums.
+
+``fleet.py`` says what is summed and why so.
+"""
+
+from __future__ import annotations
+
+from monitor.store.events import NOTE
+
+MACHINES = """
+CREATE OR REPLACE TEMP TABLE fleet_machine AS
+SELECT machine, row_number() OVER (ORDER BY machine) - 1 AS machine_no FROM machine
+"""
+
+# Identifications that hold the same parameters, and the numbers of those among all, told apart once for the fleet.
+HEADINGS = """
+CREATE OR REPLACE TEMP TABLE fleet_heading AS
+WITH heading AS (
+    -- As one text: lists of texts are compared at twice the cost.
+    SELECT any_value(parameters) AS parameters, list(identification_id) AS identifications
+    FROM identification GROUP BY array_to_string(parameters, chr(31))
+), every AS (
+    SELECT list_sort(list_distinct(flatten(list(parameters)))) AS names FROM heading
+)
+SELECT row_number() OVER () AS heading, parameters, identifications,
+       list_transform(parameters, lambda parameter: list_position(names, parameter)) AS numbers
+FROM heading, every
+"""
+
+# Models of single machines, by campaign, and the latest version of each method's own: few rows both.
+MODELS = """
+CREATE OR REPLACE TEMP TABLE fleet_model AS
+SELECT c.campaign_id, m.method, m.model, m.model_version FROM v_machine_models AS m JOIN campaign AS c USING (machine)
+"""
+
+OWN = """
+CREATE OR REPLACE TEMP TABLE fleet_own AS
+SELECT model, max(version) AS version FROM model
+WHERE model IN (SELECT model FROM model WHERE version = 1 AND parent IS NULL) GROUP BY model
+"""
+
+CHOSEN = """
+CREATE OR REPLACE TEMP TABLE fleet_chosen AS
+WITH latest AS (
+    -- Of each campaign the identification with the most runs, the later of two: what load_identification takes.
+    SELECT campaign_id, max((CAST(run_count AS BIGINT) << 32) | identification_id) & 4294967295 AS identification_id
+    FROM identification
+    LEFT JOIN fleet_model AS f USING (campaign_id, method)
+    LEFT JOIN fleet_own AS o ON o.model = identification.method
+    WHERE CASE WHEN $model IS NULL
+          -- That which the machine is followed by, else the latest version of the method's own.
+          THEN identification.model = coalesce(f.model, identification.method)
+               AND identification.model_version = coalesce(f.model_version, o.version, identification.model_version)
+          ELSE identification.model = $model AND ($version IS NULL OR identification.model_version = $version) END
+    GROUP BY campaign_id
+), span AS (
+    SELECT campaign_id, min(day) <> max(day) AS several_days, epoch(min(started_at)) / 86400.0 AS began_d
+    FROM run GROUP BY campaign_id
+)
+SELECT CAST(l.identification_id AS INTEGER) AS identification_id, l.campaign_id, n.machine_no, h.heading,
+       s.several_days, s.began_d
+FROM latest AS l
+JOIN campaign AS c ON c.campaign_id = l.campaign_id
+JOIN span AS s ON s.campaign_id = l.campaign_id
+JOIN fleet_machine AS n USING (machine)
+JOIN (SELECT heading, unnest(identifications) AS identification_id FROM fleet_heading) AS h USING (identification_id)
+"""
+
+# A group is a campaign, or a day of a campaign that has several: `places` are then its runs among those identified.
+GROUPS = """
+CREATE OR REPLACE TEMP TABLE fleet_group AS
+SELECT identification_id, machine_no, heading, began_d, CAST(NULL AS BIGINT[]) AS places
+FROM fleet_chosen WHERE NOT several_days
+UNION ALL
+SELECT identification_id, machine_no, heading, epoch(min(started_at)) / 86400.0,
+       coalesce(list(place) FILTER (place IS NOT NULL), [])
+FROM (
+    SELECT c.identification_id, c.machine_no, c.heading, r.day, r.started_at, list_position(v.runs, r.run) AS place
+    FROM fleet_chosen AS c JOIN run AS r USING (campaign_id) JOIN identified_values AS v USING (identification_id)
+    WHERE c.several_days
+)
+GROUP BY identification_id, machine_no, heading, day
+"""
+
+# A recorded event splits the history of a machine, as in `monitor trend`: groups that began before the last event count
+# no more. An event after the last group splits nothing yet, a note never.
+SINCE = f"""
+CREATE OR REPLACE TEMP TABLE fleet_since AS
+WITH happened AS (
+    SELECT machine_no, epoch(happened_at) / 86400.0 AS at_d FROM event JOIN fleet_machine USING (machine)
+    WHERE kind <> '{NOTE}'
+), last AS (
+    SELECT machine_no, max(began_d) AS last_d FROM fleet_group SEMI JOIN happened USING (machine_no) GROUP BY machine_no
+)
+SELECT machine_no, max(at_d) AS since_d FROM happened JOIN last USING (machine_no) WHERE at_d <= last_d
+GROUP BY machine_no
+"""
+
+ENDED = """
+DELETE FROM fleet_group USING fleet_since
+WHERE fleet_group.machine_no = fleet_since.machine_no AND fleet_group.began_d < fleet_since.since_d
+"""
+
+# The history of a machine is cut into blocks of equal time, as that of a parameter in `monitor trend`: from the number
+# of
+# groups to their number, and from the time of a group to its block.
+BLOCKS = """
+CREATE OR REPLACE TEMP TABLE fleet_blocked AS
+WITH span AS (
+    SELECT machine_no, min(began_d) AS first_d, max(began_d) AS last_d, count(*) AS k
+    FROM fleet_group GROUP BY machine_no
+), cut AS (
+    SELECT machine_no, first_d, greatest(last_d - first_d, 1e-300) AS span_d,
+           CASE WHEN k <= $whole THEN k ELSE least(greatest(k // $each, $whole), $most) END AS blocks
+    FROM span
+)
+SELECT g.*, CAST(least(floor((began_d - first_d) / span_d * blocks), blocks - 1) AS UTINYINT) AS block
+FROM fleet_group AS g JOIN cut USING (machine_no)
+"""
+
+# A cell is a machine and a parameter: its number is made of both.
+PARAMETER_BITS = 20
+# And of a cell and a block.
+BLOCK_BITS = 6
+
+# The values of every cell in some groups, a list each. The outer join keeps the values on the side that is only read:
+# a hash table of them would be most of the time and memory.
+LISTS = f"""
+SELECT (machine_no << {PARAMETER_BITS}) | k AS cell, (cell << {BLOCK_BITS}) | block AS cb, began_d,
+       CASE WHEN places IS NULL THEN x ELSE list_select(x, places) END AS x
+FROM (
+    SELECT g.machine_no, g.began_d, g.places, g.block, unnest(h.numbers) AS k, unnest(v.value) AS x
+    FROM identified_values AS v JOIN {{groups}} AS g USING (identification_id)
+    LEFT JOIN fleet_heading AS h USING (heading)
+)
+"""
+
+# The last day of each machine: of every parameter what it found.
+LATEST = f"""
+CREATE OR REPLACE TEMP TABLE fleet_latest AS
+WITH last AS (
+    SELECT *, 0 AS block FROM fleet_group
+    SEMI JOIN (SELECT machine_no, max(began_d) AS began_d FROM fleet_group GROUP BY machine_no)
+    USING (machine_no, began_d)
+    QUALIFY row_number() OVER (PARTITION BY machine_no ORDER BY identification_id DESC) = 1
+)
+{LISTS.format(groups="last")}
+"""
+
+# Every machine has an origin for every parameter: a value of its first campaign, else one of its last day.
+ORIGINS = f"""
+CREATE OR REPLACE TEMP TABLE fleet_origin AS
+WITH earliest AS (
+    SELECT *, NULL AS places, 0 AS block FROM fleet_chosen
+    WHERE identification_id IN (SELECT min(identification_id) FROM fleet_chosen GROUP BY machine_no)
+), first AS ({LISTS.format(groups="earliest")})
+SELECT cell, coalesce(list_any_value(f.x), list_any_value(l.x), 0.0) AS origin
+FROM (
+    SELECT (machine_no << {PARAMETER_BITS}) | k AS cell
+    FROM fleet_machine CROSS JOIN (SELECT DISTINCT unnest(numbers) AS k FROM fleet_heading)
+)
+LEFT JOIN first AS f USING (cell)
+LEFT JOIN fleet_latest AS l USING (cell)
+"""
+
+# A row for each cell, block and number of runs in a group: what depends on that number alone is worked out afterwards.
+PARTS = f"""
+CREATE OR REPLACE TEMP TABLE fleet_part AS
+SELECT cb, n, count(*) AS k, sum(v) AS v, min(v) AS least, sum(ln(CASE WHEN v > 0.0 THEN v END)) AS logs,
+       sum(t) AS t, sum(t * t) AS tt, sum(m) AS m, sum(m * m) AS mm, sum(m * t) AS tm,
+       sum(v * v) AS vv
+FROM (
+    SELECT cb, t, list_count(d) AS n, list_avg(d) AS m, list_var_pop(d) AS v
+    FROM (
+        SELECT cb, began_d - $epoch_d AS t, list_transform(x, lambda value: value - origin) AS d
+        FROM ({LISTS.format(groups="fleet_blocked")}) JOIN fleet_origin USING (cell)
+    )
+)
+GROUP BY cb, n
+"""
+
+TOGETHER = f"""
+WITH shown AS (
+    SELECT k, parameter, first(unit) AS unit, first(factor) AS factor
+    FROM (
+        SELECT unnest(h.numbers) AS k, unnest(h.parameters) AS parameter, unnest(i.units) AS unit,
+               unnest(i.display_factors) AS factor
+        FROM identification AS i JOIN fleet_heading AS h ON i.identification_id = h.identifications[1]
+    )
+    GROUP BY k, parameter
+), latest AS (
+    SELECT cell, began_d AS last_d, list_count(x) AS latest_n,
+           list_avg(list_transform(x, lambda value: value - origin)) AS latest
+    FROM fleet_latest JOIN fleet_origin USING (cell)
+), part AS (
+    SELECT cb >> {BLOCK_BITS} AS cell, n, sum(k) AS k, sum(v) AS v, min(least) AS least, sum(logs) AS logs, sum(t) AS
+    t,
+           sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm, sum(vv) AS vv
+    -- Groups in which a parameter was refused in every run have no part in it.
+    FROM fleet_part WHERE n > 0 GROUP BY cell, n
+), summed AS (
+    SELECT cell, sum(k) AS k, sum(k * n) AS n, sum(n * m) AS s, sum(n * mm) AS q, sum(n * v) AS ss,
+           coalesce(sum(k) FILTER (n > 1), 0) AS repeated,
+           coalesce(min(least * n / (n - 1)) FILTER (n > 1), 0.0) AS least,
+           coalesce(sum((n - 1) * (logs + k * ln(n / (n - 1)))) FILTER (n > 1), 0.0) AS logs,
+           coalesce(sum(k / (n - 1)) FILTER (n > 1), 0.0) AS inverse,
+           sum(t) AS t, sum(tt) AS tt, sum(m) AS m, sum(mm) AS mm, sum(tm) AS tm,
+           -- Of the groups with several runs, whose variances are v n / (n - 1).
+           coalesce(sum(k * n) FILTER (n > 1), 0) AS runs_rep, coalesce(sum(n * m) FILTER (n > 1), 0.0) AS offset_rep,
+           coalesce(sum(n * mm) FILTER (n > 1), 0.0) AS squares_rep,
+           coalesce(sum(v * n / (n - 1)) FILTER (n > 1), 0.0) AS s2,
+           coalesce(sum(v * n * n / (n - 1)) FILTER (n > 1), 0.0) AS s2_runs,
+           coalesce(sum(vv * n * n / ((n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4,
+           coalesce(sum(vv * n * n * n / ((n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4_runs,
+           coalesce(sum(vv * n * n / ((n - 1) * (n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4_dof,
+           coalesce(sum(vv * n * n * n / ((n - 1) * (n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4_dof_runs,
+           coalesce(sum(vv * n * n * n * n / ((n - 1) * (n - 1) * (n - 1))) FILTER (n > 1), 0.0) AS s4_dof_runs_squared
+    FROM part GROUP BY cell
+)
+SELECT m.machine, s.parameter, s.unit, s.factor, o.origin, p.*,
+       CASE WHEN l.latest_n > 0 THEN l.last_d ELSE 'nan' END AS last_d, coalesce(l.latest, 'nan') AS latest,
+       coalesce(l.latest_n, 0) AS latest_n, coalesce(e.since_d, 'nan') AS since_d
+FROM summed AS p
+JOIN fleet_machine AS m ON m.machine_no = p.cell >> {PARAMETER_BITS}
+JOIN fleet_origin AS o USING (cell)
+LEFT JOIN latest AS l USING (cell)
+LEFT JOIN fleet_since AS e ON e.machine_no = m.machine_no
+JOIN shown AS s ON s.k = p.cell & ((1 << {PARAMETER_BITS}) - 1)
+ORDER BY m.machine, s.parameter
+"""
+
+# The blocks of every cell: how many groups, and their mean times and values about the origin.
+OF_BLOCKS = f"""
+SELECT cb >> {BLOCK_BITS} AS cell, cb & ((1 << {BLOCK_BITS}) - 1) AS block, CAST(sum(k) AS DOUBLE) AS k, sum(t) /
+sum(k) AS t, sum(m) / sum(k) AS m
+FROM fleet_part WHERE n > 0 GROUP BY cb
+"""
+
+TABLES = (
+    "machine",
+    "heading",
+    "model",
+    "own",
+    "chosen",
+    "group",
+    "blocked",
+    "since",
+    "latest",
+    "origin",
+    "part",
+)

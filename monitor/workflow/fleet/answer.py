@@ -1,0 +1,79 @@
+"""What needs attention in a fleet: the most urgent rows, and how many of all, by kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from monitor.documents import OMITTED
+from monitor.workflow.history.weekly_looks import WeeklyNotices
+
+
+class Attention(StrEnum):
+    """Why a parameter needs attention, the most urgent first; the last is of a limit of the volumetric error."""
+
+    OUT = "out of tolerance"
+    DRIFTS_OUT = "drifts out of tolerance within a year"
+    STANDS_OUT = "the latest day stands out"
+    DRIFTS = "drifts"
+    DAYS_DIFFER = "days differ much more than runs"
+    AS_USUAL = "as usual"
+    ONE_DAY = "one day only, nothing to compare it with"
+    UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
+
+
+#: The classes by their number.
+ATTENTION = tuple(Attention)
+
+
+@dataclass(frozen=True)
+class FleetTableRow:
+    """A parameter of a machine: why it needs attention, the tests of its days, its drift, its latest day."""
+
+    rank: int
+    machine: str
+    parameter: str
+    attention: Attention
+    unit: str
+    n: int
+    days: int
+    mean: float | None
+    sd_all: float | None
+    sd_pooled: float | None
+    between_days: float | None
+    bartlett: float | None
+    bartlett_p: float | None
+    bartlett_q: float | None
+    anova_f: float | None
+    anova_p: float | None
+    anova_q: float | None
+    slope_per_year: float | None
+    u_slope: float | None
+    slope_widening: float | None
+    drift_p: float | None
+    drift_q: float | None
+    latest: float | None
+    latest_at: str | None
+    since: str | None
+    limit: float | None
+    years_to_limit: float | None
+
+
+@dataclass(frozen=True)
+class FleetAnswer:
+    """The most urgent rows of ``rows``, and how many of all need attention, by kind.
+
+    ``not_identified`` are campaigns without numbers under the model that their machine is followed by: they have no
+    part in it. ``tolerances_of_type`` names the machine type by machine, where its campaign states no tolerances.
+    """
+
+    machines: int
+    rows: int
+    values: int
+    false_discovery_rate: float
+    attention: Mapping[str, int]
+    not_identified: tuple[str, ...]
+    table: tuple[FleetTableRow, ...]
+    weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
+    tolerances_of_type: Mapping[str, str] | None = field(default=None, metadata=OMITTED)

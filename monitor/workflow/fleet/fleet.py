@@ -1,0 +1,143 @@
+"""All machines at once: what needs attention, ranked. The rows stay in the database; only sums come out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Array
+from monitor.statistics import control_false_discoveries
+from monitor.statistics.sufficient import CellDrift, CellTests
+from monitor.store import (
+    Database,
+    FleetSums,
+    fleet_sums,
+    latest_tolerances,
+    not_identified,
+    tolerance_types,
+)
+from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.fleet.answer import ATTENTION, FleetAnswer, FleetTableRow
+from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked
+from monitor.workflow.fleet.request import FleetRequest
+from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows
+from monitor.workflow.history.weekly_looks import weekly_notices
+from monitor.workflow.models import resolve
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Every machine and parameter: its sums, tests and q-values, the limit, its class (``kind``), the measure within
+    that, and the years to the limit."""
+
+    sums: FleetSums
+    cells: CellTests
+    drift: CellDrift
+    q_values: Mapping[str, Array]
+    limit: Array
+    kind: npt.NDArray[np.int64]
+    measure: Array
+    years: Array
+
+    @property
+    def order(self) -> npt.NDArray[np.int64]:
+        """The most urgent first."""
+        return np.lexsort((self.sums.parameter, self.sums.machine, -self.measure, self.kind))
+
+    def row(self, index: int) -> FleetTableRow:
+        """One of them as a row without a rank."""
+        return FleetTableRow(
+            rank=0,
+            machine=str(self.sums.machine[index]),
+            parameter=str(self.sums.parameter[index]),
+            attention=ATTENTION[int(self.kind[index])],
+            unit=str(self.sums.unit[index]),
+            n=int(self.sums.runs[index]),
+            days=int(self.sums.groups[index]),
+            mean=float(self.sums.origin[index] + self.cells.mean[index]),
+            sd_all=_number(self.cells.sd_all[index]),
+            sd_pooled=_number(self.cells.sd_pooled[index]),
+            between_days=_number(self.cells.between[index]),
+            bartlett=_number(self.cells.bartlett[index]),
+            bartlett_p=_number(self.cells.bartlett_p[index]),
+            bartlett_q=_number(self.q_values["bartlett"][index]),
+            anova_f=_number(self.cells.anova_f[index]),
+            anova_p=_number(self.cells.anova_p[index]),
+            anova_q=_number(self.q_values["anova"][index]),
+            slope_per_year=_number(self.drift.slope[index] * DAYS_PER_YEAR),
+            u_slope=_number(self.drift.u[index] * DAYS_PER_YEAR),
+            slope_widening=_number(self.drift.widening[index]),
+            drift_p=_number(self.drift.p_value[index]),
+            drift_q=_number(self.q_values["drift"][index]),
+            latest=_number(self.sums.origin[index] + self.sums.latest[index]),
+            latest_at=_date(float(self.sums.last_d[index])),
+            since=_date(float(self.sums.since_d[index])),
+            limit=_number(self.limit[index]),
+            years_to_limit=_number(self.years[index]) if self.kind[index] == 1 else None,
+        )
+
+
+def fleet(db: Database, request: FleetRequest) -> FleetAnswer:
+    """Every machine and parameter of one model, the most urgent first.
+
+    Raises NotFoundError where nothing was identified.
+    """
+    cells = _cells_of(db, request.model)
+    sums, most = cells.sums, request.top or None
+    volumetric = volumetric_rows(db, set(sums.machine.tolist()))
+    measured = [(cells.row(index), float(cells.measure[index])) for index in cells.order[:most]]
+    measured += [(row, share_of_limit(row)) for row in volumetric]
+    measured.sort(
+        key=lambda pair: (ATTENTION.index(pair[0].attention), -pair[1], pair[0].machine, pair[0].parameter)
+    )
+    return FleetAnswer(
+        machines=len(np.unique(sums.machine)),
+        rows=len(sums.machine) + len(volumetric),
+        values=int(sums.runs.sum()),
+        false_discovery_rate=RATE,
+        attention={
+            label: int((cells.kind == number).sum()) + sum(row.attention is label for row in volumetric)
+            for number, label in enumerate(ATTENTION)
+        },
+        not_identified=not_identified(db) if request.model is None else (),
+        table=tuple(replace(row, rank=rank) for rank, (row, _) in enumerate(measured[:most], start=1)),
+        weekly_looks=weekly_notices(db) if request.weekly_looks else None,
+        tolerances_of_type=tolerance_types(db) or None,
+    )
+
+
+def _cells_of(db: Database, model: str | None) -> _Cells:
+    """Every machine and parameter under a model, tested and ranked."""
+    stored = None if model is None else resolve(db, model)
+    name, version = (None, None) if stored is None else (stored.name, stored.version)
+    sums = fleet_sums(db, name, version, cut=CUT)
+    cells, drift = cell_tests(sums)
+    limit = _limits(db, sums)
+    tests = {"anova": means_p(sums), "bartlett": cells.bartlett_p, "drift": drift.p_value}
+    q_values = {
+        test: control_false_discoveries(p_values, rate=RATE).q_value for test, p_values in tests.items()
+    }
+    return _Cells(sums, cells, drift, q_values, limit, *ranked(sums, cells, drift, q_values["drift"], limit))
+
+
+def _limits(db: Database, sums: FleetSums) -> Array:
+    """Limit of the absolute value of each cell by the machine's latest campaign; NaN where none is stated."""
+    stated = latest_tolerances(db)
+    keys = zip(sums.machine.tolist(), sums.parameter.tolist(), strict=True)
+    return np.array([stated.get(key, np.nan) for key in keys])
+
+
+def _date(days: float) -> str | None:
+    return (
+        None
+        if not np.isfinite(days)
+        else (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(days=days)).isoformat()
+    )
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,113 @@
+"""The tests of every machine and parameter from its sums, and how urgent what they say is."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Array
+from monitor.statistics.block_lines import DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS, Blocks
+from monitor.statistics.means import VarianceMoments, brown_forsythe_from_moments
+from monitor.statistics.sufficient import (
+    CellDrift,
+    CellTests,
+    GroupSums,
+    cells_from_sums,
+    drift_from_sums,
+    drift_in_blocks,
+)
+from monitor.store import BlockCut, FleetSums
+from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.history.drift import SHORTEST_DAYS
+
+#: How histories are cut into blocks: as those of `monitor trend`.
+CUT = BlockCut(DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS)
+#: A drift that reaches the limit within so many years needs attention now.
+SOON_YEARS = 1.0
+#: False discovery rate over all machines and parameters.
+RATE = 0.05
+#: Days of one machine usually differ: they need attention where they scatter so much more than runs.
+DAYS_OVER_RUNS = 3.0
+#: Fewer days than this make a difference, not a drift.
+FEWEST_DAYS = 5
+#: The latest day stands out where it lies so many standard deviations of the days from their mean, with so many days.
+STANDS_OUT, FEWEST_TO_STAND_OUT = 3.0, 6.0
+
+
+def cell_tests(sums: FleetSums) -> tuple[CellTests, CellDrift]:
+    """Bartlett, ANOVA and drift (a day) of every machine and parameter from its sums."""
+    cells = cells_from_sums(
+        GroupSums(
+            sums.groups, sums.runs, sums.offset, sums.squares, sums.within, sums.repeated, sums.least_variance,
+            sums.log_variances, sums.inverse_dof,
+        )
+    )  # fmt: skip
+    drift = drift_from_sums(sums.groups, sums.sum_t, sums.sum_tt, sums.sum_m, sums.sum_mm, sums.sum_tm)
+    blocks = Blocks(sums.blocks.groups, sums.blocks.t, sums.blocks.m, sums.groups)
+    return cells, _without_short_histories(sums, drift_in_blocks(drift, blocks, cycle=DAYS_PER_YEAR))
+
+
+def means_p(sums: FleetSums) -> Array:
+    """Return p-values (c,) of equal means of the days, whatever their scatter: Brown and Forsythe's test."""
+    repeated = sums.repeated_sums
+    with np.errstate(divide="ignore", invalid="ignore"):
+        between = np.maximum(repeated.squares - repeated.offset**2 / repeated.runs, 0.0)
+    moments = VarianceMoments(
+        groups=sums.repeated, runs=repeated.runs, between=between, first=repeated.s2,
+        first_runs=repeated.s2_runs, second=repeated.s4, second_runs=repeated.s4_runs, by_dof=repeated.s4_dof,
+    )  # fmt: skip
+    return brown_forsythe_from_moments(moments)[3]
+
+
+def _without_short_histories(sums: FleetSums, drift: CellDrift) -> CellDrift:
+    """No slope a year from less than ``SHORTEST_DAYS``: evenly spread days have a standard deviation of their span
+    over the root of 12."""
+    mean = sums.sum_t / sums.groups
+    spread = np.sqrt(np.maximum(sums.sum_tt / sums.groups - mean**2, 0.0))
+    short = spread < SHORTEST_DAYS / np.sqrt(12.0)
+    columns = (drift.slope, drift.u, drift.p_value, drift.widening)
+    return CellDrift(*(np.where(short, np.nan, values) for values in columns))
+
+
+def _level(sums: FleetSums, drift: CellDrift) -> Array:
+    """Where the line of each cell is on the last day, from which trend page and report forecast, too.
+
+    The mean of that day alone scatters as runs and days do, and so would the day on which the limit is reached.
+    """
+    ahead = sums.last_d - sums.epoch_d - sums.sum_t / sums.groups
+    return np.asarray(sums.origin + sums.sum_m / sums.groups + drift.slope * ahead)
+
+
+def ranked(
+    sums: FleetSums, cells: CellTests, drift: CellDrift, drift_q: Array, limit: Array
+) -> tuple[npt.NDArray[np.int64], Array, Array]:
+    """Class of each cell (0 is the most urgent), its measure within the class (larger first), years to the limit."""
+    latest = sums.origin + sums.latest
+    share = np.abs(latest) / limit
+    per_year = drift.slope * DAYS_PER_YEAR
+    with np.errstate(divide="ignore", invalid="ignore"):
+        years = (np.where(per_year >= 0.0, limit, -limit) - _level(sums, drift)) / per_year
+        # Against the other days: the latest one is taken out of their mean.
+        k = sums.groups
+        others = (sums.sum_m - sums.latest) / (k - 1.0)
+        squares = sums.sum_mm - sums.latest**2 - (k - 1.0) * others**2
+        variance = np.maximum(squares, 0.0) / (k - 2.0) * (1.0 + 1.0 / (k - 1.0))
+        # A day of few runs after days of many: what the mean of its runs scatters more than theirs do.
+        fewer = 1.0 / sums.latest_runs - (k - 1.0) / (sums.runs - sums.latest_runs)
+        sd = np.sqrt(variance + np.nan_to_num(cells.sd_pooled) ** 2 * np.maximum(fewer, 0.0))
+        z = np.abs(sums.latest - others) / np.where(k >= FEWEST_TO_STAND_OUT, sd, np.nan)
+        ratio = cells.between / cells.sd_pooled
+        steepness = np.abs(drift.slope / drift.u)
+    drifting = (drift_q < RATE) & (sums.groups >= FEWEST_DAYS)
+    kind = np.where(sums.groups < 2.0, 6, 5)
+    measure = np.nan_to_num(ratio, nan=0.0, posinf=0.0)
+    for number, holds, size in (
+        (4, ratio > DAYS_OVER_RUNS, ratio),
+        (3, drifting, steepness),
+        (2, z > STANDS_OUT, z),
+        (1, drifting & (years >= 0.0) & (years < SOON_YEARS), -years),
+        (0, share >= 1.0, share),
+    ):
+        mask = np.asarray(holds, dtype=np.bool_)
+        kind[mask], measure[mask] = number, np.nan_to_num(size)[mask]
+    return kind, measure, years
