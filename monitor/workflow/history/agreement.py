@@ -28,8 +28,9 @@ NOT_DECIDED = (
 
 #: Why nothing is said of what independent days of one scatter do not explain and other days do.
 DAYS_MAY_DO = (
-    "not decided: more than independent days that scatter alike explain, but days that follow each other, or that "
-    "scatter differently on the two sides, may do as much; more days on each side or further campaigns decide it"
+    "not decided: more than independent days that scatter alike explain, but days that follow each other, a side whose "
+    "days scatter more, or campaigns that differ by more than their days may do as much; more days on each side or "
+    "further campaigns decide it"
 )
 
 
@@ -51,7 +52,7 @@ class ParameterAgreement:
     ``e_n`` are None where nothing is known of the days, and ``why_not_decided`` says what would decide it: ``expanded``
     is then of runs alone. ``expanded`` and ``e_n`` are for independent days of one scatter; ``agree`` is None, too,
     where the difference is larger than ``expanded`` and no larger than ``expanded_cautious``, for days that follow each
-    other or sides that scatter differently.
+    other, sides that scatter differently, or campaigns that differ by more than their days.
     """
 
     unit: str
