@@ -256,3 +256,21 @@ def test_refusals_say_what_is_needed():
         find_changes({"a": np.arange(6.0)}, np.arange(6.0), u={"b": np.ones(6)}, rng=rng)
     with pytest.raises(DataError, match="values holds no parameter"):
         find_changes({}, np.arange(6.0), rng=rng)
+
+
+def test_a_part_of_a_yearly_wave_of_one_scatter_is_no_change_and_a_step_of_six_is(rate_at_most):
+    rng = np.random.default_rng(14)
+    t = 7.0 * np.arange(34)
+    called = plain = seen = 0
+    for _ in range(120):
+        y = rng.normal(size=len(t)) + np.cos(2.0 * np.pi * (t / 365.25 + rng.uniform()))
+        shifted = rng.normal(size=len(t)) + 6.0 * (t > 120.0)
+        for values, cycle in ((y, 365.25), (y, None), (shifted, 365.25)):
+            history = find_changes({"a": values}, t, rng=rng, cycle=cycle, false_alarm=0.01)
+            hit = bool(history.changes or history.trends)
+            called += hit and values is y and cycle is not None
+            plain += hit and cycle is None
+            seen += hit and values is shifted
+    assert rate_at_most(called, 120, 0.015)
+    assert plain / 120 > 0.1
+    assert seen / 120 > 0.9
