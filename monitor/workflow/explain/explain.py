@@ -32,6 +32,7 @@ from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAns
 from monitor.workflow.explain.machine_answer import machine_explanation
 from monitor.workflow.explain.machine_sentences import is_hopeless, mistake_sentence
 from monitor.workflow.explain.request import RATE, ExplainRequest
+from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve_for, subject_of
@@ -61,7 +62,7 @@ def explanation_of(
     def maker(changed: Campaign) -> ChainProblem:
         return machine_problem(changed, model)
 
-    mistakes = find_other_names(campaign, maker, robust)
+    mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
     if not mistakes and is_gross(campaign, first):
         mistakes = find_mistakes(campaign, maker, first)
     if mistakes:
