@@ -63,6 +63,7 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
             _statements,
             _temperatures,
             _days,
+            _to_come,
         )
         for sentence in check(campaign)
     )
