@@ -169,7 +169,7 @@ def test_table_6_no_height_of_the_side_rows_explains_dy_ca(simulator, layout, mo
 
 @pytest.mark.slow
 def test_table_6_rows_at_60_mm_give_dy_ca_and_lose_dx_ay(simulator, monkeypatch):
-    """docs/rotary-probing.md: all of Table 6 but dx_AY fits rows low on the sides, dx_AY alone asks for 170 mm or more."""
+    """docs/rotary-probing.md: all but dx_AY fits rows low on the sides, dx_AY alone asks for 170 mm or more."""
     monkeypatch.setattr(sys.modules[__name__], "RUNS", 1000)
     low = Layout(simulator, 60.0)
     parts = low.contributions(np.random.default_rng(6), 2.0, 2.0).values()

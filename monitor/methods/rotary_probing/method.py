@@ -43,8 +43,9 @@ def refuse(campaign: Campaign, problem: ChainProblem) -> None:
 
 def _what_would_be_right(problem: ChainProblem, reading: GrossReading) -> str:
     """Where a wrong touch stands in the file, and the reading that the other touches of its point ask for."""
-    joint = problem.context.chain.index(reading.axis.upper())
-    typed = float(problem.context.positions[reading.row, joint])
+    chain = problem.context.chain
+    joint = chain.index(reading.axis.upper())
+    typed = chain.joints[joint].sign * float(problem.context.positions[reading.row, joint])
     return (
         f"run {reading.run}, sequence {reading.sequence} (point {reading.target}): {reading.axis}_mm is {typed:.4f}, "
         f"off by {reading.size:+.3g} mm; some {typed - reading.size:.1f} would be right"
