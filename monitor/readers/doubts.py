@@ -233,8 +233,8 @@ def _days(campaign: Campaign) -> Iterator[str]:
 
 def _to_come(campaign: Campaign) -> Iterator[str]:
     """Runs that nobody can have made yet."""
-    now = datetime.now(UTC)
-    later = [run for run in campaign.runs if run.started_at > now + CLOCKS]
+    latest = datetime.now(UTC) + CLOCKS
+    later = [run for run in campaign.runs if run.started_at > latest]
     if later:
         run = later[0]
         yield (

@@ -250,10 +250,10 @@ def _of_sides(
 ) -> tuple[Rival, ...]:
     """What the days of each side leave open of their scatter: ``day`` is the variance of a mean of a day by all days,
     ``variance`` that of the difference with ``dof``."""
-    own = [of_sides.mean[of_sides.stretch == side] for side in (0, 1)]
-    if min(len(days) for days in own) > 1 and not other_days:
-        return tuple(rival for rival in (two_scatters(*own),) if rival is not None)
-    return (Rival(float(np.sqrt(variance + wider_side(own, day))), dof),)
+    means = [of_sides.mean[of_sides.stretch == side] for side in (0, 1)]
+    if min(len(days) for days in means) > 1 and not other_days:
+        return tuple(rival for rival in (two_scatters(*means),) if rival is not None)
+    return (Rival(float(np.sqrt(variance + wider_side(means, day))), dof),)
 
 
 def _judged(of_sides: _Means, means: _Means, other_days: int, allowance: Allowance) -> BeforeAfter:

@@ -81,14 +81,14 @@ def two_scatters(first: Array, second: Array) -> Rival | None:
     return Rival(u, satterthwaite(*parts)) if u > 0.0 else None
 
 
-def wider_side(own: Sequence[Array], of_day: float) -> float:
+def wider_side(sides: Sequence[Array], of_day: float) -> float:
     """Return what one side adds to the variance of the difference if its days scatter as widely as they may.
 
-    ``own`` are the means of days (d,) of each side, ``of_day`` the variance of such a mean by other days. A side may
+    ``sides`` are the means of days (d,) of each side, ``of_day`` the variance of such a mean by other days. A side may
     scatter by ``WIDEST`` times as much, or by the upper limit of what its own days show where that is less.
     """
     extra = 0.0
-    for days in own:
+    for days in sides:
         ratio = WIDEST**2
         if len(days) > 1:
             quantile = float(scipy.special.chdtri(len(days) - 1, 1.0 - NOT_SHOWN))

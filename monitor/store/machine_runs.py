@@ -128,5 +128,5 @@ def parameter_frames(db: Database, machine: str, parameters: Sequence[str]) -> d
         "WHERE machine = ? AND refers_to IS NOT NULL GROUP BY parameter",
         [machine],
     )
-    words = dict(rows)
-    return {name: words[name] for name in parameters if name in words}
+    of_machine = dict(rows)
+    return {name: of_machine[name] for name in parameters if name in of_machine}
