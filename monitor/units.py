@@ -39,6 +39,9 @@ METRE = Unit("m", 1e3)
 RADIAN = Unit("rad", 1.0)
 MICRORADIAN = Unit("µrad", 1e-6)
 DEGREE = Unit("°", math.pi / 180.0)
+INCH = Unit("inch", 25.4)
+CENTIMETRE = Unit("cm", 10.0)
+TENTH_MILLIMETRE = Unit("0.1 mm", 0.1)
 SECOND = Unit("s", 1.0)
 MINUTE = Unit("min", 60.0)
 HOUR = Unit("h", 3600.0)
@@ -67,3 +70,15 @@ def column_unit(column: str) -> Unit | None:
     """The unit that a column's name ends in, or None: ``column_unit("x_mm")`` is the millimetre."""
     stem, _, suffix = column.rpartition("_")
     return COLUMN_UNITS.get(suffix) if stem else None
+
+
+#: Units that lengths in columns of mm are typed in by mistake, the commonest first.
+_MISTAKEN = (METRE, MICROMETRE, INCH, CENTIMETRE, TENTH_MILLIMETRE)
+
+
+def mistaken_for_mm(ratio: float | None = None, tolerance: float = 0.02) -> tuple[Unit, ...]:
+    """Return the units that lengths may be in that should be in mm; with the ``ratio`` of typed to true lengths
+    those that give it within a relative ``tolerance``."""
+    if ratio is None:
+        return _MISTAKEN
+    return tuple(unit for unit in _MISTAKEN if abs(ratio * unit.factor - 1.0) <= tolerance)

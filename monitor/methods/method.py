@@ -7,6 +7,7 @@ and never for a name.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, Protocol
@@ -168,8 +169,12 @@ class Method:
 
 
 def _suspected(problem: ChainProblem) -> str:
-    """Which readings are grossly off, as the end of a refusal; empty where none stands out."""
+    """Which readings are grossly off, as the end of a refusal; empty where none stands out, or the same target in most
+    runs: then the file is wrong throughout, not a row."""
     gross = gross_readings(problem)
+    runs_of_target = Counter(target for _, target in {(reading.run, reading.target) for reading in gross})
+    if len(problem.runs) > 2 and max(runs_of_target.values(), default=0) > len(problem.runs) / 2:
+        return ""
     rows = ", ".join(
         f"run {reading.run}, sequence {reading.sequence} ({reading.target})" for reading in gross
     )

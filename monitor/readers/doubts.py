@@ -7,16 +7,15 @@ have, and the angles at which people index. What a fit has to see is told by `id
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from datetime import datetime, timedelta
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from monitor.readers.registry import method_rules
-from monitor.records import Array, Campaign
-from monitor.units import DEGREE, MICROMETRE
+from monitor.readers.unit_doubts import DISTANCE_TOLERANCE, off_places, runs_in_units
+from monitor.records import Array, Campaign, Run
+from monitor.units import CENTIMETRE, DEGREE, INCH, METRE, MICROMETRE, TENTH_MILLIMETRE
 
 #: No calibration moves its axes by less: the smallest artefacts (a ball plate for a micro-machine) have 10 mm.
 SHORTEST_TRAVEL = 5.0
@@ -24,20 +23,14 @@ SHORTEST_TRAVEL = 5.0
 FULL_TURN = 6.3
 #: People index at multiples of 5 degrees; radians of three decimals come back to them within 0.03 degrees.
 INDEX_DEG, INDEX_TOLERANCE_DEG = 5.0, 0.03
-#: Declared places are set up by hand: a few millimetres on 100 mm are usual.
-DISTANCE_TOLERANCE = 0.05
-#: Rows of a run whose distances are taken: all pairs of a million rows would need 4 TB. Plans have 60 to 10 000.
-MOST_ROWS = 2000
-#: Pairs beyond the tolerance from which on it is no single ball that was moved.
-TELLING_SHARE = 0.2
-#: What columns were taken for each other: metres or micrometres for millimetres, inches, a shifted decimal point.
-FACTORS = (
-    (1e3, "in metres"),
-    (1e-3, "in µm"),
-    (25.4, "in inches"),
-    (10.0, "ten times too small"),
-    (0.1, "ten times too large"),
-)
+#: What columns of mm are taken to be instead.
+UNIT_WORDS = {
+    METRE: "in metres",
+    MICROMETRE: "in µm",
+    INCH: "in inches",
+    CENTIMETRE: "ten times too small",
+    TENTH_MILLIMETRE: "ten times too large",
+}
 #: Standard uncertainties of length standards: a millionth of the length is good, a thousandth is no calibration.
 LARGEST_SHARE = 1e-3
 #: mm between the calibrated length of a bar and the declared distance of its balls. They are places on one artefact,
@@ -49,6 +42,8 @@ PROBE_RANGE = (1e-5, 1.0)
 AIR_RANGE = (-40.0, 60.0)
 #: Two days begin at least so far apart: two shifts of one date do not.
 APART = timedelta(hours=12)
+#: Clocks of machines and of this computer differ by less.
+CLOCKS = timedelta(hours=1)
 #: What a recorded temperature that says how long the bar was is called.
 AIR_NAMES = ("ambient", "air", "bar", "artefact", "artifact", "workpiece")
 #: Diameters of calibrated balls in mm.
@@ -59,7 +54,17 @@ def doubts(campaign: Campaign) -> tuple[str, ...]:
     """Sentences on what to look at, each with the numbers that it rests on; empty for most campaigns."""
     return tuple(
         sentence
-        for check in (_short_runs, _travel, _angles, _places, _statements, _temperatures, _days)
+        for check in (
+            _short_runs,
+            _travel,
+            _angles,
+            _places,
+            _units_of_runs,
+            _statements,
+            _temperatures,
+            _days,
+            _to_come,
+        )
         for sentence in check(campaign)
     )
 
@@ -131,64 +136,35 @@ def _angles(campaign: Campaign) -> Iterator[str]:
 
 
 def _places(campaign: Campaign) -> Iterator[str]:
-    """Distances between balls, or modules, at one pose against the declared ones: no rotary axis has a part in them."""
-    rules = method_rules().get(campaign.method)
-    declared = None if rules is None else rules.declared(campaign.artefact)
-    if declared is None or not all(axis in campaign.probings.readings for axis in "XYZ"):
+    """Distances between targets that are not the declared ones."""
+    off = off_places(campaign)
+    if off is None:
         return
-    steps, nominal = _pairs(campaign, declared.places)
-    if not len(nominal):
-        return
-    off = _share_off(steps, nominal, np.ones(3))
-    if off <= TELLING_SHARE:
-        return
-    ratio = float(np.median(np.linalg.norm(steps, axis=1) / nominal))
     head = (
-        f"the distances between {declared.noun} that were probed are {ratio:.3g} times the declared ones (median of "
-        f"{len(nominal)})"
+        f"the distances between {off.noun} that were probed are {off.ratio:.3g} times the declared ones (median of "
+        f"{off.count})"
     )
-    for factor, unit in FACTORS:
-        for axes in ("XYZ", "X", "Y", "Z"):
-            scale = np.where([axis in axes for axis in "XYZ"], factor, 1.0)
-            if _share_off(steps, nominal, scale) <= TELLING_SHARE / 2:
-                columns = _and([f"{axis.lower()}_mm" for axis in axes])
-                yield (
-                    f"{head}: it looks as if {columns} {'were' if len(axes) > 1 else 'was'} {unit}"
-                    + (", or the declared places in another unit than mm" if len(axes) > 1 else "")
-                )
-                return
+    if off.unit is None:
+        yield (
+            f"{head}; {off.share:.0%} of them differ by more than {DISTANCE_TOLERANCE:.0%}: check the declared places, "
+            "the names of the targets and the units"
+        )
+        return
+    columns = _and([f"{axis.lower()}_mm" for axis in off.axes])
     yield (
-        f"{head}; {off:.0%} of them differ by more than {DISTANCE_TOLERANCE:.0%}: check the declared places, the "
-        "names of the targets and the units"
+        f"{head}: it looks as if {columns} {'were' if len(off.axes) > 1 else 'was'} {UNIT_WORDS[off.unit]}"
+        + (", or the declared places in another unit than mm" if len(off.axes) > 1 else "")
     )
 
 
-def _pairs(campaign: Campaign, declared: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Steps (n, 3) of X, Y, Z between targets probed at one pose of one run, and their declared distances (n,)."""
-    probings = campaign.probings
-    rows = np.flatnonzero(probings.run == probings.run[0])[:MOST_ROWS]
-    fixed = [
-        values[rows] for axis, values in probings.readings.items() if not campaign.machine.is_linear(axis)
-    ]
-    fixed += [probings.channels[name][rows] for name in ("placement",) if name in probings.channels]
-    pose: npt.NDArray[np.int64] = np.zeros(len(rows), dtype=np.int64)
-    if fixed:
-        _, pose = np.unique(np.column_stack(fixed), axis=0, return_inverse=True)
-    pose = pose.reshape(-1)
-    has_place = np.array([name in declared for name in probings.target[rows].tolist()])
-    read = np.column_stack([probings.readings[axis][rows] for axis in "XYZ"])
-    at = np.array([declared.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
-    first, second = np.triu_indices(len(rows), 1)
-    at_one_pose = has_place[first] & has_place[second] & (pose[first] == pose[second])
-    first, second = first[at_one_pose], second[at_one_pose]
-    nominal = np.linalg.norm(at[first] - at[second], axis=1)
-    apart = nominal > 0.0
-    return (read[first] - read[second])[apart], nominal[apart]
-
-
-def _share_off(steps: Array, nominal: Array, scale: Array) -> float:
-    """Share of the distances that differ from the declared ones by more than the tolerance."""
-    return float(np.mean(np.abs(np.linalg.norm(steps * scale, axis=1) / nominal - 1.0) > DISTANCE_TOLERANCE))
+def _units_of_runs(campaign: Campaign) -> Iterator[str]:
+    """Single runs in another unit than the others."""
+    for odd in runs_in_units(campaign):
+        yield (
+            f"run {odd.run}: {_and(list(odd.columns))} {'span' if len(odd.columns) > 1 else 'spans'} {odd.ratio:.4g} "
+            f"times the span in the other runs, as if {'they were' if len(odd.columns) > 1 else 'it was'} "
+            f"{UNIT_WORDS[odd.unit]} there; lengths are in mm"
+        )
 
 
 def _statements(campaign: Campaign) -> Iterator[str]:
@@ -234,21 +210,37 @@ def _temperatures(campaign: Campaign) -> Iterator[str]:
 
 def _days(campaign: Campaign) -> Iterator[str]:
     """Days that are none: several numbers on one date, which an uncertainty over days would rest on."""
-    first: dict[int, datetime] = {}
+    first: dict[int, Run] = {}
     for run in sorted(campaign.runs, key=lambda run: run.started_at):
-        first.setdefault(run.day, run.started_at)
-    began = sorted(first.items(), key=lambda entry: entry[1])
+        first.setdefault(run.day, run)
+    began = sorted(first.values(), key=lambda run: run.started_at)
     close = [
-        (day, later)
-        for (day, at), (later, after) in pairwise(began)
-        if at.date() == after.date() and after - at < APART
+        (earlier, later)
+        for earlier, later in pairwise(began)
+        if earlier.started_at.date() == later.started_at.date()
+        and later.started_at - earlier.started_at < APART
     ]
     if close:
-        day, later = close[0]
+        earlier, later = close[0]
         yield (
-            f"days {day} and {later} began on {first[day]:%Y-%m-%d} less than {APART.total_seconds() / 3600.0:g} hours "
-            f"apart ({len(close)} of {len(began) - 1} such): are the numbers in the column day those of days? What "
-            "days differ by is estimated from them"
+            f"days {earlier.day} and {later.day} (from runs {earlier.run} and {later.run} on) began on "
+            f"{earlier.started_at:%Y-%m-%d} less than {APART.total_seconds() / 3600.0:g} hours apart ({len(close)} of "
+            f"{len(began) - 1} such): are the numbers in the column day those of days? What days differ by is "
+            f"estimated from them; runs of one date have one number, so give run {later.run} day {earlier.day} in "
+            "runs.csv"
+        )
+
+
+def _to_come(campaign: Campaign) -> Iterator[str]:
+    """Runs that nobody can have made yet."""
+    latest = datetime.now(UTC) + CLOCKS
+    later = [run for run in campaign.runs if run.started_at > latest]
+    if later:
+        run = later[0]
+        yield (
+            f"run {run.run} started at {run.started_at:%Y-%m-%d %H:%M}, which is still to come ({len(later)} of "
+            f"{len(campaign.runs)} runs): correct started_at in runs.csv (year, order of day and month, offset from "
+            "UTC); trend, report and plans of the next calibration count from the latest run"
         )
 
 

@@ -155,7 +155,8 @@ _UNDECIDED = {
         "not decided: one day on each side cannot tell a change from days that differ; measure a second day"
     ),
     Undecided.DAYS_MAY_DO: (
-        "not decided: more than independent days that scatter alike explain, but days that follow each other, or that "
-        "scatter differently on the two sides, may do as much; more days on each side or further campaigns decide it"
+        "not decided: more than independent days that scatter alike explain, but days that follow each other, a side "
+        "whose days scatter more, or campaigns that differ by more than their days may do as much; more days on each side "
+        "or further campaigns decide it"
     ),
 }

@@ -6,9 +6,10 @@ days of both sides and, where these are few, from other days of the same machine
 tell a change from days that differ, however many runs there are: then nothing is decided. Judged by E_n with the
 expanded uncertainty at 95 % for the degrees of freedom that there are, so that of machines that did not change one in
 twenty is said to have. Days of a campaign may also resemble those before them, which few days do not show: what is
-beyond independent days but not beyond such (``following_days``), or beyond days of one scatter but not beyond two sides
-that scatter differently, is not decided either. Compare results of different
-methods, which share less, with ``normalised_error``.
+beyond independent days of one scatter but not beyond such (``following_days``), two sides that scatter differently, a
+side of few days that scatters more than the others, or campaigns that differ by more than their days
+(``rival_scatter``), is not decided either. Compare results of different methods, which share less, with
+``normalised_error``.
 """
 
 from __future__ import annotations
@@ -17,16 +18,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_vector
-from monitor.statistics.following_days import REFUTED, FollowingDays, following_days
+from monitor.statistics.following_days import following_days
+from monitor.statistics.rival_scatter import (
+    Allowance,
+    Rival,
+    factor,
+    satterthwaite,
+    two_scatters,
+    wider_side,
+)
 from monitor.statistics.sums import label_groups
 
-#: Probability with which the expanded uncertainty holds the difference of a machine that did not change.
-LEVEL = 0.95
 #: With fewer degrees of freedom of their own days than this, both sides lean on the machine's other days. It depends on
 #: the plan alone, so that no rate moves by the choice.
 ENOUGH = 8
@@ -58,10 +64,9 @@ class BeforeAfter:
     their runs, None where no two days are alike: then the difference of the machine and that of two days are one, ``u``
     is of runs alone, and nothing is ``decided``. ``other_days`` of the machine took part in the estimate; of so many
     ``other_campaigns`` the means differ by more than that, and ``u``, ``dof`` and ``k`` are theirs (0: they do not).
-    ``cautious`` is the largest expanded uncertainty that the days do not exclude: for days that resemble those before
-    them by ``correlation``, and for sides of different scatter (Welch; where no other days took part and both have
-    two); None where other campaigns say how campaigns differ, or nothing is known of the days. ``following`` is the
-    first of the two.
+    ``rivals`` are what the days do not exclude: days that resemble those before them by ``correlation`` (None where
+    other campaigns say how campaigns differ), sides of different scatter (Welch; where no other days took part and both
+    have two), a side of few days that scatters more, and campaigns that differ; none where nothing is known of days.
     """
 
     before: float
@@ -74,9 +79,10 @@ class BeforeAfter:
     k: float
     between: float | None
     other_days: int
+    days_before: int
+    days_after: int
     other_campaigns: int = 0
-    cautious: float | None = None
-    following: FollowingDays | None = None
+    rivals: tuple[Rival, ...] = ()
     correlation: float | None = None
 
     @property
@@ -88,6 +94,15 @@ class BeforeAfter:
     def expanded(self) -> float:
         """Expanded uncertainty of the difference; where nothing is decided, by the runs alone and so too small."""
         return self.k * self.u
+
+    @property
+    def cautious(self) -> float | None:
+        """The largest expanded uncertainty of the rivals, at least ``expanded``; None without rivals."""
+        return max(self.expanded, *(rival.expanded for rival in self.rivals)) if self.rivals else None
+
+    def p_value_of_rivals(self) -> float:
+        """Return the largest p-value of the difference by what the days do not exclude; 0 without rivals."""
+        return max((rival.p_value(self.difference) for rival in self.rivals), default=0.0)
 
     @property
     def e_n(self) -> float | None:
@@ -156,7 +171,7 @@ def before_after(
     days_before: npt.ArrayLike,
     days_after: npt.ArrayLike,
     others: OtherDays | None = None,
-    refuted: float = REFUTED,
+    allowance: Allowance = Allowance(),  # noqa: B008
 ) -> BeforeAfter:
     """Compare runs (n,) before with runs (m,) after an event, of the days (n,) and (m,), every day alike.
 
@@ -164,7 +179,6 @@ def before_after(
     for independent normal days of as many runs, whatever the day component; with unequal numbers of runs the scatter of
     the runs makes up what the means of a side scatter more than those of the others (Satterthwaite). A day that the
     event cuts in two counts on both sides: its two halves share what is of the day only in part, which is neglected.
-    ``refuted`` is that of ``following_days``.
     Raises ``DataError`` for fewer than three runs, or where nothing scatters. Measured: docs/trials-statistics.md.
     """
     x, y = as_vector(before, "before"), as_vector(after, "after")
@@ -185,29 +199,34 @@ def before_after(
             means, other_days = every, len(every.mean) - len(joined.mean)
     if np.ptp(x) == 0.0 and np.ptp(y) == 0.0:
         raise DataError("no run differs from the others of its side; the difference has no uncertainty.")
-    result = _judged(joined, means, other_days, refuted)
-    return result if others is None else _beside_campaigns(result, others)
+    result = _judged(joined, means, other_days, allowance)
+    return result if others is None else _beside_campaigns(result, others, joined)
 
 
-def _beside_campaigns(result: BeforeAfter, others: OtherDays) -> BeforeAfter:
+def _beside_campaigns(result: BeforeAfter, others: OtherDays, joined: _Means) -> BeforeAfter:
     """The same with what the means of other campaigns differ by, where that asks for more than the days do."""
     means, stretch = _campaign_means(others)
     dof = len(means) - len(np.unique(stretch))
     if dof < CAMPAIGNS_THAT_SAY:
         return result
-    # Days that follow each other make campaigns differ, and that is known.
-    result = replace(result, cautious=None, correlation=None, following=None)
+    # Days that follow each other make campaigns differ, and that is known; how wide the days of a side are is not.
+    day = max(result.u_before**2 * result.days_before, result.u_after**2 * result.days_after)
+    result = replace(
+        result, rivals=_of_sides(joined, result.other_days, day, result.u**2, result.dof), correlation=None
+    )
     squares = sum(
         float(((means[stretch == i] - means[stretch == i].mean()) ** 2).sum()) for i in set(stretch)
     )
-    u, k = float(np.sqrt(2.0 * squares / dof)), _factor(dof)
+    u, k = float(np.sqrt(2.0 * squares / dof)), factor(dof)
     if k * u <= result.expanded and result.decided:
         return result
     of_side = u / np.sqrt(2.0)
     between = of_side if result.between is None else result.between
+    # Of days that say nothing of each other the campaigns do.
+    rivals = _of_sides(joined, result.other_days, day if result.decided else of_side**2, u**2, float(dof))
     return replace(
         result, u_before=of_side, u_after=of_side, u=u, dof=float(dof), k=k, between=between,
-        other_campaigns=len(means),
+        other_campaigns=len(means), rivals=rivals,
     )  # fmt: skip
 
 
@@ -226,12 +245,18 @@ def _campaign_means(others: OtherDays) -> tuple[Array, npt.NDArray[np.intp]]:
     return np.asarray(means), parts[:, 0]
 
 
-def _factor(dof: float) -> float:
-    """Coverage factor of Student's distribution for ``LEVEL``."""
-    return -float(scipy.special.stdtrit(dof, (1.0 - LEVEL) / 2.0))
+def _of_sides(
+    of_sides: _Means, other_days: int, day: float, variance: float, dof: float
+) -> tuple[Rival, ...]:
+    """What the days of each side leave open of their scatter: ``day`` is the variance of a mean of a day by all days,
+    ``variance`` that of the difference with ``dof``."""
+    means = [of_sides.mean[of_sides.stretch == side] for side in (0, 1)]
+    if min(len(days) for days in means) > 1 and not other_days:
+        return tuple(rival for rival in (two_scatters(*means),) if rival is not None)
+    return (Rival(float(np.sqrt(variance + wider_side(means, day))), dof),)
 
 
-def _judged(of_sides: _Means, means: _Means, other_days: int, refuted: float) -> BeforeAfter:
+def _judged(of_sides: _Means, means: _Means, other_days: int, allowance: Allowance) -> BeforeAfter:
     """The difference of the two sides of ``of_sides`` by the scatter of the days of ``means``."""
     sides = [of_sides.stretch == side for side in (0, 1)]
     first, second = (float(of_sides.mean[side].mean()) for side in sides)
@@ -241,26 +266,30 @@ def _judged(of_sides: _Means, means: _Means, other_days: int, refuted: float) ->
     of_runs = means.within / means.dof_runs if means.dof_runs else 0.0
     if means.dof_days == 0:
         # Nothing is known of the days: what the runs say, as a lower bound.
-        variances, dof, between, follow = of_runs * share / days, float(means.dof_runs), None, None
+        variances, dof, between = of_runs * share / days, float(means.dof_runs), None
     else:
         of_days, expected = _scatter_of_days(means)
         by_runs = of_runs * float(np.maximum(share - expected, 0.0) @ (1.0 / days)), means.dof_runs
-        dof = _satterthwaite((of_days * float((1.0 / days).sum()), means.dof_days), by_runs)
+        dof = satterthwaite((of_days * float((1.0 / days).sum()), means.dof_days), by_runs)
         variances = (of_days + of_runs * np.maximum(share - expected, 0.0)) / days
         between = float(np.sqrt(max(of_days - of_runs * expected, 0.0)))
-        follow = following_days(means.mean, means.stretch, means.campaign, (0, 1), refuted)
     u = float(np.sqrt(variances.sum()))
     if u == 0.0:
         raise DataError("no day differs from the others of its side; the difference has no uncertainty.")
-    cautious = following = None
-    if follow is not None:
-        following = FollowingDays(
-            float(np.hypot(follow.u, np.sqrt(by_runs[0]))),
-            _satterthwaite((follow.u**2, follow.dof), by_runs),
-            follow.correlation,
+    rivals: tuple[Rival, ...] = ()
+    correlation = None
+    if between is not None:
+        follow = following_days(means.mean, means.stretch, means.campaign, (0, 1), allowance.refuted)
+        assert follow is not None
+        correlation = follow.correlation
+        following = Rival(
+            float(np.hypot(follow.u, np.sqrt(by_runs[0]))), satterthwaite((follow.u**2, follow.dof), by_runs)
         )
-        unequal = 0.0 if other_days else _unequal(of_sides, sides)
-        cautious = max(_factor(following.dof) * following.u, unequal, _factor(dof) * u)
+        rivals = (
+            following,
+            *_of_sides(of_sides, other_days, of_days, u**2, dof),
+            Rival(float(np.sqrt(u**2 + 2.0 * allowance.campaigns**2 * of_days)), dof),
+        )
     return BeforeAfter(
         before=first,
         after=second,
@@ -269,30 +298,14 @@ def _judged(of_sides: _Means, means: _Means, other_days: int, refuted: float) ->
         difference=second - first,
         u=u,
         dof=dof,
-        k=_factor(dof),
+        k=factor(dof),
         between=between,
         other_days=other_days,
-        cautious=cautious,
-        correlation=None if follow is None else follow.correlation,
-        following=following,
+        rivals=rivals,
+        correlation=correlation,
+        days_before=int(days[0]),
+        days_after=int(days[1]),
     )
-
-
-def _unequal(of_sides: _Means, sides: list[npt.NDArray[np.bool_]]) -> float:
-    """Expanded uncertainty of the difference with the scatter of each side by its own days, 0 where one has one day.
-
-    Source: B. L. Welch, Biometrika 29 (1938) 350.
-    """
-    if min(int(side.sum()) for side in sides) < 2:
-        return 0.0
-    parts = [(float(of_sides.mean[side].var(ddof=1) / side.sum()), float(side.sum()) - 1.0) for side in sides]
-    return _factor(_satterthwaite(*parts)) * float(np.sqrt(sum(variance for variance, _ in parts)))
-
-
-def _satterthwaite(*parts: tuple[float, float]) -> float:
-    """Degrees of freedom of a sum of variances with their own (GUM G.4.1); parts of none or of no size are left out."""
-    squares = sum(variance**2 / dof for variance, dof in parts if dof)
-    return sum(variance for variance, _ in parts) ** 2 / squares if squares > 0.0 else float(parts[0][1])
 
 
 def _scatter_of_days(means: _Means) -> tuple[float, float]:

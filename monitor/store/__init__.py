@@ -68,6 +68,7 @@ from monitor.store.machine_runs import (
     identified_runs,
     machine_descriptions,
     machine_runs,
+    parameter_frames,
     probing_counts,
 )
 from monitor.store.models import (
@@ -187,6 +188,7 @@ __all__ = [
     "next_version",
     "not_identified",
     "one_at_a_time",
+    "parameter_frames",
     "probing_counts",
     "record_event",
     "record_refusal",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, timezone
 
@@ -119,3 +119,14 @@ def probing_counts(db: Database, campaign: str) -> dict[int, int]:
     """The number of touches of every run of a campaign."""
     rows = db.rows("SELECT run, count(*) FROM v_probings WHERE campaign = ? GROUP BY run", [campaign])
     return {int(run): int(count) for run, count in rows}
+
+
+def parameter_frames(db: Database, machine: str, parameters: Sequence[str]) -> dict[str, str]:
+    """What parameters of a machine refer to, in the words of ``parameter_frame``; "or" where models differ."""
+    rows = db.rows(
+        "SELECT parameter, string_agg(DISTINCT refers_to, ' or ' ORDER BY refers_to) FROM v_parameters "
+        "WHERE machine = ? AND refers_to IS NOT NULL GROUP BY parameter",
+        [machine],
+    )
+    of_machine = dict(rows)
+    return {name: of_machine[name] for name in parameters if name in of_machine}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from by_path import load
 
 from monitor.discovery import fit, robust_fit
+from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.gross import gross_readings
 from monitor.methods.model import Model
@@ -126,3 +128,22 @@ def test_the_sentence_says_run_row_ball_pose_and_size(virtual_campaigns):
     method = campaign_method(spoiled)
     (reading,) = method.identify(spoiled, Model("samba")).gross
     assert gross_sentence(reading, method.nouns.target) == sentence
+
+
+def test_identify_says_which_reading_of_a_touch_far_off_is_wrong_and_what_would_be_right():
+    campaign = read_campaign(EXAMPLES / "tilting-table")
+    row = int(second_run(campaign)[41])
+    typed = wrong.with_wrong_reading(campaign, row, "Y", 5.0)
+    right = campaign.probings.readings["Y"][row]
+    with pytest.raises(DataError) as refusal:
+        campaign_method(typed).identify(typed)
+    number = r"(-?[\d.]+)"
+    said = re.search(
+        rf"y_mm is {number}, off by \+{number} mm; some {number} would be right", str(refusal.value)
+    )
+    assert said is not None
+    assert [float(part) for part in said.groups()] == pytest.approx([right + 5.0, 5.0, right], abs=0.1)
+    assert f"sequence {campaign.probings.sequence[row]} (point {campaign.probings.target[row]})" in str(
+        refusal.value
+    )
+    assert "no number of their run would hold" in str(refusal.value)

@@ -167,6 +167,17 @@ def test_table_6_no_height_of_the_side_rows_explains_dy_ca(simulator, layout, mo
         assert found == pytest.approx([expected, as_printed], rel=0.05)
 
 
+@pytest.mark.slow
+def test_table_6_rows_at_60_mm_give_dy_ca_and_lose_dx_ay(simulator, monkeypatch):
+    """docs/rotary-probing.md: all but dx_AY fits rows low on the sides, dx_AY alone asks for 170 mm or more."""
+    monkeypatch.setattr(sys.modules[__name__], "RUNS", 1000)
+    low = Layout(simulator, 60.0)
+    parts = low.contributions(np.random.default_rng(6), 2.0, 2.0).values()
+    u = dict(zip(PARAMETERS, np.sqrt(sum(part**2 for part in parts)), strict=True))
+    assert (u["EY0C"], u["EZ0A"]) == (pytest.approx(3.5, rel=0.1), pytest.approx(4.6, rel=0.1))
+    assert u["EX0A"] == pytest.approx(2.8, rel=0.1)  # 5.7 printed
+
+
 def test_e11_the_printed_columns_do_not_add_up_to_table_6_exactly():
     columns = np.array([[a, 0.0 if b is None else b] for a, b in PRINTED.values()])
     assert np.sqrt(np.sum(columns**2, axis=0)) == pytest.approx([6.27, 1.84], abs=0.01)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +14,9 @@ from pathlib import Path
 import pytest
 
 from monitor.readers import doubts, read_campaign
+from monitor.readers.unit_doubts import runs_in_units
 from monitor.records import Campaign
+from monitor.workflow.intake.gross_doubts import gross_doubts
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 Change = Callable[[float], float]
@@ -151,5 +154,63 @@ def test_days_that_are_hours() -> None:
         replace(run, started_at=start + timedelta(minutes=30 * i)) for i, run in enumerate(campaign.runs)
     )
     (doubt,) = doubts(replace(campaign, runs=runs))
-    assert doubt.startswith("days 1 and 2 began on 20")
+    assert doubt.startswith("days 1 and 2 (from runs 1 and 5 on) began on 20")
+    assert doubt.endswith("so give run 5 day 1 in runs.csv")
     assert "(4 of 4 such): are the numbers in the column day those of days?" in doubt
+
+
+def in_inches_in_run_2(folder: Path) -> Path:
+    """The folder with the lengths of run 2 in inches."""
+    path = folder / "probings.csv"
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        for name in ("x_mm", "y_mm", "z_mm"):
+            if row["run"] == "2":
+                row[name] = f"{float(row[name]) / 25.4:.6f}"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder
+
+
+@pytest.mark.parametrize("example", ["five-days", "tilting-table"])
+def test_one_run_in_inches_is_said_as_that_and_no_reading_of_it_is_called_wrong(
+    altered: Callable[..., Path], example: str
+) -> None:
+    campaign = read_campaign(in_inches_in_run_2(altered(example)))
+    assert isinstance(campaign, Campaign)
+    (sentence,) = doubts(campaign)
+    assert sentence == (
+        "run 2: x_mm, y_mm and z_mm span 0.03937 times the span in the other runs, as if they were in inches there; "
+        "lengths are in mm"
+    )
+    assert gross_doubts(campaign) == ()
+    (odd,) = runs_in_units(campaign)
+    assert odd.ratio == pytest.approx(1.0 / 25.4, rel=1e-3)
+
+
+def test_a_whole_file_in_inches_makes_no_row_a_gross_reading(altered: Callable[..., Path]) -> None:
+    folder = altered("free-form-pocket", dict.fromkeys(("x_mm", "y_mm"), lambda mm: mm / 25.4))
+    campaign = read_campaign(folder)
+    assert isinstance(campaign, Campaign)
+    (sentence,) = doubts(campaign)
+    assert sentence.startswith(
+        "the distances between points that were probed are 0.0394 times the declared ones"
+    )
+    assert "in inches" in sentence
+    assert gross_doubts(campaign) == ()
+
+
+def test_a_run_that_is_still_to_come_is_named_with_what_to_do(altered: Callable[..., Path]) -> None:
+    folder = altered("tilting-table")
+    runs = folder / "runs.csv"
+    lines = runs.read_text(encoding="utf-8").splitlines()
+    lines[4] = lines[4].replace(",20", ",21", 1)
+    runs.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (sentence,) = of(folder)
+    assert re.match(
+        r"run 4 started at 21\d\d-\d\d-\d\d \d\d:\d\d, which is still to come \(1 of 4 runs\)", sentence
+    )
+    assert "correct started_at in runs.csv" in sentence

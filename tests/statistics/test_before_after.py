@@ -107,8 +107,19 @@ def test_days_that_follow_each_other_are_not_called_and_u_is_that_of_dense_matri
     u = np.sqrt(y @ m @ y / np.trace(m @ c) * (contrast @ c @ contrast))
     dof = np.trace(m @ c) ** 2 / np.trace(m @ c @ m @ c)
     welch = stats.ttest_ind(days[1], days[0], equal_var=False).confidence_interval(0.95)
+    # Two campaigns that differ by 0.8 of the scatter of a mean of a day.
+    freedom = sum(ns) - 2
+    campaigns = np.sqrt(y @ m @ y / freedom * (1.0 / before + 1.0 / after + 2.0 * 0.8**2))
+    assert [(rival.u, rival.dof) for rival in result.rivals[::2]] == [
+        (pytest.approx(u), pytest.approx(dof)),
+        (pytest.approx(campaigns), pytest.approx(freedom)),
+    ]
     assert result.cautious == pytest.approx(
-        max(stats.t.ppf(0.975, dof) * u, (welch.high - welch.low) / 2.0, result.expanded)
+        max(
+            stats.t.ppf(0.975, dof) * u,
+            (welch.high - welch.low) / 2.0,
+            stats.t.ppf(0.975, freedom) * campaigns,
+        )
     )
 
 
@@ -122,6 +133,53 @@ def test_two_days_that_scatter_more_than_ten_before_are_seldom_called_without_we
     # Welch with one degree of freedom holds 8 to 9 % (docs/trials-statistics.md); days of one scatter half of them.
     assert rate_at_most(called, 400, 0.09)
     assert alike / 400 > 0.4
+
+
+@pytest.mark.parametrize(("before", "after", "rest"), [(1, 1, (5,)), (1, 1, (1,) * 6), (2, 2, (5,) * 4)])
+def test_few_days_that_scatter_three_times_as_much_as_the_machines_others_are_no_change(
+    before, after, rest, rate_at_most
+):
+    rng = np.random.default_rng([before, after, *rest])
+    called = alike = seen = 0
+    for _ in range(300):
+        (x, of_x), (y, of_y) = sides(rng, before, 4, 1.0), sides(rng, after, 4, 1.0)
+        days = rng.normal(size=(sum(rest), 1)) + rng.normal(size=(sum(rest), 4))
+        campaign = np.repeat(np.repeat(np.arange(len(rest)), rest), 4)
+        others = OtherDays(days.ravel(), np.repeat(np.arange(len(days)), 4), 0.0 * campaign, campaign)
+        result = before_after(x, 3.0 * y, of_x, of_y, others)
+        called, alike = called + (result.agree is False), alike + (abs(result.e_n) > 1.0)
+        # A change of 12 u is seen: 12 sqrt(2/days) of a day that scatters by sqrt(1.25).
+        shift = 12.0 * np.sqrt(1.25 * (1.0 / before + 1.0 / after))
+        seen += before_after(x, y + shift, of_x, of_y, others).agree is False
+    assert rate_at_most(called, 300, 0.075)
+    assert alike / 300 > 0.2
+    assert seen / 300 > 0.9
+
+
+@pytest.mark.parametrize("days", [5, 20])
+def test_two_campaigns_that_differ_by_as_much_as_their_days_are_no_change(days, rate_at_most):
+    rng = np.random.default_rng(days)
+    called = alike = seen = 0
+    for _ in range(300):
+        x, y = (
+            0.7 * rng.normal(size=(2, days))
+            + 0.5 * rng.normal(size=(2, days))
+            + 0.7 * rng.normal(size=(2, 1))
+        )
+        result = before_after(x, y, np.arange(days), np.arange(days))
+        called, alike = called + (result.agree is False), alike + (abs(result.e_n) > 1.0)
+        seen += before_after(x, y + 6.0, np.arange(days), np.arange(days)).agree is False
+    assert rate_at_most(called, 300, 0.075)
+    assert alike / 300 > 0.2
+    assert seen / 300 > 0.9
+
+
+def test_a_single_day_may_scatter_three_times_as_much_by_hand():
+    rng = np.random.default_rng(8)
+    rest = rng.normal(size=5)
+    others = OtherDays(rest, np.arange(5), np.zeros(5), np.zeros(5))
+    result = before_after([0.0, 0.0], [1.0, 1.1], [0, 0], [0, 0], others)
+    assert max(rival.u for rival in result.rivals) == pytest.approx(rest.std(ddof=1) * np.sqrt(1.0 + 9.0))
 
 
 def test_refusals_say_what_is_needed():

@@ -10,6 +10,7 @@ import pytest
 
 from monitor.exceptions import DataError
 from monitor.statistics import find_changes
+from monitor.statistics.changes import _Search, _Series
 from monitor.statistics.day_evidence import shows_wide_days
 from monitor.statistics.scan import Scanner
 
@@ -256,3 +257,22 @@ def test_refusals_say_what_is_needed():
         find_changes({"a": np.arange(6.0)}, np.arange(6.0), u={"b": np.ones(6)}, rng=rng)
     with pytest.raises(DataError, match="values holds no parameter"):
         find_changes({}, np.arange(6.0), rng=rng)
+
+
+def test_a_part_of_a_yearly_wave_of_one_scatter_is_no_change_and_a_step_of_six_is(rate_at_most):
+    rng = np.random.default_rng(14)
+    t = 7.0 * np.arange(34)
+    with_season, without = _Search(rng, 1999), _Search(rng, 1999)
+
+    def is_called(search: _Search, y: np.ndarray, cycle: float | None) -> bool:
+        return any(search.pieces([(_Series("a", y, t, None, None, cycle), 0)], 0.01))
+
+    called = plain = seen = 0
+    for _ in range(150):
+        y = rng.normal(size=len(t)) + np.cos(2.0 * np.pi * (t / 365.25 + rng.uniform()))
+        called += is_called(with_season, y, 365.25)
+        plain += is_called(without, y, None)
+        seen += is_called(with_season, rng.normal(size=len(t)) + 6.0 * (t > 120.0), 365.25)
+    assert rate_at_most(called, 150, 0.015)
+    assert plain / 150 > 0.1
+    assert seen / 150 > 0.9

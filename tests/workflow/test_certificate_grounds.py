@@ -27,7 +27,7 @@ from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import CertificateRequest, RemakeRequest
 from monitor.workflow.models import resolve
 from monitor.workflow.uncertainty.evaluation import uncertainty
-from monitor.workflow.uncertainty.grounds import LARGEST_GAIN, MOST_TIMES
+from monitor.workflow.uncertainty.grounds import LARGEST_GAIN, MOST_TIMES, _units
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 from monitor.workflow.uncertainty.stored import stored_uncertainty
 
@@ -213,3 +213,19 @@ def test_the_reason_is_printed_stored_and_made_again(
         stored = load_certificate(db, answer.certificate.number).record
         assert [entry["reason"] for entry in stored["accepted"]] == ["bekannt", WHY]
         assert remake(db, RemakeRequest(answer.certificate.number)).identical
+
+
+def test_a_run_in_inches_speaks_against_every_certificate_by_its_unit_and_by_no_reading_of_it(
+    five_days: Campaign,
+) -> None:
+    rows = five_days.probings.run == 2
+    readings = {
+        axis: np.where(rows, values / 25.4, values) if axis in "XYZ" else values
+        for axis, values in five_days.probings.readings.items()
+    }
+    probings = replace(five_days.probings, readings=readings)
+    (ground,) = _units(replace(five_days, probings=probings), 7)
+    assert (ground.kind, ground.run, ground.unit) == (GroundKind.UNITS, 2, "inch")
+    assert ground.size == pytest.approx(1.0 / 25.4, rel=1e-3)
+    german = ground_sentence(ground, texts_of("de"))
+    assert "als wäre ihre Einheit inch statt mm" in german

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -105,3 +106,29 @@ def test_json_says_it(identified_examples: Path, capsys: pytest.CaptureFixture[s
         said = kinds[frame["kind"]].format(frame.get("axis"))
         assert said == expected(symbol, topology), symbol
     assert len(frames) >= 3
+
+
+@pytest.mark.parametrize("verb", [("stats", "five-days"), ("trend", "HU40-T")])
+def test_statistics_and_trend_say_it(
+    identified_examples: Path, capsys: pytest.CaptureFixture[str], verb: tuple[str, str]
+) -> None:
+    assert main(["--db", str(identified_examples), *verb, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    topology = read_campaign(EXAMPLES / "five-days").machine.topology
+    for symbol in answer["parameters"]:
+        assert answer["refers_to"].get(symbol) == expected(symbol, topology), symbol
+    assert len(answer["refers_to"]) >= 10
+
+
+def test_limits_say_it(tmp_path: Path) -> None:
+    folder = tmp_path / "five-days"
+    shutil.copytree(EXAMPLES / "five-days", folder)
+    with (folder / "campaign.toml").open("a", encoding="utf-8") as file:
+        file.write("\n[machine.tolerances]\nEA0C = 20.0\nEA0B = 20.0\n")
+    with Database(":memory:") as db:
+        import_folders(db, ImportRequest((folder,)))
+        assert db.rows("SELECT DISTINCT refers_to FROM v_tolerances") == [(None,)]
+        identify(db, IdentifyRequest("five-days"))
+        limits = dict(db.rows("SELECT parameter, refers_to FROM v_tolerances"))
+    topology = read_campaign(EXAMPLES / "five-days").machine.topology
+    assert limits == {name: expected(name, topology) for name in ("EA0B", "EA0C")}

@@ -23,7 +23,7 @@ from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, colum
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.methods.chain.measured import MeasuredChain
 from monitor.records import Array
-from monitor.units import Unit
+from monitor.units import Unit, mistaken_for_mm
 
 
 @dataclass(frozen=True)
@@ -288,11 +288,16 @@ def _refuse_another_machine(problem: ChainProblem, solution: Solution) -> None:
         errors = np.where(free, values, 0.0)
         worst = int(np.abs(errors).argmax())
         if abs(errors[worst]) > problem.largest_error:
-            unit = "mm/mm" if isinstance(effect, ChainEffect) and effect.is_gain else "rad"
+            is_gain = isinstance(effect, ChainEffect) and effect.is_gain
+            # A tip that truly moves by 1 + gain of what was typed.
+            units = mistaken_for_mm(1.0 / (1.0 + errors[worst])) if is_gain and errors[worst] > -1.0 else ()
+            looks = "".join(
+                f"; it looks as if the unit of its readings were {unit.name}, not mm" for unit in units
+            )
             raise DataError(
                 f"run {problem.runs[worst]}: {problem.base_names[columns.start]} comes out at {errors[worst]:.3g} "
-                f"{unit}, which is no error of a machine: the readings contradict the machine file; check the axis "
-                "signs, the topology, the units, the columns and the order of the targets"
+                f"{'mm/mm' if is_gain else 'rad'}, which is no error of a machine: the readings contradict the machine "
+                f"file{looks}; check the axis signs, the topology, the units, the columns and the order of the targets"
             )
     wrong = problem.contradiction(solution)
     if wrong is not None:

@@ -93,7 +93,8 @@ def _refuse_far_off(problem: FreeFormProblem) -> None:
         raise DataError(
             f"run {problem.context.run[worst]}, sequence {problem.context.sequence[worst]}: the stylus tip stands "
             f"{off[worst]:.3f} mm off the nominal point {problem.context.target[worst]} along its normal; check the "
-            "frame of nominal_x_mm and normal_x (the table's, at all axes zero), the axis signs and the targets"
+            "frame of nominal_x_mm and normal_x (the table's, at all axes zero), the axis signs, the units "
+            "(lengths are in mm) and the targets"
         )
 
 

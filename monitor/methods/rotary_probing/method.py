@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.exceptions import DataError
+from monitor.methods.chain.gross import Deviation, GrossReading, as_reading
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.method import ChainMethod, Nouns
@@ -25,14 +26,29 @@ def refuse(campaign: Campaign, problem: ChainProblem) -> None:
     apart = np.flatnonzero(problem.far_off)
     if not len(apart):
         return
-    context = problem.context
-    touches = ", ".join(
-        f"run {context.run[row]}, sequence {context.sequence[row]} (point {context.target[row]})"
-        for row in apart
+    by_error = problem.evaluated(problem.start, problem.common_start, jacobian=True).by_error
+    assert by_error is not None
+    vectors = problem.vectors(problem.start, problem.common_start)
+    touches = "; ".join(
+        _what_would_be_right(
+            problem, as_reading(problem, by_error, Deviation(row, tuple(vectors[row]), np.inf))
+        )
+        for row in apart.tolist()
     )
     raise DataError(
-        f"touches stand more than {FARTHEST_APART:g} mm apart from the others of their point: {touches}; correct the "
-        "rows, or leave them out of probings.csv"
+        f"touches stand more than {FARTHEST_APART:g} mm apart from the others of their point: {touches}. Correct the "
+        "rows, or leave them out of probings.csv: no number of their run would hold"
+    )
+
+
+def _what_would_be_right(problem: ChainProblem, reading: GrossReading) -> str:
+    """Where a wrong touch stands in the file, and the reading that the other touches of its point ask for."""
+    chain = problem.context.chain
+    joint = chain.index(reading.axis.upper())
+    typed = chain.joints[joint].sign * float(problem.context.positions[reading.row, joint])
+    return (
+        f"run {reading.run}, sequence {reading.sequence} (point {reading.target}): {reading.axis}_mm is {typed:.4f}, "
+        f"off by {reading.size:+.3g} mm; some {typed - reading.size:.1f} would be right"
     )
 
 

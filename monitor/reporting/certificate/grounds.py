@@ -22,6 +22,7 @@ class GroundKind(StrEnum):
     IMPLAUSIBLE = "implausible"
     SCALE_BAR = "scale-bar"
     TEMPERATURE = "temperature"
+    UNITS = "units"
 
 
 @dataclass(frozen=True)

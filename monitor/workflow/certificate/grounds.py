@@ -11,6 +11,9 @@ from monitor.reporting.texts import texts_of
 from monitor.store import StoredModel
 from monitor.workflow.uncertainty.stored import StatedUncertainty
 
+#: Grounds of one run that speak against the others too, whose covariance is pooled with it.
+OF_ANY_RUN = (GroundKind.UNITS, GroundKind.GROSS_READINGS)
+
 
 def grounds_against(
     campaign: Campaign, model: StoredModel, stored: Mapping[int, StatedUncertainty | None]
@@ -28,9 +31,9 @@ def grounds_against(
 
         robust = robust_fit(machine_problem(campaign, model))
         by_run = [grounds_of(campaign, robust, run) for run in stored]
-    # Gross readings of any run speak against each: once each, before what is the runs' own.
+    # Gross readings and units of any run speak against each: once each, before what is the runs' own.
     grounds = dict.fromkeys(ground for of_run in by_run for ground in of_run or ())
-    return tuple(sorted(grounds, key=lambda ground: ground.kind is not GroundKind.GROSS_READINGS))
+    return tuple(sorted(grounds, key=lambda ground: ground.kind not in OF_ANY_RUN))
 
 
 def accepted_grounds(

@@ -32,6 +32,7 @@ from monitor.workflow.explain.curve_answer import curve_explanation
 from monitor.workflow.explain.explain_answer import CurveExplanation, ExplainAnswer, MachineExplanation
 from monitor.workflow.explain.machine_answer import is_hopeless, machine_explanation, mistakes_found
 from monitor.workflow.explain.request import RATE, ExplainRequest
+from monitor.workflow.explain.unit_mistakes import units_mistaken
 from monitor.workflow.identify.fitting import curve_problem, machine_problem
 from monitor.workflow.measured import load_measured
 from monitor.workflow.models import label, resolve_for, subject_of
@@ -63,7 +64,7 @@ def explanation_of(
     def maker(changed: Campaign) -> ChainProblem:
         return machine_problem(changed, model)
 
-    mistakes = find_other_names(campaign, maker, robust)
+    mistakes = (*find_other_names(campaign, maker, robust), *units_mistaken(campaign, maker, first))
     if not mistakes and is_gross(campaign, first):
         mistakes = find_mistakes(campaign, maker, first)
     if mistakes:

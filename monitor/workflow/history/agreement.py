@@ -41,7 +41,7 @@ class ParameterAgreement:
     ``e_n`` are None where nothing is known of the days, and ``why_not_decided`` says what would decide it: ``expanded``
     is then of runs alone. ``expanded`` and ``e_n`` are for independent days of one scatter; ``agree`` is None, too,
     where the difference is larger than ``expanded`` and no larger than ``expanded_cautious``, for days that follow each
-    other or sides that scatter differently.
+    other, sides that scatter differently, or campaigns that differ by more than their days.
     """
 
     unit: str

@@ -16,6 +16,7 @@ import scipy
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.before_after import BeforeAfter, OtherDays, before_after
+from monitor.statistics.rival_scatter import Allowance
 from monitor.store import NOTE, MachineEvent
 from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.past import ParameterPast
@@ -28,6 +29,8 @@ EVENT_FALSE_ALARM = 0.05
 #: Correlations of days that their likelihood leaves open: the level of a step of one of many parameters is low; with
 #: 0.5 machines of four parameters whose days correlate by 0.6 have one in 12 % instead of 5 %.
 REFUTED = 2.0
+#: A side may hold many campaigns: how they differ is in the scatter of its days.
+ALLOWANCE = Allowance(refuted=REFUTED, campaigns=0.0)
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class EventStep:
     ``at`` is the time of the event (days since 1970). ``by_days`` says whether ``u`` and ``p_value`` are by the
     scatter of the means of days; otherwise by that of the runs, which knows nothing of how days differ: then the step
     is not ``decided``, for one day a side may differ as much where nothing happened. Nor is it where independent days
-    do not explain it and days that follow each other (``following_days``) do.
+    do not explain it and days that follow each other, or that scatter more on one side (``rival_scatter``), do.
     """
 
     parameter: str
@@ -54,11 +57,11 @@ class EventStep:
 @dataclass(frozen=True)
 class _Compared:
     """Both sides of an event compared by the means of their days (None: too few), by their runs, and the p-value of
-    days that follow each other."""
+    days that follow each other or scatter differently on both sides."""
 
     step: EventStep
     by_runs: tuple[float, float] | None
-    following: float
+    rivals: float
 
 
 def event_steps(
@@ -68,8 +71,8 @@ def event_steps(
 
     By the scatter of the days: those whose p-value lies below ``false_alarm`` over the number of comparisons
     (Bonferroni), so that ``false_alarm`` is the probability of any where there is none. Both sides of an event and all
-    other pieces of the history say how days differ. What days that follow each other explain is named as not decided
-    (Bonferroni, too). Where no piece has two days nothing says so: what is large by the
+    other pieces of the history say how days differ. What days that follow each other, or a side of wider scatter,
+    explain is named as not decided (Bonferroni, too). Where no piece has two days nothing says so: what is large by the
     scatter of the runs is then named as not decided (``by_days`` is false). Of events between the same two runs the
     last one stands for all.
     """
@@ -84,7 +87,7 @@ def _stated(pair: _Compared, level: float) -> EventStep | None:
     """The step as it may be stated, None where it may not: by days at ``level``; by runs where no days can."""
     step = pair.step
     if step.by_days:
-        return replace(step, decided=pair.following < level) if step.p_value < level else None
+        return replace(step, decided=pair.rivals < level) if step.p_value < level else None
     if pair.by_runs is None or pair.by_runs[1] >= level:
         return None
     u, p_value = pair.by_runs
@@ -112,10 +115,8 @@ def _of_parameter(past: ParameterPast, moments: Mapping[float, MachineEvent]) ->
         size = days.difference if days is not None else _difference_of_days(before, after)
         u, p_value = (days.u, _p_value(size, days.u, days.dof)) if days is not None else runs or (np.nan, 1.0)
         step = EventStep(steady.name, steady.unit, event, at, size, u, p_value, days is not None)
-        follow = None if days is None else days.following
-        pairs[first] = _Compared(
-            step, runs, 1.0 if follow is None else max(p_value, _p_value(size, follow.u, follow.dof))
-        )
+        rivals = 1.0 if days is None else max(p_value, days.p_value_of_rivals())
+        pairs[first] = _Compared(step, runs, rivals)
     return list(pairs.values())
 
 
@@ -129,7 +130,7 @@ def _by_days(before: Series, after: Series, rest: Series, pieces: npt.NDArray[np
         return None
     others = OtherDays(rest.values, rest.days, pieces, pieces)
     try:
-        result = before_after(before.values, after.values, before.days, after.days, others, refuted=REFUTED)
+        result = before_after(before.values, after.values, before.days, after.days, others, ALLOWANCE)
     except DataError:
         return None
     return result if result.decided else None

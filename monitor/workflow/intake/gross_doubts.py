@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.exceptions import MonitorError
+from monitor.readers.unit_doubts import off_places, runs_in_units
 from monitor.records import Campaign
 
 
@@ -27,4 +28,12 @@ def gross_doubts(campaign: Campaign) -> tuple[str, ...]:
     except (MonitorError, np.linalg.LinAlgError):
         # What cannot be identified is said by the verb that is asked to.
         return ()
-    return tuple(gross_sentence(reading, method.nouns.target) for reading in readings)
+    if off_places(campaign) is not None:
+        # Where the places do not fit, no single row is to blame; ``doubts`` says what is.
+        return ()
+    in_other_units = {odd.run for odd in runs_in_units(campaign)}
+    return tuple(
+        gross_sentence(reading, method.nouns.target)
+        for reading in readings
+        if reading.run not in in_other_units
+    )

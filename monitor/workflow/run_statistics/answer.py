@@ -159,7 +159,8 @@ class GroupCorrelation:
 @dataclass(frozen=True, eq=False)
 class StatisticsAnswer:
     """Statistics of a campaign's runs. ``groups`` has the number of runs by group; correlation matrices are over the
-    parameters in ``parameter_order``. ``seed`` is that of the test of normality."""
+    parameters in ``parameter_order``. ``seed`` is that of the test of normality; ``refers_to`` says in words what the
+    parameters are relative to, those that are errors of the chain."""
 
     campaign: str
     machine: str
@@ -178,6 +179,7 @@ class StatisticsAnswer:
     degrees_of_freedom_all: int
     degrees_of_freedom_pooled: int
     seed: int
+    refers_to: Mapping[str, str]
     matrices: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
 

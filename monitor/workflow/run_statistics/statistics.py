@@ -204,6 +204,9 @@ def stats(db: Database, request: StatisticsRequest) -> StatisticsAnswer:
         degrees_of_freedom_all=pooled.dof_all,
         degrees_of_freedom_pooled=pooled.dof_pooled,
         seed=SEED,
+        refers_to={
+            name: identification.refers_to[name] for name in names if name in identification.refers_to
+        },
     )
     save_analysis(
         db, "statistics", to_document(answer), method=f"by {request.by}", campaign=campaign.name,

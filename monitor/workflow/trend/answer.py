@@ -369,7 +369,8 @@ class VolumetricForecast:
 class TrendAnswer:
     """The long view of a machine; ``why`` says why there are no parameters.
 
-    ``false_alarm`` is the probability of any change where there is none, ``seed`` that of everything simulated.
+    ``false_alarm`` is the probability of any change where there is none, ``seed`` that of everything simulated;
+    ``refers_to`` says in words what the parameters are relative to, those that are errors of the chain.
     """
 
     machine: str
@@ -389,3 +390,4 @@ class TrendAnswer:
     volumetric_error: VolumetricForecast | None = field(default=None, metadata=OMITTED)
     figures: tuple[str, ...] | None = field(default=None, metadata=OMITTED)
     weekly_looks: WeeklyNotices | None = field(default=None, metadata=OMITTED)
+    refers_to: Mapping[str, str] = field(default_factory=dict)

@@ -20,6 +20,7 @@ from monitor.store import (
     followed_by,
     machine_events,
     machine_history,
+    parameter_frames,
     save_analysis,
     tolerance_types,
 )
@@ -140,6 +141,7 @@ def _answer(
         seed=SEED,
         why=None if past else _why_none(request),
         parameters={},
+        refers_to=parameter_frames(db, request.machine, tuple(past)),
     )
     if not past:
         return head

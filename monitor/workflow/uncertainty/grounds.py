@@ -19,6 +19,7 @@ from monitor.readers.doubts import (
     bar_difference,
     implausible_temperatures,
 )
+from monitor.readers.unit_doubts import off_places, runs_in_units
 from monitor.records import Campaign, Run
 from monitor.reporting.certificate.grounds import Ground, GroundKind
 from monitor.units import MICROMETRE
@@ -41,8 +42,12 @@ LARGEST_OFFSET = 5.0
 def grounds_of(campaign: Campaign, robust: RobustFit, run: int) -> tuple[Ground, ...]:
     """Return every ground against a certificate of a run: ``robust`` is the model fitted to the whole campaign."""
     (measured,) = (each for each in campaign.runs if each.run == run)
+    units = tuple(_units(campaign, run))
+    in_units, is_whole = {unit.run for unit in units}, off_places(campaign) is not None
     return (
-        *_gross_readings(robust),
+        # A run in another unit has readings that contradict the rest: not one of them is the mistake.
+        *units,
+        *(ground for ground in _gross_readings(robust) if not is_whole and ground.run not in in_units),
         *_lack_of_fit(robust, run),
         *_implausible(campaign, robust, run),
         *_scale_bar(campaign, run),
@@ -56,6 +61,16 @@ def _gross_readings(robust: RobustFit) -> Iterator[Ground]:
         size = MICROMETRE.to_display(abs(reading.size))
         subject = f"{reading.sequence} ({reading.target})"
         yield Ground(GroundKind.GROSS_READINGS, reading.run, subject, size, None, MICROMETRE.name)
+
+
+def _units(campaign: Campaign, run: int) -> Iterator[Ground]:
+    """Lengths that look as if they were in another unit than mm, of the whole campaign or of any run."""
+    off = off_places(campaign)
+    if off is not None and off.unit is not None:
+        columns = ", ".join(f"{axis.lower()}_mm" for axis in off.axes)
+        yield Ground(GroundKind.UNITS, run, columns, off.ratio, None, off.unit.name)
+    for odd in runs_in_units(campaign):
+        yield Ground(GroundKind.UNITS, odd.run, ", ".join(odd.columns), odd.ratio, None, odd.unit.name)
 
 
 def _lack_of_fit(robust: RobustFit, run: int) -> Iterator[Ground]:

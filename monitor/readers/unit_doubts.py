@@ -1,0 +1,145 @@
+"""Lengths in a unit that is not mm: in all runs, held against declared or nominal places, or in single runs against the
+others. Typed, so that a certificate can be refused on it; ``doubts`` makes the sentences of an import.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.readers.method_rules import DeclaredPlaces
+from monitor.readers.registry import method_rules
+from monitor.records import Array, Campaign
+from monitor.units import Unit, mistaken_for_mm
+
+#: Declared places are set up by hand: a few millimetres on 100 mm are usual.
+DISTANCE_TOLERANCE = 0.05
+#: Rows of a run whose distances are taken: all pairs of a million rows would need 4 TB. Plans have 60 to 10 000.
+MOST_ROWS = 2000
+#: Pairs beyond the tolerance from which on it is no single ball that was moved.
+TELLING_SHARE = 0.2
+#: Spans of one plan repeat to some hundredths of a millimetre on millimetres and more, a run broken off covers less.
+SPAN_TOLERANCE = 0.005
+
+
+@dataclass(frozen=True)
+class OffPlaces:
+    """Distances between targets that are not the declared ones: ``ratio`` of the two (median of ``count``), ``share``
+    of them beyond the tolerance. In ``unit`` the columns of ``axes`` fit; None where no unit does."""
+
+    noun: str
+    ratio: float
+    count: int
+    share: float
+    axes: str
+    unit: Unit | None
+
+
+@dataclass(frozen=True)
+class RunInUnit:
+    """A ``run`` whose ``columns`` span ``ratio`` times what they do in the others, as in ``unit``."""
+
+    run: int
+    columns: tuple[str, ...]
+    ratio: float
+    unit: Unit
+
+
+def off_places(campaign: Campaign) -> OffPlaces | None:
+    """Distances between balls, modules or points at one pose against the declared or nominal ones, in the first run: no
+    rotary axis has a part in them. None where they agree, or nothing is declared."""
+    declared = _declared(campaign)
+    if declared is None or not all(axis in campaign.probings.readings for axis in "XYZ"):
+        return None
+    steps, nominal = _pairs(campaign, declared.places)
+    if not len(nominal):
+        return None
+    share = _share_off(steps, nominal, np.ones(3))
+    if share <= TELLING_SHARE:
+        return None
+    ratio = float(np.median(np.linalg.norm(steps, axis=1) / nominal))
+    for unit in mistaken_for_mm():
+        for axes in ("XYZ", "XY", "X", "Y", "Z"):
+            scale = np.where([axis in axes for axis in "XYZ"], unit.factor, 1.0)
+            if _share_off(steps, nominal, scale) <= TELLING_SHARE / 2:
+                return OffPlaces(declared.noun, ratio, len(nominal), share, axes, unit)
+    return OffPlaces(declared.noun, ratio, len(nominal), share, "", None)
+
+
+def _declared(campaign: Campaign) -> DeclaredPlaces | None:
+    """The places of the artefact; of a workpiece without, the nominal ones in the rows."""
+    rules = method_rules().get(campaign.method)
+    declared = None if rules is None else rules.declared(campaign.artefact)
+    probings = campaign.probings
+    if declared is not None or not {"nominal_x_mm", "nominal_y_mm"} <= set(probings.channels):
+        return declared
+    zero = np.zeros(len(probings.target))
+    columns = [probings.channels.get(f"nominal_{axis}_mm", zero) for axis in "xyz"]
+    nominal = np.column_stack(columns)
+    return DeclaredPlaces("points", dict(zip(probings.target.tolist(), nominal, strict=True)))
+
+
+def _pairs(campaign: Campaign, declared: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Steps (n, 3) of X, Y, Z between targets probed at one pose of one run, and their declared distances (n,)."""
+    probings = campaign.probings
+    rows = np.flatnonzero(probings.run == probings.run[0])[:MOST_ROWS]
+    fixed = [
+        values[rows] for axis, values in probings.readings.items() if not campaign.machine.is_linear(axis)
+    ]
+    fixed += [probings.channels[name][rows] for name in ("placement",) if name in probings.channels]
+    pose: npt.NDArray[np.int64] = np.zeros(len(rows), dtype=np.int64)
+    if fixed:
+        _, pose = np.unique(np.column_stack(fixed), axis=0, return_inverse=True)
+    pose = pose.reshape(-1)
+    has_place = np.array([name in declared for name in probings.target[rows].tolist()])
+    read = np.column_stack([probings.readings[axis][rows] for axis in "XYZ"])
+    at = np.array([declared.get(name, np.zeros(3)) for name in probings.target[rows].tolist()])
+    first, second = np.triu_indices(len(rows), 1)
+    at_one_pose = has_place[first] & has_place[second] & (pose[first] == pose[second])
+    first, second = first[at_one_pose], second[at_one_pose]
+    nominal = np.linalg.norm(at[first] - at[second], axis=1)
+    apart = nominal > 0.0
+    return (read[first] - read[second])[apart], nominal[apart]
+
+
+def _share_off(steps: Array, nominal: Array, scale: Array) -> float:
+    """Share of the distances that differ from the declared ones by more than the tolerance."""
+    return float(np.mean(np.abs(np.linalg.norm(steps * scale, axis=1) / nominal - 1.0) > DISTANCE_TOLERANCE))
+
+
+def runs_in_units(campaign: Campaign) -> tuple[RunInUnit, ...]:
+    """The runs whose lengths look as if they were in another unit than those of the other runs, by what each column
+    spans; of two runs the one that a unit explains."""
+    probings = campaign.probings
+    columns = {
+        f"{axis.lower()}_mm": values
+        for axis, values in probings.readings.items()
+        if campaign.machine.is_linear(axis)
+    }
+    columns |= {name: values for name, values in probings.channels.items() if name.startswith("tracker_")}
+    runs = np.unique(probings.run)
+    if len(runs) < 2 or not columns:
+        return ()
+    spans = {
+        name: np.array([np.ptp(values[probings.run == run]) for run in runs])
+        for name, values in columns.items()
+    }
+    odd: list[RunInUnit] = []
+    for index, run in enumerate(runs.tolist()):
+        by_unit: dict[Unit, list[str]] = {}
+        ratios: dict[Unit, float] = {}
+        for name, of_runs in spans.items():
+            usual = float(np.median(np.delete(of_runs, index)))
+            if usual <= 0.0:
+                continue
+            ratio = float(of_runs[index]) / usual
+            (unit,) = mistaken_for_mm(ratio, SPAN_TOLERANCE)[:1] or (None,)
+            if unit is not None:
+                by_unit.setdefault(unit, []).append(name)
+                ratios[unit] = ratio
+        odd += [RunInUnit(run, tuple(sorted(names)), ratios[unit], unit) for unit, names in by_unit.items()]
+    # More than half of the runs are not the odd ones.
+    return tuple(odd) if len({entry.run for entry in odd}) <= len(runs) / 2 else ()
