@@ -156,7 +156,7 @@ _UNDECIDED = {
     ),
     Undecided.DAYS_MAY_DO: (
         "not decided: more than independent days that scatter alike explain, but days that follow each other, a side "
-        "whose days scatter more, or campaigns that differ by more than their days may do as much; more days on each side "
-        "or further campaigns decide it"
+        "whose days scatter more, or campaigns that differ by more than their days may do as much; more days on each "
+        "side or further campaigns decide it"
     ),
 }
