@@ -7,6 +7,7 @@ import importlib
 import importlib.util
 import os
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -25,6 +26,10 @@ if "--benchmark-only" not in sys.argv:
 # of processor time each), nor by the next run. Images of continuous integration often switch it off.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# A shell ignores Ctrl-C for what it starts in the background, and so would every process that a test starts and stops.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 if "by_path" not in sys.modules:
     _spec = importlib.util.spec_from_file_location("by_path", Path(__file__).with_name("by_path.py"))

@@ -150,10 +150,18 @@ def issued_once(
     def issue(folder: Path) -> None:
         path = folder / "issued.duckdb"
         shutil.copyfile(filled_once, path)
+        stated = [
+            "--date",
+            "2026-03-10",
+            "--laboratory",
+            str(laboratory),
+            "--out",
+            str(folder / "out folder ü"),
+        ]
         for campaign, run in (("five-days", 20), ("five-days", 19), ("cold-cold", 3)):
-            status = main(["--db", str(path), "certificate", "issue", campaign, "--run", str(run), "--date", "2026-03-10",
-                           "--laboratory", str(laboratory), "--out", str(folder / "out folder ü")])  # fmt: skip
-            assert status == 0
+            assert (
+                main(["--db", str(path), "certificate", "issue", campaign, "--run", str(run), *stated]) == 0
+            )
 
     folder = made_once("three-certificates", issue)
     return Issued(folder / "issued.duckdb", folder / "out folder ü")

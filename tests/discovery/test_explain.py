@@ -105,10 +105,10 @@ def test_a_pitch_that_nobody_knows_is_found_with_its_uncertainty(virtual_campaig
     "options",
     [
         {"days": 1, "runs_per_day": 1},
-        {"cold": True, "noise_um": 0.7},
         {"noise_um": 0.5, "stated_um": 1.0, "days": 2},
         {"with_channels": False, "days": 2},
         {"keep": lambda told: (told["run"] % 2 == 1) | (told["sequence"] < 50), "days": 2},
+        pytest.param({"cold": True, "noise_um": 0.7}, marks=pytest.mark.slow),
         pytest.param({"days": 1, "runs_per_day": 2}, marks=pytest.mark.slow),
         pytest.param({"days": 3, "runs_per_day": 1}, marks=pytest.mark.slow),
         pytest.param({"noise_um": 0.5, "stated_um": 1.0}, marks=pytest.mark.slow),
@@ -159,7 +159,7 @@ def test_runs_that_were_left_out_or_never_probed_do_not_matter(virtual_campaigns
 
 def test_an_added_effect_is_missing_no_more_and_a_removed_one_is_again(virtual_campaigns):
     sim = simulator()
-    campaign, _ = virtual_campaigns.virtual(2, [sim.Effect("EXX:reversal", peak_um=5.0)])
+    campaign, _ = virtual_campaigns.virtual(2, [sim.Effect("EXX:reversal", peak_um=5.0)], days=2)
     rng = np.random.default_rng(1)
     grown = problem_of(campaign, Model("grown", added=("EXX:reversal",)))
     answer = explain(campaign, grown, "grown", rng=rng)
@@ -182,7 +182,7 @@ def test_an_added_effect_that_follows_a_driver_is_missing_no_more(virtual_campai
     sim = virtual_campaigns.simulator()
     width = 3 if effect.endswith("gravity") else 1
     hidden = sim.Effect(effect, peak_um=8.0, direction=(1.0, 0.5, 0.2)[:width])
-    campaign, _ = virtual_campaigns.virtual(3, [hidden])
+    campaign, _ = virtual_campaigns.virtual(3, [hidden], days=2)
     grown = problem_of(campaign, Model("grown", added=(effect,)))
     answer = explain(campaign, grown, "grown", rng=np.random.default_rng(1))
     assert answer.missing == ()
