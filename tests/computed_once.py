@@ -32,6 +32,7 @@ REGION_FACTORS = (
     "monitor.uncertainty.framework.region_factors",
     "monitor.workflow.uncertainty.stating.region_factors",
 )
+JOINT_COVERAGE = ("monitor.workflow.uncertainty.stating.joint_coverage",)
 ROBUST_FIT = (
     "monitor.discovery.robust_fit",
     "monitor.workflow.explain.explain.robust_fit",
@@ -39,7 +40,7 @@ ROBUST_FIT = (
 )
 FIT = ("monitor.workflow.uncertainty.evaluation.fit",)
 SEARCH = ("monitor.workflow.explain.explain.explanation_of", "monitor.workflow.health.task.explanation_of")
-COMPUTED_ONCE = (LAYOUT, REGION_FACTORS, ROBUST_FIT, FIT, SEARCH)
+COMPUTED_ONCE = (LAYOUT, REGION_FACTORS, JOINT_COVERAGE, ROBUST_FIT, FIT, SEARCH)
 
 #: The folder of this session's answers, which a fixture of ``conftest.py`` names.
 FOLDER: list[Path] = []
