@@ -60,22 +60,23 @@ def pytest_xdist_auto_num_workers() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-#: Files of more than 15 s of processor time, the longest first.
+#: Files of more than 12 s of processor time, the longest first.
 _LONGEST = {
     name: rank
     for rank, name in enumerate(
         (
             "workflow/test_health.py",
             "discovery/test_explain.py",
-            "test_readme.py",
-            "workflow/test_budget.py",
-            "workflow/test_health_pictures.py",
             "cli/test_output.py",
+            "workflow/test_health_pictures.py",
+            "test_readme.py",
+            "api/test_python.py",
             "cli/test_json.py",
+            "workflow/test_one_past.py",
             "discovery/test_anomalies.py",
-            "workflow/test_certificate_contents.py",
+            "cli/test_models.py",
+            "workflow/test_certificate_grounds.py",
             "cli/test_interruptions.py",
-            "curves/test_real_data.py",
         )
     )
 }
