@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
+import fcntl
 import importlib
 import importlib.util
 import os
-import pickle
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import pytest
 
@@ -27,6 +26,10 @@ if "--benchmark-only" not in sys.argv:
 # of processor time each), nor by the next run. Images of continuous integration often switch it off.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# A shell ignores Ctrl-C for what it starts in the background, and so would every process that a test starts and stops.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 if "by_path" not in sys.modules:
     _spec = importlib.util.spec_from_file_location("by_path", Path(__file__).with_name("by_path.py"))
@@ -47,9 +50,9 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
         action="store_true",
         help="run only what is slow, and what can be tested more thoroughly (make slow)",
     )
-    pluginmanager.register(
-        sys.modules["by_path"].load("processor_time", Path(__file__).with_name("processor_time.py"))
-    )
+    load = sys.modules["by_path"].load
+    pluginmanager.register(load("processor_time", Path(__file__).with_name("processor_time.py")))
+    pluginmanager.register(load("computed_once", Path(__file__).with_name("computed_once.py")))
 
 
 def pytest_xdist_auto_num_workers() -> int:
@@ -57,22 +60,23 @@ def pytest_xdist_auto_num_workers() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-#: Files of more than 15 s of processor time, the longest first.
+#: Files of more than 12 s of processor time, the longest first.
 _LONGEST = {
     name: rank
     for rank, name in enumerate(
         (
             "workflow/test_health.py",
             "discovery/test_explain.py",
-            "test_readme.py",
-            "workflow/test_budget.py",
-            "workflow/test_health_pictures.py",
             "cli/test_output.py",
+            "workflow/test_health_pictures.py",
+            "test_readme.py",
+            "api/test_python.py",
             "cli/test_json.py",
+            "workflow/test_one_past.py",
             "discovery/test_anomalies.py",
-            "workflow/test_certificate_contents.py",
+            "cli/test_models.py",
+            "workflow/test_certificate_grounds.py",
             "cli/test_interruptions.py",
-            "curves/test_real_data.py",
         )
     )
 }
@@ -113,24 +117,63 @@ def seeds(pytestconfig: pytest.Config) -> Callable[[int, int], range]:
     return lambda count, sample: range(count if pytestconfig.getoption("--all-seeds") else sample)
 
 
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of this session that all its workers have."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 @pytest.fixture(scope="session", autouse=True)
-def database_is_copied(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str, str], None]]:
+def computed_in(shared_folder: Path) -> None:
+    """Where the workers keep for each other what they computed (``computed_once.py``)."""
+    sys.modules["computed_once"].FOLDER.append(shared_folder)
+
+
+@pytest.fixture(scope="session")
+def made_once(shared_folder: Path) -> Callable[[str, Callable[[Path], object]], Path]:
+    """``made_once("filled", fill)``: a folder that ``fill`` filled, in one of the workers; the others wait for it.
+
+    What is in it is only read, or copied.
+    """
+
+    def folder_of(name: str, make: Callable[[Path], object]) -> Path:
+        folder, is_made = shared_folder / name, shared_folder / f"{name}.made"
+        with (shared_folder / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not is_made.exists():
+                # What a worker that failed left there.
+                shutil.rmtree(folder, ignore_errors=True)
+                folder.mkdir()
+                make(folder)
+                is_made.touch()
+        return folder
+
+    return folder_of
+
+
+@pytest.fixture(scope="session", autouse=True)
+def database_is_copied(
+    made_once: Callable[[str, Callable[[Path], object]], Path],
+) -> Iterator[Callable[[str, str], None]]:
     """A new database file is a copy of the first: the 570 statements of its schema take 0.15 s of processor time.
 
     Yields what makes one by these statements, as processes that tests start do. See ``made_anew``.
     """
     opening = importlib.import_module("monitor.store.opening")
-    template = tmp_path_factory.mktemp("new") / "new.duckdb"
     versions = opening.migrations.available()
     make = opening._make
+
+    def make_template(folder: Path) -> None:
+        make(str(folder / "new.duckdb"), str(folder / "new.duckdb.new"))
 
     def copy(path: str, partial: str) -> None:
         if opening.migrations.available() != versions:
             make(path, partial)
             return
-        if not template.exists():
-            make(str(template), f"{template}.new")
-        shutil.copy(template, partial)
+        shutil.copy(made_once("new", make_template) / "new.duckdb", partial)
         os.replace(partial, path)
 
     with pytest.MonkeyPatch.context() as patch:
@@ -168,34 +211,12 @@ def pdf_unread() -> Callable[[], AbstractContextManager[None]]:
     return unread
 
 
-@pytest.fixture(scope="session")
-def laid_out_once() -> Iterator[Callable[..., bytes]]:
-    """A page that was laid out in this session, with the same files inside, is not laid out again.
-
-    So tests of what is made again ask whether the page is the same. That its layout has the same bytes each time is
-    asked with ``laid_out_anew``, and in tests/reporting. Yields what lays out.
-    """
-    laid_out: dict[str, bytes] = {}
-    lay_out: Callable[..., bytes] = importlib.import_module("monitor.reporting.pdf.render").pdf_of
-
-    def page(html: str, **options: Any) -> bytes:
-        fonts = [font.read_bytes() for font in options.get("extra_fonts", ()) if font.is_file()]
-        key = hashlib.sha256(pickle.dumps((html, fonts, sorted(options.items())))).hexdigest()
-        if key not in laid_out:
-            laid_out[key] = lay_out(html, **options)
-        return laid_out[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        for room in ("pdf", "health"):
-            patch.setattr(f"monitor.reporting.{room}.render.pdf_of", page)
-        yield lay_out
-
-
 @pytest.fixture
-def laid_out_anew(laid_out_once: Callable[..., bytes], monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests of the bytes of a PDF: every page is laid out."""
-    for room in ("pdf", "health"):
-        monkeypatch.setattr(f"monitor.reporting.{room}.render.pdf_of", laid_out_once)
+def laid_out_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests of the bytes of a PDF: every page is laid out, in tests of workflow and command line too."""
+    lay_out = sys.modules["computed_once"].layout()
+    for name in sys.modules["computed_once"].LAYOUT:
+        monkeypatch.setattr(name, lay_out)
 
 
 @pytest.fixture(scope="session")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,14 +41,17 @@ def leaves(path: str, parser: argparse.ArgumentParser) -> Iterator[tuple[str, ar
             yield from leaves(f"{path} {name}", subparser)
 
 
-PARSERS = {path: parser for verb in VERBS for path, parser in leaves(verb, verb_parser(verb)[0])}
+@functools.cache
+def parsers() -> dict[str, argparse.ArgumentParser]:
+    """Return the parser of every verb and subverb."""
+    return {path: parser for verb in VERBS for path, parser in leaves(verb, verb_parser(verb)[0])}
 
 
 def live_options() -> dict[str, set[str]]:
     """Return the options of every verb and subverb, as the parsers have them."""
     return {
         path: {name for action in parser._actions for name in action.option_strings} - COMMON
-        for path, parser in PARSERS.items()
+        for path, parser in parsers().items()
     }
 
 
@@ -71,7 +75,7 @@ def test_the_first_table_has_every_verb_and_no_other() -> None:
 def test_every_option_has_a_help() -> None:
     silent = {
         f"{path} {action.option_strings[0]}"
-        for path, parser in PARSERS.items()
+        for path, parser in parsers().items()
         for action in parser._actions
         if action.option_strings and not action.help
     }
@@ -103,17 +107,15 @@ def fault_of(docstring: str | None) -> str | None:
     return None
 
 
+@functools.cache
 def class_definitions() -> dict[str, list[ast.ClassDef]]:
-    """Return the classes of the package by name."""
+    """Return the classes of the package by name. It takes seconds: asked for by tests alone, not to collect them."""
     classes: dict[str, list[ast.ClassDef]] = {}
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ClassDef):
                 classes.setdefault(node.name, []).append(node)
     return classes
-
-
-CLASSES = class_definitions()
 
 
 def members_of(node: ast.ClassDef) -> set[str]:
@@ -128,18 +130,20 @@ def members_of(node: ast.ClassDef) -> set[str]:
     }
     own |= set(re.findall(r"``([a-z_]+)``", ast.get_docstring(node) or ""))
     bases = {ast.unparse(base).split("[")[0] for base in node.bases}
-    return own.union(*(members_of(base) for name in bases for base in CLASSES.get(name, [])))
+    return own.union(*(members_of(base) for name in bases for base in class_definitions().get(name, [])))
 
 
-#: Documented members of the protocols, which a class has without naming the protocol among its bases.
-PROTOCOLS = set().union(
-    *(
-        members_of(node)
-        for nodes in CLASSES.values()
-        for node in nodes
-        if any("Protocol" in ast.unparse(base) for base in node.bases)
+@functools.cache
+def members_of_protocols() -> set[str]:
+    """Return the documented members of the protocols, which a class has without naming the protocol among its bases."""
+    return set().union(
+        *(
+            members_of(node)
+            for nodes in class_definitions().values()
+            for node in nodes
+            if any("Protocol" in ast.unparse(base) for base in node.bases)
+        )
     )
-)
 
 
 def faults(path: Path) -> list[str]:
@@ -153,7 +157,9 @@ def faults(path: Path) -> list[str]:
         if name in exempt or any(ast.unparse(decorator) == "overload" for decorator in node.decorator_list):
             continue
         documented = (
-            members_of(classes[of_class]) | PROTOCOLS | LIBRARY_METHODS if of_class in classes else set()
+            members_of(classes[of_class]) | members_of_protocols() | LIBRARY_METHODS
+            if of_class in classes
+            else set()
         )
         if member in documented and not ast.get_docstring(node):
             continue

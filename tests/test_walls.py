@@ -6,6 +6,7 @@ Imports inside functions and under ``TYPE_CHECKING`` count too: a wall with a do
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -86,8 +87,13 @@ def room_of(path: Path, package: Path) -> str:
     return path.relative_to(package).parts[0].removesuffix(".py")
 
 
-def imported(path: Path, package: Path) -> Iterator[tuple[int, str]]:
+@functools.cache
+def imported(path: Path, package: Path) -> tuple[tuple[int, str], ...]:
     """Line and dotted name of everything that a file imports; relative imports made absolute."""
+    return tuple(_imported(path, package))
+
+
+def _imported(path: Path, package: Path) -> Iterator[tuple[int, str]]:
     relative = path.relative_to(package.parent)
     here = relative.parts[:-1]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), filename=str(path))):

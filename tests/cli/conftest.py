@@ -42,11 +42,6 @@ Typed = Callable[..., Answer]
 
 
 @pytest.fixture(scope="session", autouse=True)
-def layouts(laid_out_once: object) -> None:
-    """No page is laid out twice."""
-
-
-@pytest.fixture(scope="session", autouse=True)
 def clock() -> Iterator[None]:
     """Certificates are issued on a day of ours, whatever the clock of the computer says."""
     with pytest.MonkeyPatch.context() as patch:
@@ -105,11 +100,14 @@ def examples() -> Path:
 
 
 @pytest.fixture(scope="session")
-def filled_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def filled_once(made_once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     """A database with three campaigns and no results, to be copied."""
-    path = tmp_path_factory.mktemp("filled") / "filled.duckdb"
-    assert main(["--db", str(path), "import", *(str(EXAMPLES / name) for name in CAMPAIGNS)]) == 0
-    return path
+
+    def fill(folder: Path) -> None:
+        path = folder / "filled.duckdb"
+        assert main(["--db", str(path), "import", *(str(EXAMPLES / name) for name in CAMPAIGNS)]) == 0
+
+    return made_once("three-campaigns", fill) / "filled.duckdb"
 
 
 @pytest.fixture(scope="module")
@@ -146,15 +144,27 @@ class Issued:
 
 
 @pytest.fixture(scope="session")
-def issued_once(filled_once: Path, laboratory: Path, tmp_path_factory: pytest.TempPathFactory) -> Issued:
-    folder = tmp_path_factory.mktemp("certificates") / "out folder ü"
-    path = folder.parent / "issued.duckdb"
-    shutil.copyfile(filled_once, path)
-    for campaign, run in (("five-days", 20), ("five-days", 19), ("cold-cold", 3)):
-        status = main(["--db", str(path), "certificate", "issue", campaign, "--run", str(run), "--date", "2026-03-10",
-                       "--laboratory", str(laboratory), "--out", str(folder)])  # fmt: skip
-        assert status == 0
-    return Issued(path, folder)
+def issued_once(
+    filled_once: Path, laboratory: Path, made_once: Callable[[str, Callable[[Path], object]], Path]
+) -> Issued:
+    def issue(folder: Path) -> None:
+        path = folder / "issued.duckdb"
+        shutil.copyfile(filled_once, path)
+        stated = [
+            "--date",
+            "2026-03-10",
+            "--laboratory",
+            str(laboratory),
+            "--out",
+            str(folder / "out folder ü"),
+        ]
+        for campaign, run in (("five-days", 20), ("five-days", 19), ("cold-cold", 3)):
+            assert (
+                main(["--db", str(path), "certificate", "issue", campaign, "--run", str(run), *stated]) == 0
+            )
+
+    folder = made_once("three-certificates", issue)
+    return Issued(folder / "issued.duckdb", folder / "out folder ü")
 
 
 @pytest.fixture

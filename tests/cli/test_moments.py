@@ -55,7 +55,13 @@ def test_what_is_no_moment_is_refused_with_forms_that_are_read(text: str) -> Non
         assert moment(form, "--at").tzinfo is not None
 
 
-@pytest.mark.parametrize("at", ["2025-07-20", "2025-07-20 14:00", "2025-07-20T14:00"])
+@pytest.mark.parametrize(
+    "at",
+    [
+        "2025-07-20 14:00",
+        *(pytest.param(at, marks=pytest.mark.slow) for at in ("2025-07-20", "2025-07-20T14:00")),
+    ],
+)
 def test_every_option_with_a_moment_reads_the_same_forms(typed: Any, db: Path, at: str) -> None:
     recorded = typed("event", "HU40-T", "belt changed", "--at", at, "--json", db=db)
     stored = datetime.fromisoformat(recorded.document["events"][0]["happened_at"])

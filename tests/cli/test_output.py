@@ -255,7 +255,7 @@ def test_a_full_disk_behind_the_pipe_is_told(started: Any) -> None:
     assert err == "monitor: the output could not be written: No space left on device\n"
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+@pytest.mark.parametrize("encoding", ["ascii", "utf-8", pytest.param("latin-1", marks=pytest.mark.slow)])
 def test_any_encoding_of_the_terminal_will_do(started: Any, encoding: str) -> None:
     process = started("effects", "backlash", env={"PYTHONIOENCODING": encoding}, encoding=encoding)
     out, err = process.communicate(timeout=250)

@@ -68,9 +68,8 @@ def test_bad_points_are_found_with_axis_and_size_and_are_no_effect(virtual_campa
 
 def test_a_bad_point_does_not_hide_an_effect(virtual_campaigns, explained):
     sim = simulator()
-    campaign, _ = virtual_campaigns.virtual(
-        4, [sim.Effect("EYX:poly2", peak_um=6.0)], bad_points=[(5, 20, (80.0, 0.0, 0.0))]
-    )
+    effect, bad = sim.Effect("EYX:poly2", peak_um=6.0), (5, 20, (80.0, 0.0, 0.0))
+    campaign, _ = virtual_campaigns.virtual(4, [effect], bad_points=[bad], days=2)
     answer = explained(campaign)
     assert [one.effect for one in answer.missing] == ["EYX:poly2"]
     assert [(point.run, point.sequence) for point in answer.suspect] == [(5, 20)]
@@ -102,9 +101,9 @@ def test_a_ball_that_moved_between_runs_is_a_step_of_that_ball_alone(virtual_cam
 def test_an_effect_that_varies_from_run_to_run_is_said_to_vary(virtual_campaigns, explained):
     """No recorded column follows it, and no bad points or moved balls are invented."""
     sim = simulator()
-    sizes = np.random.default_rng(3).standard_normal(20)
+    sizes = np.random.default_rng(3).standard_normal(12)
     sizes *= 2e-7 / np.std(sizes, ddof=1)
-    answer = explained(virtual_campaigns.virtual(3, [sim.Effect("EAX:poly1", coefficients=sizes)])[0])
+    answer = explained(virtual_campaigns.virtual(3, [sim.Effect("EAX:poly1", coefficients=sizes)], days=3)[0])
     (found,) = answer.missing
     assert found.effect == "EAX:poly1@each_run"
     assert found.varies

@@ -21,17 +21,18 @@ def names(found):
 @pytest.mark.parametrize(
     ("effect", "options"),
     [
-        ("EXX:poly2", {}),
-        ("EBZ:poly3", {}),
         ("EYY:cyclic16mm", {"direction": (1.0, -0.4)}),
-        ("EXC:harmonic3", {"direction": (0.3, 1.0)}),
-        ("EZC1:const@warmup", {"tau_s": 6000.0}),
         ("EB0C@run_time", {}),
-        ("EZC1:const@x_axis_degC", {}),
         ("artefact:expansion@run_time", {}),
         ("EZC:const@gravity", {"direction": (1.0, 0.5, 0.2)}),
         ("stem:gravity", {"targets": ("3",)}),
-        ("EAY:poly2", {}),
+        # Of their kinds the labelled campaigns and other tests have one each.
+        pytest.param("EXX:poly2", {}, marks=pytest.mark.slow),
+        pytest.param("EBZ:poly3", {}, marks=pytest.mark.slow),
+        pytest.param("EXC:harmonic3", {"direction": (0.3, 1.0)}, marks=pytest.mark.slow),
+        pytest.param("EZC1:const@warmup", {"tau_s": 6000.0}, marks=pytest.mark.slow),
+        pytest.param("EZC1:const@x_axis_degC", {}, marks=pytest.mark.slow),
+        pytest.param("EAY:poly2", {}, marks=pytest.mark.slow),
     ],
 )
 def test_a_hidden_effect_leads_or_stands_in_the_leading_group(virtual_campaigns, explained, effect, options):
@@ -66,6 +67,7 @@ def test_three_effects_are_found_one_after_the_other_and_the_error_falls(virtual
     assert answer.missing[-1].held_out_after == pytest.approx(1e-3, rel=0.03)
 
 
+@pytest.mark.slow
 def test_growth_of_the_artefact_is_not_told_as_that_of_two_axes(virtual_campaigns, explained):
     sim = simulator()
     hidden = [
@@ -103,13 +105,18 @@ def test_a_pitch_that_nobody_knows_is_found_with_its_uncertainty(virtual_campaig
     "options",
     [
         {"days": 1, "runs_per_day": 1},
-        {"days": 1, "runs_per_day": 2},
-        {"days": 3, "runs_per_day": 1},
-        {"cold": True, "noise_um": 0.7},
-        {"noise_um": 0.5, "stated_um": 1.0},
-        {"stated_um": 1 / 1.2},
-        {"with_channels": False},
-        {"keep": lambda told: (told["run"] % 2 == 1) | (told["sequence"] < 50)},
+        {"noise_um": 0.5, "stated_um": 1.0, "days": 2},
+        {"with_channels": False, "days": 2},
+        {"keep": lambda told: (told["run"] % 2 == 1) | (told["sequence"] < 50), "days": 2},
+        pytest.param({"cold": True, "noise_um": 0.7}, marks=pytest.mark.slow),
+        pytest.param({"days": 1, "runs_per_day": 2}, marks=pytest.mark.slow),
+        pytest.param({"days": 3, "runs_per_day": 1}, marks=pytest.mark.slow),
+        pytest.param({"noise_um": 0.5, "stated_um": 1.0}, marks=pytest.mark.slow),
+        pytest.param({"stated_um": 1 / 1.2}, marks=pytest.mark.slow),
+        pytest.param({"with_channels": False}, marks=pytest.mark.slow),
+        pytest.param(
+            {"keep": lambda told: (told["run"] % 2 == 1) | (told["sequence"] < 50)}, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_campaigns_of_other_kinds_with_and_without_an_effect(virtual_campaigns, explained, options):
@@ -140,7 +147,7 @@ def test_an_error_of_a_tenth_of_a_millimetre_is_still_one_effect(virtual_campaig
     assert abs(found.amplitude) == pytest.approx(0.1, rel=3e-3)
 
 
-@pytest.mark.parametrize("chosen", [(3, 5, 9, 12), (2,), (4, 5)])
+@pytest.mark.parametrize("chosen", [(3, 5, 9, 12), (2,), pytest.param((4, 5), marks=pytest.mark.slow)])
 def test_runs_that_were_left_out_or_never_probed_do_not_matter(virtual_campaigns, explained, chosen):
     sim = simulator()
     campaign, _ = virtual_campaigns.virtual(
@@ -152,7 +159,7 @@ def test_runs_that_were_left_out_or_never_probed_do_not_matter(virtual_campaigns
 
 def test_an_added_effect_is_missing_no_more_and_a_removed_one_is_again(virtual_campaigns):
     sim = simulator()
-    campaign, _ = virtual_campaigns.virtual(2, [sim.Effect("EXX:reversal", peak_um=5.0)])
+    campaign, _ = virtual_campaigns.virtual(2, [sim.Effect("EXX:reversal", peak_um=5.0)], days=2)
     rng = np.random.default_rng(1)
     grown = problem_of(campaign, Model("grown", added=("EXX:reversal",)))
     answer = explain(campaign, grown, "grown", rng=rng)
@@ -163,13 +170,19 @@ def test_an_added_effect_is_missing_no_more_and_a_removed_one_is_again(virtual_c
 
 
 @pytest.mark.parametrize(
-    "effect", ["EZC1:const@warmup", "EB0C@run_time", "EZC:const@gravity", "artefact:expansion@run_time"]
+    "effect",
+    [
+        "EZC1:const@warmup",
+        "EZC:const@gravity",
+        pytest.param("EB0C@run_time", marks=pytest.mark.slow),
+        pytest.param("artefact:expansion@run_time", marks=pytest.mark.slow),
+    ],
 )
 def test_an_added_effect_that_follows_a_driver_is_missing_no_more(virtual_campaigns, effect):
     sim = virtual_campaigns.simulator()
     width = 3 if effect.endswith("gravity") else 1
     hidden = sim.Effect(effect, peak_um=8.0, direction=(1.0, 0.5, 0.2)[:width])
-    campaign, _ = virtual_campaigns.virtual(3, [hidden])
+    campaign, _ = virtual_campaigns.virtual(3, [hidden], days=2)
     grown = problem_of(campaign, Model("grown", added=(effect,)))
     answer = explain(campaign, grown, "grown", rng=np.random.default_rng(1))
     assert answer.missing == ()

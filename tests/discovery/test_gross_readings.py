@@ -35,7 +35,7 @@ def second_run(campaign):
     return np.flatnonzero(campaign.probings.run == runs[min(1, len(runs) - 1)])
 
 
-@pytest.mark.parametrize("machine", ["trunnion", "one rotary table"])
+@pytest.mark.parametrize("machine", ["trunnion", pytest.param("one rotary table", marks=pytest.mark.slow)])
 def test_a_wrong_reading_of_a_ball_is_the_one_that_is_named(virtual_campaigns, seeds, machine):
     campaign = virtual_campaigns.on_machine(machine, 5)[0]
     rows, axes = second_run(campaign), ("X", "Y", "Z")

@@ -89,6 +89,7 @@ def test_no_example_is_gross(example: str) -> None:
     assert not is_gross(campaign, fit(maker(campaign)(campaign)))
 
 
+@pytest.mark.slow
 def test_exchanged_linear_columns_of_balls() -> None:
     assert told(recorded("five-days", readings(X="Y", Y="X"))) == ["the columns x_mm and y_mm were exchanged"]
 

@@ -10,14 +10,18 @@ from monitor.discovery import Verdict
 from monitor.methods.chain.problem import solve_problem
 from monitor.methods.samba.method import problem_of
 
-MACHINES = ("trunnion", "tilting table on X", "head and table", "fork head", "one rotary table")
+#: The others have their turn in ``make slow``; of them two have a test below, one a rate in the trials.
+MACHINES = ("trunnion", "head and table")
+OTHERS = ("tilting table on X", "fork head", "one rotary table")
 
 
 def groups(answer):
     return [{one.effect, *(rival.effect for rival in one.rivals)} for one in answer.missing]
 
 
-@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize(
+    "machine", [*MACHINES, *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)]
+)
 def test_nothing_is_told_where_nothing_is_hidden(virtual_campaigns, explained, machine):
     campaign, _ = virtual_campaigns.on_machine(machine, 80000)
     answer = explained(campaign)
@@ -25,7 +29,7 @@ def test_nothing_is_told_where_nothing_is_hidden(virtual_campaigns, explained, m
     assert answer.comparison.verdict is Verdict.EXPLAINED
 
 
-@pytest.mark.parametrize("machine", ["fork head", "one rotary table"])
+@pytest.mark.parametrize("machine", ["fork head", pytest.param("one rotary table", marks=pytest.mark.slow)])
 def test_two_hidden_effects_are_told(virtual_campaigns, explained, machine):
     sim = simulator()
     hidden = ("EXX:reversal", "EZZ:poly2" if machine == "one rotary table" else "EYX:poly3")
@@ -35,7 +39,9 @@ def test_two_hidden_effects_are_told(virtual_campaigns, explained, machine):
     assert all(any(name in group for group in found) for name in hidden)
 
 
-@pytest.mark.parametrize("seed", range(90000, 90003))
+@pytest.mark.parametrize(
+    "seed", [90000, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (90001, 90002))]
+)
 def test_an_axis_that_stands_still_does_not_sell_its_noise(virtual_campaigns, explained, seed):
     """Along a single rotary table's axis nothing moves: cos(2 pi y / 16 mm) of the readings is then their noise in
     another unit, and a gain that only the stylus' offset of 0.3 mm determines would take the rest of it."""

@@ -19,7 +19,7 @@ def bumped(virtual_campaigns):
     bump = sim.Effect(
         "EYX:table", coefficients=list(8e-3 * np.exp(-(((GRID - 60.0) / 60.0) ** 2))), grid=list(GRID)
     )
-    return virtual_campaigns.virtual(4, [bump, sim.Effect("EZC1:const@warmup", peak_um=6.0)])[0]
+    return virtual_campaigns.virtual(4, [bump, sim.Effect("EZC1:const@warmup", peak_um=6.0)], days=2)[0]
 
 
 @pytest.fixture(scope="module")
@@ -57,5 +57,5 @@ def test_the_ends_of_a_table_hold_what_the_base_can_do(explanation):
 def test_shapes_of_the_catalogue_stay_what_they_are(virtual_campaigns, explained):
     sim = virtual_campaigns.simulator()
     effects = [sim.Effect("EYX:poly3", peak_um=8.0), sim.Effect("EYX:reversal", peak_um=5.0)]
-    found = [one.effect for one in explained(virtual_campaigns.virtual(6, effects)[0]).missing]
+    found = [one.effect for one in explained(virtual_campaigns.virtual(6, effects, days=2)[0]).missing]
     assert sorted(found) == ["EYX:poly3", "EYX:reversal"]

@@ -33,7 +33,9 @@ def trial():
     return load("trial_unknown", Path(__file__).resolve().parents[1] / "benchmarks" / "trial_unknown.py")
 
 
-@pytest.mark.parametrize("family", ["play over 40 mm", "fifth harmonic of C", "X times B"])
+@pytest.mark.parametrize(
+    "family", ["play over 40 mm", "X times B", pytest.param("fifth harmonic of C", marks=pytest.mark.slow)]
+)
 def test_the_right_error_alone_is_named(virtual_campaigns, trial, explained, family):
     right, effect, curve = trial.FAMILIES[family]
     hidden = simulator().Effect(effect, peak_um=5.0, curve=curve)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
 
@@ -17,11 +17,6 @@ CAMPAIGNS = ("five-days", "cold-cold", "hidden-reversal-x")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def layouts(laid_out_once: object) -> None:
-    """No page is laid out twice."""
-
-
-@pytest.fixture(scope="session", autouse=True)
 def clock() -> Iterator[None]:
     """Certificates are issued on a day of ours, whatever the clock of the computer says."""
     with pytest.MonkeyPatch.context() as patch:
@@ -30,11 +25,12 @@ def clock() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def filled(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("workflow") / "filled.duckdb"
-    with Database(path) as db:
-        import_folders(db, ImportRequest([EXAMPLES / name for name in CAMPAIGNS]))
-    return path
+def filled(made_once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+    def fill(folder: Path) -> None:
+        with Database(folder / "filled.duckdb") as db:
+            import_folders(db, ImportRequest([EXAMPLES / name for name in CAMPAIGNS]))
+
+    return made_once("workflow", fill) / "filled.duckdb"
 
 
 @pytest.fixture

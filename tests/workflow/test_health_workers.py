@@ -85,28 +85,39 @@ def test_no_worker_is_too_few(fleet: Path, tmp_path: Path) -> None:
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks for the workers in /proc")
 def test_ctrl_c_ends_the_workers_without_a_word_of_theirs(fleet: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "monitor.cli", "--db", str(fleet), "report", "--week", "2026-W10"]
-    with subprocess.Popen(
-        [*command, "--workers", "2", "--out", str(tmp_path / "out")],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    ) as process:  # fmt: skip
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        deadline = time.monotonic() + 120
-        # The two workers, and Python's tracker of resources.
-        while (
-            process.poll() is None and len(children.read_text().split()) < 3 and time.monotonic() < deadline
-        ):
-            time.sleep(0.05)
-        workers = children.read_text().split()
-        assert len(workers) == 3
-        # As a terminal does: to all processes of the group, while the workers still import.
-        os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate(timeout=120)
+    # On a busy machine the report may be made before the signal comes: it is made again then.
+    for attempt in range(5):
+        status, out, err, workers = interrupted(
+            [*command, "--workers", "2", "--out", str(tmp_path / f"out-{attempt}")]
+        )
+        if status != 0:
+            break
     # Started with -m, Python ends itself by the signal where Ctrl-C went through an exec; a shell calls either 130.
-    assert process.returncode in (130, -signal.SIGINT)
+    assert status in (130, -signal.SIGINT)
     assert (out, err) == ("", STOPPED)
-    deadline = time.monotonic() + 30
+    assert len(workers) == 3
+    deadline = time.monotonic() + 120
     while any(Path(f"/proc/{one}").exists() for one in workers) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not [one for one in workers if Path(f"/proc/{one}").exists()]
     with Database(fleet) as db:
         assert verify_audit(db).ok
+
+
+def interrupted(command: list[str]) -> tuple[int, str, str, list[str]]:
+    """Status and output of a report whose processes all got Ctrl-C once there were two workers, and its children."""
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        deadline = time.monotonic() + 300
+        workers: list[str] = []
+        # The two workers, and Python's tracker of resources.
+        while len(workers) < 3 and process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.05)
+            workers = children.read_text().split()
+        if process.poll() is None:
+            # As a terminal does: to all processes of the group, while the workers still import.
+            os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=300)
+    return process.returncode, out, err, workers

@@ -1,0 +1,128 @@
+"""What the product computes from equal inputs is computed once in a session of tests, by the first worker to need it.
+
+Only costly functions whose answer depends on their arguments alone, and only in the folders whose tests ask something
+else (``FOLDERS``): where such a function is itself the subject, every call computes. An answer is kept as a file in a
+folder that the workers share, and read anew by each who asks, so that nobody can alter another's. Loaded by
+``tests/conftest.py``; the processes that tests start compute everything themselves.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import importlib
+import os
+import pickle
+from collections.abc import Callable, Generator, Iterator, Mapping
+from datetime import date, tzinfo
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+#: Folders and files of tests in which equal questions are computed once.
+FOLDERS = ("api", "cli", "web", "workflow", "test_readme.py")
+
+#: The functions, each by the modules' names for it that are replaced.
+LAYOUT = ("monitor.reporting.pdf.render.pdf_of", "monitor.reporting.health.render.pdf_of")
+REGION_FACTORS = (
+    "monitor.uncertainty.framework.region_factors",
+    "monitor.workflow.uncertainty.stating.region_factors",
+)
+JOINT_COVERAGE = ("monitor.workflow.uncertainty.stating.joint_coverage",)
+ROBUST_FIT = (
+    "monitor.discovery.robust_fit",
+    "monitor.workflow.explain.explain.robust_fit",
+    "monitor.workflow.uncertainty.evaluation.robust_fit",
+)
+FIT = ("monitor.workflow.uncertainty.evaluation.fit",)
+SEARCH = ("monitor.workflow.explain.explain.explanation_of", "monitor.workflow.health.task.explanation_of")
+COMPUTED_ONCE = (LAYOUT, REGION_FACTORS, JOINT_COVERAGE, ROBUST_FIT, FIT, SEARCH)
+
+#: The folder of this session's answers, which a fixture of ``conftest.py`` names.
+FOLDER: list[Path] = []
+
+
+def parts_of(value: object) -> Iterator[bytes]:
+    """Yield bytes that are equal for equal values, whichever objects hold them."""
+    yield type(value).__qualname__.encode()
+    if isinstance(value, np.ndarray):
+        yield repr((value.shape, value.dtype.str)).encode()
+        yield np.ascontiguousarray(value).tobytes()
+    elif isinstance(value, Path):
+        # A file is what is in it.
+        yield value.read_bytes() if value.is_file() else str(value).encode()
+    elif isinstance(value, Enum):
+        yield value.name.encode()
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            yield from parts_of(getattr(value, field.name))
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from parts_of(key)
+            yield from parts_of(inner)
+    elif isinstance(value, (list, tuple)):
+        yield str(len(value)).encode()
+        for inner in value:
+            yield from parts_of(inner)
+    elif isinstance(value, (bytes, str, int, float, type(None), date, tzinfo)):
+        yield repr(value).encode()
+    else:
+        raise TypeError(f"{value!r} has no key: a function that takes it cannot be computed once")
+
+
+def key_of(*values: object) -> str:
+    """Return a key that equal values share."""
+    digest = hashlib.sha256()
+    for part in parts_of(values):
+        digest.update(len(part).to_bytes(8, "little"))
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def computed_once(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that computes only what no worker has computed; what it raises is not kept."""
+
+    @functools.wraps(function)
+    def answer(*arguments: Any, **options: Any) -> Any:
+        file = FOLDER[-1] / key_of(name, arguments, sorted(options.items()))
+        if not file.exists():
+            partial = file.with_suffix(f".{os.getpid()}")
+            partial.write_bytes(pickle.dumps(function(*arguments, **options)))
+            partial.replace(file)
+        return pickle.loads(file.read_bytes())
+
+    return answer
+
+
+_REPLACEMENTS: dict[str, Callable[..., Any]] = {}
+
+
+def _replacements() -> dict[str, Callable[..., Any]]:
+    """What stands for each function while the tests of ``FOLDERS`` run, made with the first of them."""
+    if not _REPLACEMENTS:
+        for names in COMPUTED_ONCE:
+            module, _, attribute = names[0].rpartition(".")
+            function = getattr(importlib.import_module(module), attribute)
+            _REPLACEMENTS.update(dict.fromkeys(names, computed_once(names[0], function)))
+    return _REPLACEMENTS
+
+
+def layout() -> Callable[..., bytes]:
+    """Return what lays out a page each time."""
+    function: Callable[..., bytes] = _replacements()[LAYOUT[0]].__wrapped__  # type: ignore[attr-defined]
+    return function
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Replace the functions around a test, with the fixtures that it is the first to need."""
+    below = item.path.relative_to(Path(__file__).parent).parts[0]
+    with pytest.MonkeyPatch.context() as patch:
+        if below in FOLDERS:
+            for name, function in _replacements().items():
+                patch.setattr(name, function)
+        return (yield)
