@@ -20,17 +20,21 @@ from monitor.records import Array
 
 # The variance of fewer poses than this is too uncertain to be a yardstick.
 FEWEST_POSES = 30
+# The numbers of one row that a joint moves together, as it does those of two points.
+PLACE_AND_ORIENTATION = 6
 
 
 def poses_of_rows(fit: Fit) -> npt.NDArray[np.int64] | None:
     """The pose (M,) of every whitened number, -1 for calibrated quantities and padding: rows of one run after another
-    at which no axis moved. None where hardly a pose has several rows, or there are few."""
+    at which no axis moved. None where hardly a pose has several rows or a place with its orientation, or there are few.
+    """
     problem = fit.problem
     context = problem.context
     moved = np.any(np.diff(context.positions, axis=0) != 0.0, axis=1) | (np.diff(context.run) != 0)
     pose = np.concatenate([[0], np.cumsum(moved)])
     poses = int(pose[-1]) + 1
-    if poses < FEWEST_POSES or 2 * poses > len(pose):
+    several = 2 * poses <= len(pose) or problem.sigma.shape[1] >= PLACE_AND_ORIENTATION
+    if poses < FEWEST_POSES or not several:
         return None
     numbers = np.repeat(pose, problem.sigma.shape[1]).reshape(problem.sigma.shape)
     return problem.padded(numbers + 1.0).astype(np.int64).reshape(-1) - 1
