@@ -29,7 +29,8 @@ BRANCHES: tuple[Branch, ...] = ("tool", "work")
 @dataclass(frozen=True)
 class ReadingFormat:
     """What a kind of reading asks of the file: its ``columns`` (those of ``optional`` may be empty or missing), whether
-    they are angles, whether an orientation ``turns`` besides lengths, the keys that it needs, those that it allows, and the unknowns that may be ``known``."""
+    they are angles, the keys that it needs, those that it allows, the unknowns that may be ``known``, and whether it
+    ``turns``: an orientation besides lengths, with an uncertainty of its own."""
 
     columns: tuple[str, ...]
     angular: bool = False

@@ -2,9 +2,9 @@
 
     python tests/benchmarks/trial_robot_sizes.py --seeds 200
 
-A joint gives way by a known coefficient. Beside it stands what no model has: joints that come to rest anew, and lines of
-gears. The shares are those of robots whose true coefficient lies within 2 u, of ``explain`` (readings of a pose counted
-together) and of ``identify`` with the effect in the model.
+A joint gives way by a known coefficient. Beside it stands what no model has: joints that come to rest anew, and
+lines of gears. The shares are those of robots whose true coefficient lies within 2 u, of ``explain`` and of
+``identify`` with the effect in the model.
 """
 
 from __future__ import annotations

@@ -112,5 +112,5 @@ def test_a_quaternion_has_length_one(tmp_path: Path) -> None:
     cells = rows[4].split(",")
     rows[4] = ",".join([*cells[:-1], "1.5"])
     (folder / "probings.csv").write_text("\n".join(rows))
-    with pytest.raises(CampaignError, match="the quaternion has length .*; a quaternion has length 1"):
+    with pytest.raises(CampaignError, match=r"the quaternion has length .*; a quaternion has length 1"):
         read_campaign(folder)
