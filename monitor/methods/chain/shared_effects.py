@@ -110,9 +110,9 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
     reasons: list[Reason | None] = [
         None if free else Reason(ReasonKind.UNSEEN) for free in solution.common_free
     ]
-    for column in np.flatnonzero(solution.common_held):
+    for column in map(int, np.flatnonzero(solution.common_held)):
         at = problem.linearise(solution.local, solution.common)
-        same = replaced_by(problem.shared, at, solution.common_held, int(column))
+        same = replaced_by(problem.shared, at, solution.common_held, column)
         reasons[column] = Reason(ReasonKind.HELD_AT_ZERO, same)
     by_error = problem.evaluated(solution.local, solution.common, jacobian=True).by_error
     assert by_error is not None

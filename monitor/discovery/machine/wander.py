@@ -1,0 +1,70 @@
+"""A tracker that wanders: what reflectors beside the machine say of a drift that is about to be named.
+
+A drift of the whole machine and one of what looks at it differ on resting targets alone. A tracker seldom drifts along
+the curves of the catalogue; it walks. So, before the machine is named, its drift has to stand out beside a tracker that
+moves in every run along any curve of some nodes, in all three directions: only what resting targets do not take part in
+is left to the machine then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.search.candidate import Variant
+from monitor.effects import ArtefactEffect, Context
+from monitor.effects.description import Description
+from monitor.effects.driver import HeatDriver
+from monitor.effects.drivers import Always
+from monitor.records import Array
+from monitor.units import MICROMETRE, Unit
+
+# Nodes of the tracker's curve in every run: each is held by some visits of the resting targets.
+FEWEST_NODES, MOST_NODES, VISITS_A_NODE = 3, 10, 2
+
+
+@dataclass(frozen=True)
+class TrackerWander:
+    """A shift of the tracker's frame along a curve of ``nodes`` over every run; never an answer itself."""
+
+    nodes: int
+    text: str = "tracker:wander"
+    unit: Unit = MICROMETRE
+
+    def labels(self, context: Context) -> tuple[str, ...]:
+        """A suffix for each coefficient: run by run, node by node, along X, Y and Z."""
+        runs = np.unique(context.run)
+        return tuple(f".{run}.{node}.{axis}" for run in runs for node in range(self.nodes) for axis in "xyz")
+
+    def shifts(self, context: Context) -> Array:
+        """The shifts (n, 3, 3 R K) of all rows."""
+        grid = np.linspace(0.0, 1.0, self.nodes)
+        curves = np.clip(1.0 - np.abs(context.run_time[:, None] - grid) / grid[1], 0.0, None)
+        inside = context.run[:, None] == np.unique(context.run)
+        shifts = np.einsum("nr,nk,ab->narkb", inside, curves, np.eye(3))
+        return np.asarray(shifts.reshape(len(context), 3, -1))
+
+    def described(self, driven: str) -> Description:
+        """A curve that nobody is told of."""
+        return Description("the frame of the tracker wanders", "", "", "")
+
+
+def is_drift_of_machine(candidate: ChainCandidate) -> bool:
+    """Whether an effect is a drift with time or heat of anything but the tracker."""
+    effect = candidate.effect
+    return not isinstance(effect, ArtefactEffect) and isinstance(effect.driver, HeatDriver)
+
+
+def tracker_wander(scene: ChainScene) -> tuple[ChainCandidate, ...]:
+    """What a tracker that walks could do; empty where no target rests."""
+    problem = scene.fit.problem
+    resting = np.isin(problem.context.target, list(problem.resting))
+    if not resting.any():
+        return ()
+    runs = len(problem.runs)
+    visits = int(resting.sum()) // (len(problem.resting) * runs)
+    nodes = int(np.clip(visits // VISITS_A_NODE, FEWEST_NODES, MOST_NODES))
+    wander = ArtefactEffect(TrackerWander(nodes), Always(), "")
+    return scene_of(scene.fit, [Variant(wander.text, wander)]).candidates
