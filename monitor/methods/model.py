@@ -10,7 +10,6 @@ from monitor.machine import Chain, chain_of_axes, parse_topology
 from monitor.methods.chain.base_effects import base_effects
 from monitor.records import Machine
 
-
 #: Among the added effects: all base effects, one number for all runs of a campaign instead of one in each.
 SHARED_BASE = "base@all_runs"
 
@@ -19,8 +18,8 @@ SHARED_BASE = "base@all_runs"
 class Model:
     """A named list of effects. ``base`` empty means: the complete and minimal set of the machine's chain.
 
-    With ``SHARED_BASE`` among the ``added`` effects the base is shared by all runs (one session of a robot whose tracker
-    was set up several times), and none of it is free in a run.
+    With ``SHARED_BASE`` among the ``added`` effects the base is shared by all runs (one session of a robot whose
+    tracker was set up several times), and none of it is free in a run.
     """
 
     name: str

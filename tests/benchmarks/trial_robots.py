@@ -201,8 +201,8 @@ def noise_of(rng: np.random.Generator, kind: str, count: int) -> np.ndarray:
 
 
 def empty_table(seeds: range, poses: int) -> None:
-    """Robots that hide nothing, in three kinds of noise: effects that are told all the same; and robots whose base drifts
-    by 0.1 mm while the reflectors beside them stand still, which is to be told as such."""
+    """Robots that hide nothing, in three kinds of noise: effects that are told all the same; and robots whose base
+    drifts by 0.1 mm while the reflectors beside them stand still, which is to be told as such."""
     print("| noise | robots | with false effects | false effects | explain / s |")
     print("| --- | --- | --- | --- | --- |")
     for kind in ("white", "ar", "walk", "base drifts"):

@@ -16,7 +16,8 @@ import scipy
 
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.flexible import error_of
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.slight_shapes import slight_shape
 from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
@@ -55,7 +56,10 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     not."""
     selected = result.candidates
     if not selected and not _lacks_something(scene):
-        return scene, result
+        slight = _slight(scene)
+        if slight is None:
+            return scene, result
+        return _with_candidate(scene, slight), ScanResult(findings_of(scene, [slight]), result.remaining)
     for symbol in dict.fromkeys(map(error_of, filter(_is_of_shape, selected))):
         mine = [shape for shape in filter(_is_of_shape, selected) if error_of(shape) == symbol]
         others = [shape for shape in selected if not _is_among(shape, mine)]
@@ -95,6 +99,20 @@ def _leaves_something(scene: ChainScene, selected: Sequence[ChainCandidate]) -> 
 def _is_free(candidate: ChainCandidate) -> bool:
     effect = candidate.effect
     return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
+
+
+def _slight(scene: ChainScene) -> ChainCandidate | None:
+    """One part of an error of free shape that stands out, and predicts poses and runs that were left out."""
+    shapes: dict[str, list[ChainCandidate]] = {}
+    for shape in filter(_is_of_shape, scene.candidates):
+        shapes.setdefault(error_of(shape), []).append(shape)
+    part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
+    if part is None:
+        return None
+    free = _of_parts(scene, part[0], [part[1]], shapes[part[0]], [])
+    before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([free]))
+    predicts = before is None or after is None or after < before
+    return free if predicts and _predicts(scene, free, []) else None
 
 
 def _alone(scene: ChainScene, selected: Sequence[ChainCandidate]) -> ChainCandidate | None:
@@ -150,10 +168,14 @@ def _free(
 
 def _whole(scene: ChainScene, symbol: str, shape: ChainCandidate) -> ChainCandidate:
     """The whole flexible basis of the error of which a candidate is a shape."""
+    return scene_of(scene.fit, [_in_any_shape(symbol, shape)]).candidates[0]
+
+
+def _in_any_shape(symbol: str, shape: ChainCandidate) -> ChainVariant:
+    """The error of which a candidate is a shape, in any shape, under its symbol."""
     effect = shape.effect
     assert isinstance(effect, ChainEffect)
-    variant = Variant(f"{symbol}:free", replace(effect, shape=Free(), shape_text="free"))
-    return scene_of(scene.fit, [variant]).candidates[0]
+    return Variant(symbol, replace(effect, shape=Free(), shape_text="free"))
 
 
 def _of_parts(

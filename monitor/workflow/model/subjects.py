@@ -66,8 +66,8 @@ class Machines:
         if effect == SHARED_BASE:
             if self.method is None or not self.method.shares_base:
                 raise InputError(
-                    "base@all_runs: only where a machine is seen from outside (tracker) can its base effects be shared by all "
-                    "runs of a campaign; elsewhere they are what is followed from run to run"
+                    f"{SHARED_BASE}: only where a machine is seen from outside (tracker) can its base effects be "
+                    "shared by all runs of a campaign; elsewhere they are what is followed from run to run"
                 )
             return effect
         text = _first(chains, lambda chain: parse_effect(effect, chain).text)

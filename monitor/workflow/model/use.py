@@ -75,8 +75,8 @@ def _check_effects(db: Database, model: StoredModel, machine: str) -> None:
     for effect in model.effects:
         if effect == SHARED_BASE:
             raise InputError(
-                f"model {label(model)} has one base for all runs of a campaign, so that there is nothing to follow from "
-                "run to run; choose a model without '{SHARED_BASE}'"
+                f"model {label(model)} has one base for all runs of a campaign, so that there is nothing to follow "
+                f"from run to run; choose a model without {SHARED_BASE}"
             )
         try:
             parse_effect(effect, chain)
