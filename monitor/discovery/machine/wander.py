@@ -13,8 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.search.candidate import Variant
-from monitor.effects import ArtefactEffect, Context
+from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of
+from monitor.effects import ArtefactEffect, ChainEffect, Context
 from monitor.effects.description import Description
 from monitor.effects.driver import HeatDriver
 from monitor.effects.drivers import Always
@@ -68,3 +71,58 @@ def tracker_wander(scene: ChainScene) -> tuple[ChainCandidate, ...]:
     nodes = int(np.clip(visits // VISITS_A_NODE, FEWEST_NODES, MOST_NODES))
     wander = ArtefactEffect(TrackerWander(nodes), Always(), "")
     return scene_of(scene.fit, [Variant(wander.text, wander)]).candidates
+
+
+def with_base_instead(scene: ChainScene, result: ChainScan) -> ChainScan:
+    """The result with a base of the machine that moves in place of a tracker that does, where resting targets say so.
+
+    A shift of the tracker has three coefficients and is found in one step; each direction in which a base moves is an
+    effect of its own and stands behind it until all are tried together. That something moves is certain already: only
+    which of the two is asked, and nothing is paid for the catalogue again.
+    """
+    problem = scene.fit.problem
+    first = problem.context.chain.joints[len(problem.context.chain.work)].name
+    of_base = [candidate for candidate in scene.candidates if _moves_base(candidate, first)]
+    seen = [candidate for candidate in result.candidates if _is_tracker(candidate)]
+    if not seen or not of_base or not problem.resting:
+        return result
+    others = [
+        candidate
+        for candidate in result.candidates
+        if not _is_tracker(candidate) and not _moves_base(candidate, first)
+    ]
+    base: list[ChainCandidate] = []
+    worth = 0.0
+    while True:
+        families = {candidate.family.partition("@")[0] for candidate in base}
+        rest = [each for each in of_base if each.family.partition("@")[0] not in families]
+        weighed = weigh_beside(scene, rest, [*others, *base]) if rest else []
+        if not weighed or weighed[0].score <= 0.0:
+            break
+        base.append(weighed[0].candidate)
+        worth += weighed[0].score
+    named = [
+        candidate
+        for candidate in result.candidates
+        if _is_tracker(candidate) or _moves_base(candidate, first)
+    ]
+    present = 0.0
+    for index, candidate in enumerate(named):
+        present += weigh_beside(scene, [candidate], [*others, *named[:index]])[0].score
+    if not base or worth <= present + WORTH_EXCHANGING:
+        return result
+    return ScanResult(findings_of(scene, [*others, *base]), result.remaining)
+
+
+def _is_tracker(candidate: ChainCandidate) -> bool:
+    return isinstance(candidate.effect, ArtefactEffect) and candidate.family.startswith("tracker:")
+
+
+def _moves_base(candidate: ChainCandidate, first: str) -> bool:
+    """Whether an effect is a drift of where the first axis stands."""
+    effect = candidate.effect
+    return (
+        isinstance(effect, ChainEffect)
+        and effect.term.symbol.endswith(f"0{first}")
+        and is_drift_of_machine(candidate)
+    )
