@@ -38,7 +38,7 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
         if not new or len(gears) > MOST_GEARS:
             if not all_curves_were_searched(scene.fit):
                 scene, result = with_tables(scene, result, scanned)
-            result = with_base_instead(scene, result)
+            result = with_base_instead(scene, result, rate)
             scene, result = with_unknown_shapes(scene, standing_out(scene, result))
             return scene, by_error_taken_away(scene, standing_out(scene, result))
         gears |= {variant.effect.text for variant in new}

@@ -8,14 +8,17 @@ is left to the machine then.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.projection import orthonormal, without
 from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of
 from monitor.effects import ArtefactEffect, ChainEffect, Context
 from monitor.effects.description import Description
@@ -73,12 +76,13 @@ def tracker_wander(scene: ChainScene) -> tuple[ChainCandidate, ...]:
     return scene_of(scene.fit, [Variant(wander.text, wander)]).candidates
 
 
-def with_base_instead(scene: ChainScene, result: ChainScan) -> ChainScan:
+def with_base_instead(scene: ChainScene, result: ChainScan, rate: float) -> ChainScan:
     """The result with a base of the machine that moves in place of a tracker that does, where resting targets say so.
 
     A shift of the tracker has three coefficients and is found in one step; each direction in which a base moves is an
     effect of its own and stands behind it until all are tried together. That something moves is certain already: only
-    which of the two is asked, and nothing is paid for the catalogue again.
+    which of the two is asked, and nothing is paid for the catalogue again. The base has to be seen at ``rate`` beside a
+    tracker that moves along any curve.
     """
     problem = scene.fit.problem
     first = problem.context.chain.joints[len(problem.context.chain.work)].name
@@ -109,9 +113,26 @@ def with_base_instead(scene: ChainScene, result: ChainScan) -> ChainScan:
     present = 0.0
     for index, candidate in enumerate(named):
         present += weigh_beside(scene, [candidate], [*others, *named[:index]])[0].score
-    if not base or worth <= present + WORTH_EXCHANGING:
+    if (
+        not base
+        or worth <= present + WORTH_EXCHANGING
+        or not _is_seen_beside_wander(scene, base, others, rate)
+    ):
         return result
     return ScanResult(findings_of(scene, [*others, *base]), result.remaining)
+
+
+def _is_seen_beside_wander(
+    scene: ChainScene, base: Sequence[ChainCandidate], others: Sequence[ChainCandidate], rate: float
+) -> bool:
+    beside = scene.remainders.beside([*others, *tracker_wander(scene)])
+    columns = orthonormal(without(beside.basis, np.concatenate([each.columns for each in base], axis=1)))
+    explained, size = float(np.sum((columns.T @ beside.residual) ** 2)), columns.shape[1]
+    dof = beside.degrees_of_freedom - size
+    rest = float(beside.residual @ beside.residual) - explained
+    if size == 0 or dof < 1 or rest <= 0.0:
+        return False
+    return float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof))) <= rate
 
 
 def _is_tracker(candidate: ChainCandidate) -> bool:
