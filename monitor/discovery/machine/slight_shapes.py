@@ -20,11 +20,11 @@ from monitor.discovery.search.sign_flips import signs
 from monitor.records import Array
 
 # The search may be wrong in one empty campaign of a hundred; this is its part of that, and that of the flips.
-LEVEL, FLIP_LEVEL = 2e-3, 5e-2
+LEVEL, FLIP_LEVEL = 5e-4, 5e-2
 # With fewer runs than this no flip is rare enough: two runs to the power of six are 1 in 64 and more.
 FEWEST_RUNS = 8
-# Fewer runs than this have no other run to speak of: what neighbours share is all that their residual knows.
-FEWEST = 3
+# Fewer runs than this have no other run to speak of: what stands there has to stand beyond any doubt of its noise.
+FEWEST, LEVEL_OF_FEW = 3, 1e-6
 # A part of which less than this is left beside the runs' own unknowns shows nothing.
 SMALLEST_SHARE = 1e-2
 
@@ -35,7 +35,7 @@ def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> tuple[str
     ``wholes`` are the errors in any shape, their symbols as families.
     """
     runs = len(scene.fit.problem.runs)
-    if runs < FEWEST or scene.fit.problem.needs_whole_periods or poses_of_rows(scene.fit) is not None:
+    if poses_of_rows(scene.fit) is not None:
         return None
     beside = scene.remainders.beside([])
     parts: list[tuple[str, int]] = []
@@ -57,7 +57,7 @@ def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> tuple[str
     if dof < 1 or rest <= 0.0:
         return None
     p_value = float(scipy.special.fdtrc(1, dof, squares / (rest / dof)))
-    if p_value * len(parts) > LEVEL:
+    if p_value * len(parts) > (LEVEL if runs >= FEWEST else LEVEL_OF_FEW):
         return None
     if runs >= FEWEST_RUNS and _share_of_flips(scene, every, beside.residual, abs(sizes[best])) > FLIP_LEVEL:
         return None

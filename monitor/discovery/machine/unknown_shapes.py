@@ -59,7 +59,7 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
         slight = _slight(scene)
         if slight is None:
             return scene, result
-        return _with_candidate(scene, slight), ScanResult(findings_of(scene, [slight]), result.remaining)
+        selected, scene = [slight], _with_candidate(scene, slight)
     for symbol in dict.fromkeys(map(error_of, filter(_is_of_shape, selected))):
         mine = [shape for shape in filter(_is_of_shape, selected) if error_of(shape) == symbol]
         others = [shape for shape in selected if not _is_among(shape, mine)]
@@ -104,8 +104,15 @@ def _is_free(candidate: ChainCandidate) -> bool:
 def _slight(scene: ChainScene) -> ChainCandidate | None:
     """One part of an error of free shape that stands out, and predicts poses and runs that were left out."""
     shapes: dict[str, list[ChainCandidate]] = {}
+    # Over a part of a turn flexure and refraction bend as any shape does.
+    turning = not scene.fit.problem.needs_whole_periods
     for shape in filter(_is_of_shape, scene.candidates):
+        effect = shape.effect
+        if isinstance(effect, ChainEffect) and effect.joint.turns and not turning:
+            continue
         shapes.setdefault(error_of(shape), []).append(shape)
+    if not shapes:
+        return None
     part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
     if part is None:
         return None
