@@ -57,13 +57,13 @@ def widening(scene: ChainScene, selected: Sequence[ChainCandidate], pose: npt.ND
     basis = orthonormal(scene.shared)
     residual = without(basis, scene.residual[:, None])[:, 0]
     columns = without(basis, np.concatenate([candidate.columns for candidate in selected], axis=1))
-    own = scene.fit.nuisance.basis
-    own = np.concatenate([own.reshape(len(residual), -1), basis], axis=1)
-    shared, plain = covariance_by_poses(columns, own, residual, pose)
+    of_runs = scene.fit.nuisance.basis
+    unknowns = np.concatenate([of_runs.reshape(len(residual), -1), basis], axis=1)
+    shared, plain = covariance_by_poses(columns, unknowns, residual, pose)
     rank = int(np.linalg.matrix_rank(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)))
     dof = max(scene.degrees_of_freedom - basis.shape[1] - rank, 1)
-    left = without(orthonormal(columns), residual[:, None])[:, 0]
-    ratio = np.diag(shared) / np.maximum(np.diag(plain) * float(left @ left) / dof, 1e-300)
+    remainder = without(orthonormal(columns), residual[:, None])[:, 0]
+    ratio = np.diag(shared) / np.maximum(np.diag(plain) * float(remainder @ remainder) / dof, 1e-300)
     return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
 
 

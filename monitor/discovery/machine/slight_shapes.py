@@ -42,11 +42,11 @@ def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> tuple[str
     columns: list[Array] = []
     for whole in scene_of(scene.fit, wholes).candidates:
         before = np.linalg.norm(whole.raw, axis=(0, 1)) / scene.fit.sigma
-        left = without(beside.basis, whole.columns)
-        length = np.linalg.norm(left, axis=0)
+        remainder = without(beside.basis, whole.columns)
+        length = np.linalg.norm(remainder, axis=0)
         able = np.flatnonzero(length > SMALLEST_SHARE * np.maximum(before, 1e-300))
         parts += [(whole.family, int(part)) for part in able]
-        columns.append((left[:, able] / length[able]).astype(np.float32))
+        columns.append((remainder[:, able] / length[able]).astype(np.float32))
     if not parts:
         return None
     every = np.concatenate(columns, axis=1)

@@ -56,17 +56,11 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     not."""
     selected = result.candidates
     if not selected and not _lacks_something(scene):
-        slight = _slight(scene)
-        if slight is None:
+        selected = _slight(scene)
+        if not selected:
             return scene, result
-        selected, scene = [slight], _with_candidate(scene, slight)
-    for symbol in dict.fromkeys(map(error_of, filter(_is_of_shape, selected))):
-        mine = [shape for shape in filter(_is_of_shape, selected) if error_of(shape) == symbol]
-        others = [shape for shape in selected if not _is_among(shape, mine)]
-        free = _free(scene, symbol, mine, others)
-        if free is not None:
-            selected = [*others, free]
-            scene = _with_candidate(scene, free)
+        scene = _with_candidate(scene, selected[0])
+    scene, selected = _with_free(scene, selected)
     if not selected or any(_is_free(shape) for shape in selected) or _leaves_something(scene, selected):
         alone = _alone(scene, selected)
         if alone is not None:
@@ -76,6 +70,18 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     ):
         return scene, result
     return scene, ScanResult(findings_of(scene, selected), result.remaining)
+
+
+def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[ChainScene, list[ChainCandidate]]:
+    """The selected effects with one of free shape for each error whose shapes of the catalogue are not the whole."""
+    for symbol in dict.fromkeys(map(error_of, filter(_is_of_shape, selected))):
+        mine = [shape for shape in filter(_is_of_shape, selected) if error_of(shape) == symbol]
+        others = [shape for shape in selected if not _is_among(shape, mine)]
+        free = _free(scene, symbol, mine, others)
+        if free is not None:
+            selected = [*others, free]
+            scene = _with_candidate(scene, free)
+    return scene, selected
 
 
 def _is_among(candidate: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
@@ -101,8 +107,8 @@ def _is_free(candidate: ChainCandidate) -> bool:
     return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
 
 
-def _slight(scene: ChainScene) -> ChainCandidate | None:
-    """One part of an error of free shape that stands out, and predicts poses and runs that were left out."""
+def _slight(scene: ChainScene) -> list[ChainCandidate]:
+    """One part of an error of free shape that stands out, and predicts poses and runs that were left out, if any."""
     shapes: dict[str, list[ChainCandidate]] = {}
     # Over a part of a turn flexure and refraction bend as any shape does.
     turning = not scene.fit.problem.needs_whole_periods
@@ -112,14 +118,14 @@ def _slight(scene: ChainScene) -> ChainCandidate | None:
             continue
         shapes.setdefault(error_of(shape), []).append(shape)
     if not shapes:
-        return None
+        return []
     part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
     if part is None:
-        return None
+        return []
     free = _of_parts(scene, part[0], [part[1]], shapes[part[0]], [])
     before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([free]))
     predicts = before is None or after is None or after < before
-    return free if predicts and _predicts(scene, free, []) else None
+    return [free] if predicts and _predicts(scene, free, []) else []
 
 
 def _alone(scene: ChainScene, selected: Sequence[ChainCandidate]) -> ChainCandidate | None:

@@ -87,44 +87,42 @@ def with_base_instead(scene: ChainScene, result: ChainScan, rate: float) -> Chai
     problem = scene.fit.problem
     first = problem.context.chain.joints[len(problem.context.chain.work)].name
     of_base = [candidate for candidate in scene.candidates if _moves_base(candidate, first)]
-    seen = [candidate for candidate in result.candidates if _is_tracker(candidate)]
-    if not seen or not of_base or not problem.resting:
+    named = [each for each in result.candidates if _is_tracker(each) or _moves_base(each, first)]
+    if not of_base or not problem.resting or not any(map(_is_tracker, named)):
         return result
-    others = [
-        candidate
-        for candidate in result.candidates
-        if not _is_tracker(candidate) and not _moves_base(candidate, first)
-    ]
+    others = [each for each in result.candidates if not (_is_tracker(each) or _moves_base(each, first))]
+    base, worth = _best_base(scene, of_base, others)
+    present = sum(
+        weigh_beside(scene, [candidate], [*others, *named[:index]])[0].score
+        for index, candidate in enumerate(named)
+    )
+    if worth <= present + WORTH_EXCHANGING or not _is_seen_beside_wander(scene, base, others, rate):
+        return result
+    return ScanResult(findings_of(scene, [*others, *base]), result.remaining)
+
+
+def _best_base(
+    scene: ChainScene, of_base: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
+) -> tuple[list[ChainCandidate], float]:
+    """Drifts of the base, each of another direction, as long as one is worth its price, and their score together."""
     base: list[ChainCandidate] = []
     worth = 0.0
     while True:
-        families = {candidate.family.partition("@")[0] for candidate in base}
-        rest = [each for each in of_base if each.family.partition("@")[0] not in families]
+        errors = {candidate.family.partition("@")[0] for candidate in base}
+        rest = [each for each in of_base if each.family.partition("@")[0] not in errors]
         weighed = weigh_beside(scene, rest, [*others, *base]) if rest else []
         if not weighed or weighed[0].score <= 0.0:
-            break
+            return base, worth
         base.append(weighed[0].candidate)
         worth += weighed[0].score
-    named = [
-        candidate
-        for candidate in result.candidates
-        if _is_tracker(candidate) or _moves_base(candidate, first)
-    ]
-    present = 0.0
-    for index, candidate in enumerate(named):
-        present += weigh_beside(scene, [candidate], [*others, *named[:index]])[0].score
-    if (
-        not base
-        or worth <= present + WORTH_EXCHANGING
-        or not _is_seen_beside_wander(scene, base, others, rate)
-    ):
-        return result
-    return ScanResult(findings_of(scene, [*others, *base]), result.remaining)
 
 
 def _is_seen_beside_wander(
     scene: ChainScene, base: Sequence[ChainCandidate], others: Sequence[ChainCandidate], rate: float
 ) -> bool:
+    """Whether drifts of the base, together, are more than chance beside a tracker that walks."""
+    if not base:
+        return False
     beside = scene.remainders.beside([*others, *tracker_wander(scene)])
     columns = orthonormal(without(beside.basis, np.concatenate([each.columns for each in base], axis=1)))
     explained, size = float(np.sum((columns.T @ beside.residual) ** 2)), columns.shape[1]

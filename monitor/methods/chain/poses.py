@@ -43,21 +43,21 @@ def shared_poses(problem: ChainProblem, solution: Solution) -> npt.NDArray[np.in
 
 
 def covariance_by_poses(
-    columns: Array, own: Array, residual: Array, pose: npt.NDArray[np.int64]
+    columns: Array, unknowns: Array, residual: Array, pose: npt.NDArray[np.int64]
 ) -> tuple[Array, Array]:
     """Covariances (k, k) of the coefficients of ``columns`` (M, k): with every pose as one observation, and of
     independent numbers of unit variance.
 
-    ``own`` (M, p) is the orthonormal span of all other unknowns, that of each run in its rows, of which columns and
-    ``residual`` (M,) are free.
+    ``unknowns`` (M, p) is the orthonormal span of all other unknowns, that of each run in its rows, of which columns
+    and ``residual`` (M,) are free.
     """
     scale = np.linalg.norm(columns, axis=0)
     scale = np.where(scale == 0.0, 1.0, scale)
-    left, values, right = np.linalg.svd(columns / scale, full_matrices=False)
+    vectors, values, right = np.linalg.svd(columns / scale, full_matrices=False)
     determined = values > COMMON_RANK_TOLERANCE
-    basis = left[:, determined]
+    basis = vectors[:, determined]
     back = (right[determined].T / values[determined]) / scale[:, None]
-    whole = np.concatenate([own, basis], axis=1)
+    whole = np.concatenate([unknowns, basis], axis=1)
     remainder = residual - basis @ (basis.T @ residual)
     inside = np.flatnonzero(pose >= 0)
     inside = inside[np.argsort(pose[inside], kind="stable")]

@@ -61,32 +61,34 @@ class Pose(Point):
         return super().ends(self._of_places(values), rows)
 
     def shown(self, stance: Stance, values: Array, rows: Rows) -> Shown:
-        place = super().shown(stance, self._of_places(values), replace(rows, measured=rows.measured[:, :3]))
-        assert place.by_shift is not None
-        assert place.by_own is not None
-        count, own = len(rows), np.zeros((len(rows), 6, values.shape[1]))
-        own[:, :3, : place.by_own.shape[2]] = place.by_own
+        of_place = super().shown(
+            stance, self._of_places(values), replace(rows, measured=rows.measured[:, :3])
+        )
+        assert of_place.by_shift is not None
+        assert of_place.by_own is not None
+        count, by_own = len(rows), np.zeros((len(rows), 6, values.shape[1]))
+        by_own[:, :3, : of_place.by_own.shape[2]] = of_place.by_own
         mounts, axes = self._mounts(values, rows)
-        seen = place.by_shift @ stance.turned
-        turn = turn_vectors(seen @ mounts @ np.swapaxes(_measured(rows), 1, 2))
+        shown = of_place.by_shift @ stance.turned
+        turn = turn_vectors(shown @ mounts @ np.swapaxes(_measured(rows), 1, 2))
         # To second order in the turn that is left, as for ``angle``.
         slope = LEVER * (np.eye(3) - 0.5 * cross_matrix(turn))
         if not self.holds("frame"):
             free = np.zeros((count, 3))
             free[:, self._free[0]] = values[:, : len(self._free[0])]
-            own[:, 3:, :3] = slope @ np.swapaxes(frame_turn(free)[1], 1, 2)
+            by_own[:, 3:, :3] = slope @ np.swapaxes(frame_turn(free)[1], 1, 2)
         if not self.holds("targets"):
             first, at = values.shape[1] - 3 * len(self.targets), self._target(rows)
-            moved = slope @ seen @ np.swapaxes(axes, 1, 2)
+            moved = slope @ shown @ np.swapaxes(axes, 1, 2)
             for axis in range(3):
-                own[np.arange(count), 3:, first + 3 * at + axis] = moved[:, :, axis]
+                by_own[np.arange(count), 3:, first + 3 * at + axis] = moved[:, :, axis]
         none = np.zeros_like(slope)
         return Shown(
-            residual=np.concatenate([place.residual, LEVER * turn], axis=1),
-            by_shift=np.concatenate([place.by_shift, none], axis=1),
-            by_turn=np.concatenate([none, slope @ place.by_shift], axis=1),
-            by_own=own,
-            along=np.concatenate([place.by_shift, none], axis=1),
+            residual=np.concatenate([of_place.residual, LEVER * turn], axis=1),
+            by_shift=np.concatenate([of_place.by_shift, none], axis=1),
+            by_turn=np.concatenate([none, slope @ of_place.by_shift], axis=1),
+            by_own=by_own,
+            along=np.concatenate([of_place.by_shift, none], axis=1),
         )
 
     def ideal(self, rows: Rows) -> Array:
