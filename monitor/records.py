@@ -256,7 +256,8 @@ class Setup:
     """One way in which an instrument is set up: what one of its readings is a statement about.
 
     ``reading`` names the kind; ``standard_uncertainty`` is that of one reading, in mm or rad, None where
-    every row states its own. ``tool_point`` and
+    every row states its own; ``turn_uncertainty`` (rad) is that of the orientation of a kind that reads a place
+    besides. ``tool_point`` and
     ``work_point`` (mm) are in the frames of the last tool and work axis; the unit vectors ``direction`` and
     ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar is free where
     ``length_uncertainty`` is None. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame`` that
@@ -277,6 +278,7 @@ class Setup:
     side: Branch = "tool"
     frame: Branch = "work"
     known: tuple[str, ...] = ()
+    turn_uncertainty: float | None = None
 
 
 @dataclass(frozen=True)

@@ -65,6 +65,7 @@ class ReasonKind(Enum):
     NOT_SEPARATED = "not_separated"
     ROWS_ALIKE = "rows_alike"
     UNSEEN = "unseen"
+    HELD_AT_ZERO = "held_at_zero"
     BARELY_SEEN = "barely_seen"
     NO_NUMBER = "no_number"
     NO_MACHINE_ERROR = "no_machine_error"
@@ -75,8 +76,9 @@ class ReasonKind(Enum):
 class Reason:
     """Why parameters have no number.
 
-    Of NOT_SEPARATED, ``others`` are the unknowns that they cannot be told from, beside each other. Of BARELY_SEEN,
-    ``u`` is the standard uncertainty, in ``unit``, that exceeds what a machine may have.
+    Of NOT_SEPARATED, ``others`` are the unknowns that they cannot be told from, beside each other; of HELD_AT_ZERO
+    those that do the same. Of BARELY_SEEN, ``u`` is the standard uncertainty, in ``unit``, that exceeds what a machine
+    may have.
     """
 
     kind: ReasonKind

@@ -39,7 +39,7 @@ def _machine(explanation: MachineExplanation) -> None:
     output.say()
     for effect in explanation.missing:
         _machine_effect(effect, explanation)
-        _advice(effect, "data")
+        _advice(effect, "data", explanation.comparison.campaign)
     for reading in explanation.suspect_data:
         _bad_probing(reading, explanation.target_word)
     output.say(explanation.answer)
@@ -104,7 +104,7 @@ def _bad_row(reading: BadRow, unit: str) -> None:
     )
 
 
-def _advice(effect: MachineMissing | CurveMissing, answers_text: str) -> None:
+def _advice(effect: MachineMissing | CurveMissing, answers_text: str, campaign: str = "CAMPAIGN") -> None:
     """Cause, remedy and rivals of an effect, and where to measure to tell them apart."""
     output.say(f"   cause: {effect.description.cause}")
     output.say(f"   remedy: {effect.description.remedy}")
@@ -119,10 +119,10 @@ def _advice(effect: MachineMissing | CurveMissing, answers_text: str) -> None:
         if isinstance(effect, MachineMissing):
             for tie in effect.ties:
                 if tie.broken_by is not TieBreak.POSES:
-                    output.say(f"   {_tie(effect.effect, tie)}")
+                    output.say(f"   {_tie(effect.effect, tie, campaign)}")
 
 
-def _tie(effect: str, tie: Tie) -> str:
+def _tie(effect: str, tie: Tie, campaign: str) -> str:
     """What to do about rivals that the poses above do not rule out."""
     rivals, drivers = ", ".join(tie.rivals), " and ".join(tie.drivers)
     if tie.broken_by is TieBreak.DRIVERS and len(tie.drivers) == 2:
@@ -132,7 +132,10 @@ def _tie(effect: str, tie: Tie) -> str:
     if tie.broken_by is TieBreak.INDEXATIONS:
         return f"to tell {rivals} apart, index {' and '.join(tie.axes)} to other angles while {drivers} acts"
     if tie.broken_by is TieBreak.PLAN:
-        return f'to tell {rivals} apart: monitor plan CAMPAIGN --separate "{effect},{tie.rivals[0]}"'
+        return f'to tell {rivals} apart: monitor plan {campaign} --separate "{effect},{tie.rivals[0]}"'
+    if tie.broken_by is TieBreak.MORE_POSES:
+        axes = " and ".join(tie.axes)
+        return f"to tell {rivals} apart, measure more poses over the whole range of {axes}, and some under another load"
     return f"no touch of these targets tells {rivals} apart: they move the tip alike, and one correction serves both"
 
 

@@ -221,7 +221,8 @@ class ChainMethod(Method):
     ``refuse`` raises DataError for a campaign that has too little to be identified. ``gross_times`` stated standard
     uncertainties in the residual are first of all a mistake of the file; of a run of more than ``trial_rows`` some
     poses suffice to try such a mistake (None: all rows are needed). ``taken_as_known`` counts as free of errors, so
-    that no reading speaks of them; ``taken_up`` are the errors that no plan gives a number of their own.
+    that no reading speaks of them; ``taken_up`` are the errors that no plan gives a number of their own;
+    ``shares_base`` says that all runs of a campaign may share the base effects.
     """
 
     problem_of: ProblemOf
@@ -232,6 +233,7 @@ class ChainMethod(Method):
     trial_rows: int | None = None
     taken_as_known: tuple[str, ...] = ()
     taken_up: Callable[[ChainProblem], tuple[TakenUp, ...]] = nothing_taken_up
+    shares_base: bool = False
     statistics: Able | Unable = Able()
     coordinates: Able | Unable = Able()
     uncertainty: Able | Unable = Able()

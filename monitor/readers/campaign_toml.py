@@ -120,6 +120,8 @@ def _setup(setup: Setup) -> Iterator[str]:
     if setup.standard_uncertainty is not None:
         unit, name = (MICRORADIAN, "urad") if form.angular else (MICROMETRE, "um")
         yield f"standard_uncertainty_{name} = {decimal_in(unit)(setup.standard_uncertainty)}"
+    if setup.turn_uncertainty is not None:
+        yield f"standard_uncertainty_urad = {decimal_in(MICRORADIAN)(setup.turn_uncertainty)}"
     yield f"tool_point_mm = {_numbers(setup.tool_point)}"
     yield f"work_point_mm = {_numbers(setup.work_point)}"
     if setup.direction is not None:

@@ -29,7 +29,8 @@ BRANCHES: tuple[Branch, ...] = ("tool", "work")
 @dataclass(frozen=True)
 class ReadingFormat:
     """What a kind of reading asks of the file: its ``columns`` (those of ``optional`` may be empty or missing), whether
-    they are angles, the keys that it needs, those that it allows, and the unknowns that may be ``known``."""
+    they are angles, the keys that it needs, those that it allows, the unknowns that may be ``known``, and whether it
+    ``turns``: an orientation besides lengths, with an uncertainty of its own."""
 
     columns: tuple[str, ...]
     angular: bool = False
@@ -37,10 +38,12 @@ class ReadingFormat:
     needs: tuple[str, ...] = ()
     allows: tuple[str, ...] = ()
     known: tuple[str, ...] = ()
+    turns: bool = False
 
 
 ONE_LENGTH, ONE_ANGLE = ("reading_um",), ("reading_urad",)
 POINTS = ("point_x_mm", "point_y_mm", "point_z_mm")
+QUATERNION = ("quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
 FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
     "vector": ReadingFormat(("dx_um", "dy_um", "dz_um"), allows=("frame",), known=("work_point",)),
     "component": ReadingFormat(ONE_LENGTH, needs=("direction",), known=("zero",)),
@@ -56,6 +59,9 @@ FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
     ),
     "point": ReadingFormat(
         POINTS, optional=("point_z_mm",), allows=("tool_direction",), known=("frame", "targets")
+    ),
+    "pose": ReadingFormat(
+        (*POINTS, *QUATERNION), allows=("tool_direction",), known=("frame", "targets"), turns=True
     ),
 })  # fmt: skip
 
@@ -105,6 +111,7 @@ def _setup(table: Table) -> Setup | None:
         side=_branch(table, "side", "tool") if "side" in form.allows else "tool",
         frame=_branch(table, "frame", "work") if "frame" in form.allows else "work",
         known=_known(table, form),
+        turn_uncertainty=_stated(table, "urad") if form.turns else None,
     )
     table.finish()
     return None if len(table.faults) > before else setup
@@ -126,17 +133,20 @@ def _uncertainty(table: Table, form: ReadingFormat) -> float | None:
     """The standard uncertainty of one reading in mm or rad; None where the rows have to state it."""
     right, wrong = ("urad", "um") if form.angular else ("um", "urad")
     other = f"standard_uncertainty_{wrong}"
-    if other in table.data:
+    if other in table.data and not form.turns:
         table.raw(other, required=False, example="")
         what = "an angle" if form.angular else "a length"
         table.fault(other, f"the reading is {what}: write standard_uncertainty_{right}")
-    unit = MICRORADIAN if form.angular else MICROMETRE
+    return _stated(table, right)
+
+
+def _stated(table: Table, name: str) -> float | None:
+    """A standard uncertainty in mm or rad, written in ``um`` or ``urad``; None where it is not stated."""
+    unit, largest = (
+        (MICRORADIAN, LARGEST_URAD) if name == "urad" else (MICROMETRE, MICROMETRE.to_display(FARTHEST_MM))
+    )
     value = table.number(
-        f"standard_uncertainty_{right}",
-        positive=True,
-        largest=LARGEST_URAD if form.angular else MICROMETRE.to_display(FARTHEST_MM),
-        unit=right,
-        example="0.5",
+        f"standard_uncertainty_{name}", positive=True, largest=largest, unit=name, example="0.5"
     )
     return None if value is None else unit.to_internal(value)
 

@@ -51,7 +51,14 @@ def refusal_sentence(refusal: Refusal, texts: Texts | None = None) -> str:
         return _not_separated(parameters, reason, say)
     u = "" if reason.u is None else f"{reason.u:.2g}".replace(".", say.decimal_sign)
     names = _joined(_unknowns(parameters, say), "both", say)
-    return say(f"sentences.{reason.kind.value}", names=names, u=u, unit=reason.unit)
+    key, several = f"sentences.{reason.kind.value}", f"sentences.{reason.kind.value}_several"
+    return say(
+        several if len(reason.others) > 1 and several in say.sentences else key,
+        names=names,
+        others=", ".join(_unknowns(_by_table(reason.others, say), say)),
+        u=u,
+        unit=reason.unit,
+    )
 
 
 def _not_separated(parameters: tuple[str, ...], reason: Reason, say: Texts) -> str:

@@ -96,6 +96,9 @@ def artefact_json(artefact: Artefact, sources: Sequence[Source] = ()) -> str:
         document["sources"] = [to_document(source) for source in sources]
     if not artefact.setups:
         del document["setups"]
+    for setup in document.get("setups", ()):
+        if setup["turn_uncertainty"] is None:
+            del setup["turn_uncertainty"]
     return _text(document)
 
 

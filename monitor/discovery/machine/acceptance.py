@@ -16,6 +16,7 @@ from monitor.discovery.machine.refine import refine
 from monitor.discovery.machine.run_evidence import p_value_against_runs
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.variants import with_drivers
+from monitor.discovery.machine.wander import is_drift_of_machine, tracker_wander
 from monitor.discovery.search.acceptance import Acceptance
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.evidence import (
@@ -68,6 +69,7 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self._poses = poses_of_rows(scene.fit)
         self._units = (scene.run, blocks_of_runs(scene))
         self._flexible = FlexibleErrors(scene, drivers)
+        self._wander = tracker_wander(scene)
         self._weighed: Memory[float] = Memory()
         self._accepted: Memory[bool] = Memory()
         self._refined: Memory[ChainCandidate] = Memory()
@@ -86,7 +88,11 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
             *self._larger_errors(others, candidate),
             *(shared for shared in self.shared if error_of(shared) != error_of(candidate)),
         ]
-        if not self._survives(others, candidate, named) or not self._is_plausible(others, candidate):
+        if not self._survives(others, candidate, self._flexible.competitors(named)):
+            return False
+        if is_drift_of_machine(candidate) and not self._survives(others, candidate, self._wander):
+            return False
+        if not self._is_plausible(others, candidate):
             return False
         if self._poses is not None:
             by_poses = p_value_by_poses(candidate, self.scene, others, self._poses)
@@ -108,7 +114,9 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
                 continue
             for index, named in enumerate(selected):
                 other_error = error_of(named) != error_of(candidate)
-                if other_error and not self._survives(selected, candidate, [named]):
+                if other_error and not self._survives(
+                    selected, candidate, self._flexible.competitors([named])
+                ):
                     within[index].append(candidate.family)
                     break
         return [tuple(names[:MOST_NAMED]) for names in within]
@@ -117,12 +125,12 @@ class ChainAcceptance(Acceptance[ChainCandidate]):
         self,
         others: Sequence[ChainCandidate],
         candidate: ChainCandidate,
-        named: Sequence[ChainCandidate],
+        competitors: Sequence[ChainCandidate],
     ) -> bool:
-        """Whether an effect stands out beside others, the ``named`` ones in whatever shape they have."""
-        if not named:
+        """Whether an effect stands out beside others and flexible ``competitors``."""
+        if not competitors:
             return True
-        beside = self.scene.remainders.beside([*others, *self._flexible.competitors(named)])
+        beside = self.scene.remainders.beside([*others, *competitors])
         residual = beside.residual
         columns = orthonormal(without(beside.basis, candidate.columns))
         explained = float(np.sum((columns.T @ residual) ** 2))

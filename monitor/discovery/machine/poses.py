@@ -16,24 +16,14 @@ import scipy
 from monitor.discovery.machine.fit import Fit
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene
 from monitor.discovery.search.projection import orthonormal, without
+from monitor.methods.chain.poses import covariance_by_poses, shared_poses
 from monitor.records import Array
-
-# The variance of fewer poses than this is too uncertain to be a yardstick.
-FEWEST_POSES = 30
 
 
 def poses_of_rows(fit: Fit) -> npt.NDArray[np.int64] | None:
-    """The pose (M,) of every whitened number, -1 for calibrated quantities and padding: rows of one run after another
-    at which no axis moved. None where hardly a pose has several rows, or there are few."""
-    problem = fit.problem
-    context = problem.context
-    moved = np.any(np.diff(context.positions, axis=0) != 0.0, axis=1) | (np.diff(context.run) != 0)
-    pose = np.concatenate([[0], np.cumsum(moved)])
-    poses = int(pose[-1]) + 1
-    if poses < FEWEST_POSES or 2 * poses > len(pose):
-        return None
-    numbers = np.repeat(pose, problem.sigma.shape[1]).reshape(problem.sigma.shape)
-    return problem.padded(numbers + 1.0).astype(np.int64).reshape(-1) - 1
+    """The pose (M,) of every whitened number, -1 for calibrated quantities and padding; None where readings do not
+    share their poses."""
+    return shared_poses(fit.problem, fit.solution)
 
 
 def p_value_by_poses(
@@ -67,16 +57,13 @@ def widening(scene: ChainScene, selected: Sequence[ChainCandidate], pose: npt.ND
     basis = orthonormal(scene.shared)
     residual = without(basis, scene.residual[:, None])[:, 0]
     columns = without(basis, np.concatenate([candidate.columns for candidate in selected], axis=1))
-    scale = np.linalg.norm(columns, axis=0)
-    columns = columns / np.where(scale == 0, 1.0, scale)
-    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-10, hermitian=True)
-    remainder = residual - columns @ (inverse @ (columns.T @ residual))
-    dof = max(scene.degrees_of_freedom - basis.shape[1] - columns.shape[1], 1)
-    inside = pose >= 0
-    scores = _sums(columns[inside] * remainder[inside, None], pose[inside])
-    shared = inverse @ (scores.T @ scores) @ inverse * (int(inside.sum()) / dof)
-    plain = inverse * float(remainder @ remainder) / dof
-    ratio = np.diag(shared) / np.maximum(np.diag(plain), 1e-300)
+    of_runs = scene.fit.nuisance.basis
+    unknowns = np.concatenate([of_runs.reshape(len(residual), -1), basis], axis=1)
+    shared, plain = covariance_by_poses(columns, unknowns, residual, pose)
+    rank = int(np.linalg.matrix_rank(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)))
+    dof = max(scene.degrees_of_freedom - basis.shape[1] - rank, 1)
+    remainder = without(orthonormal(columns), residual[:, None])[:, 0]
+    ratio = np.diag(shared) / np.maximum(np.diag(plain) * float(remainder @ remainder) / dof, 1e-300)
     return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))
 
 

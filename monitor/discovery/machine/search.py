@@ -12,6 +12,7 @@ from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.tables import ChainScan, with_tables
 from monitor.discovery.machine.unknown_shapes import with_unknown_shapes
+from monitor.discovery.machine.wander import with_base_instead
 from monitor.discovery.search.scan import by_error_taken_away, scan
 
 # More orders of gears than this are noise that no order explains.
@@ -37,6 +38,7 @@ def search_chain(scene: ChainScene, drivers: Sequence[str], rate: float) -> tupl
         if not new or len(gears) > MOST_GEARS:
             if not all_curves_were_searched(scene.fit):
                 scene, result = with_tables(scene, result, scanned)
+            result = with_base_instead(scene, result, rate)
             scene, result = with_unknown_shapes(scene, standing_out(scene, result))
             return scene, by_error_taken_away(scene, standing_out(scene, result))
         gears |= {variant.effect.text for variant in new}

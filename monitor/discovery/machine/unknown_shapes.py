@@ -16,7 +16,8 @@ import scipy
 
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.flexible import error_of
-from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.slight_shapes import slight_shape
 from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.search.candidate import Variant
 from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
@@ -55,14 +56,11 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     not."""
     selected = result.candidates
     if not selected and not _lacks_something(scene):
-        return scene, result
-    for symbol in dict.fromkeys(map(error_of, filter(_is_of_shape, selected))):
-        mine = [shape for shape in filter(_is_of_shape, selected) if error_of(shape) == symbol]
-        others = [shape for shape in selected if not _is_among(shape, mine)]
-        free = _free(scene, symbol, mine, others)
-        if free is not None:
-            selected = [*others, free]
-            scene = _with_candidate(scene, free)
+        selected = _slight(scene)
+        if not selected:
+            return scene, result
+        scene = _with_candidate(scene, selected[0])
+    scene, selected = _with_free(scene, selected)
     if not selected or any(_is_free(shape) for shape in selected) or _leaves_something(scene, selected):
         alone = _alone(scene, selected)
         if alone is not None:
@@ -72,6 +70,18 @@ def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScen
     ):
         return scene, result
     return scene, ScanResult(findings_of(scene, selected))
+
+
+def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[ChainScene, list[ChainCandidate]]:
+    """The selected effects with one of free shape for each error whose shapes of the catalogue are not the whole."""
+    for symbol in dict.fromkeys(map(error_of, filter(_is_of_shape, selected))):
+        mine = [shape for shape in filter(_is_of_shape, selected) if error_of(shape) == symbol]
+        others = [shape for shape in selected if not _is_among(shape, mine)]
+        free = _free(scene, symbol, mine, others)
+        if free is not None:
+            selected = [*others, free]
+            scene = _with_candidate(scene, free)
+    return scene, selected
 
 
 def _is_among(candidate: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
@@ -95,6 +105,27 @@ def _leaves_something(scene: ChainScene, selected: Sequence[ChainCandidate]) -> 
 def _is_free(candidate: ChainCandidate) -> bool:
     effect = candidate.effect
     return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
+
+
+def _slight(scene: ChainScene) -> list[ChainCandidate]:
+    """One part of an error of free shape that stands out, and predicts poses and runs that were left out, if any."""
+    shapes: dict[str, list[ChainCandidate]] = {}
+    # Over a part of a turn flexure and refraction bend as any shape does.
+    turning = not scene.fit.problem.needs_whole_periods
+    for shape in filter(_is_of_shape, scene.candidates):
+        effect = shape.effect
+        if isinstance(effect, ChainEffect) and effect.joint.turns and not turning:
+            continue
+        shapes.setdefault(error_of(shape), []).append(shape)
+    if not shapes:
+        return []
+    part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
+    if part is None:
+        return []
+    free = _of_parts(scene, part[0], [part[1]], shapes[part[0]], [])
+    before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([free]))
+    predicts = before is None or after is None or after < before
+    return [free] if predicts and _predicts(scene, free, []) else []
 
 
 def _alone(scene: ChainScene, selected: Sequence[ChainCandidate]) -> ChainCandidate | None:
@@ -150,10 +181,14 @@ def _free(
 
 def _whole(scene: ChainScene, symbol: str, shape: ChainCandidate) -> ChainCandidate:
     """The whole flexible basis of the error of which a candidate is a shape."""
+    return scene_of(scene.fit, [_in_any_shape(symbol, shape)]).candidates[0]
+
+
+def _in_any_shape(symbol: str, shape: ChainCandidate) -> ChainVariant:
+    """The error of which a candidate is a shape, in any shape, under its symbol."""
     effect = shape.effect
     assert isinstance(effect, ChainEffect)
-    variant = Variant(f"{symbol}:free", replace(effect, shape=Free(), shape_text="free"))
-    return scene_of(scene.fit, [variant]).candidates[0]
+    return Variant(symbol, replace(effect, shape=Free(), shape_text="free"))
 
 
 def _of_parts(

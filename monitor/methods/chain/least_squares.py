@@ -8,7 +8,7 @@ left. What the data cannot separate is detected by the rank, gets no step and no
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -54,7 +54,8 @@ class Solution:
     ``local`` (R, p) and ``common`` (c,) with the covariances ``local_covariance`` (R, p, p) and
     ``common_covariance`` (c, c) for residuals of unit variance; ``local_free`` (R, p) and ``common_free`` (c,)
     say which unknowns the data determine; ``null_space`` (R, p, p) holds scaled null vectors in its rows,
-    zero rows where there is none. ``rank`` (R,) counts what each run determines.
+    zero rows where there is none. ``rank`` (R,) counts what each run determines. ``common_held`` (c,) are held at zero,
+    because others do the same; empty where none were looked for.
     """
 
     local: Array
@@ -67,6 +68,7 @@ class Solution:
     rank: npt.NDArray[np.int64]
     iterations: int
     last: Linearisation
+    common_held: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from monitor.machine import MOTION, ChainPose, evaluate
 from monitor.methods.chain.added_effects import STARTS_S, Added, added_in, columns_of, resolved
 from monitor.methods.chain.least_squares import MOST_ITERATIONS, Linearisation, Solution, solve
 from monitor.methods.chain.measured import MeasuredChain
+from monitor.methods.chain.redundant import held_at_zero, several_of_an_error, without_held
 from monitor.records import Array
 from monitor.units import Unit, mistaken_for_mm
 
@@ -257,20 +258,31 @@ def solve_problem(
     only another machine. ``most`` bounds the steps where nothing is searched.
     """
     begin = problem.start if local is None else local
+    first = problem.common_start if common is None else common
+    held = np.zeros(len(first), dtype=bool)
+    if several_of_an_error(problem.shared):
+        held = held_at_zero(problem.shared, problem.linearise(begin, first))
+
+    def linearise(local: Array, common: Array) -> Linearisation:
+        return without_held(problem.linearise(local, common), held)
+
     if common is not None or not any(added.searched for added in problem.shared):
-        solution = solve(problem.linearise, begin, problem.common_start if common is None else common, most)
+        solution = solve(linearise, begin, np.where(held, 0.0, first), most)
     else:
-        solution = _from_several_starts(problem, begin)
+        solution = _from_several_starts(problem, linearise, begin)
+    solution = replace(solution, common_held=held)
     _refuse_another_machine(problem, solution)
     return solution
 
 
-def _from_several_starts(problem: ChainProblem, begin: Array) -> Solution:
+def _from_several_starts(
+    problem: ChainProblem, linearise: Callable[[Array, Array], Linearisation], begin: Array
+) -> Solution:
     solutions: list[Solution] = []
     fault: DataError | None = None
     for start in STARTS_S:
         try:
-            solutions.append(solve(problem.linearise, begin, problem.common_from(start)))
+            solutions.append(solve(linearise, begin, problem.common_from(start)))
         except DataError as error:
             fault = error
     if not solutions:

@@ -1,4 +1,8 @@
-"""The parameters that all runs of a campaign share, as they are reported: with numbers, or refused with the reason."""
+"""The parameters that all runs of a campaign share, as they are reported: with numbers, or refused with the reason.
+
+Their covariance is that of the stated uncertainties; where readings share their poses (a robot) it is widened to what
+the poses show.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,9 @@ import numpy as np
 from monitor.effects import Basis, ChainEffect, Effect
 from monitor.effects.effect import ChainBasis
 from monitor.methods.chain.least_squares import COMMON_RANK_TOLERANCE, MEMBER_SHARE, Solution, eliminate
+from monitor.methods.chain.poses import widening_of_common
 from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.chain.redundant import replaced_by
 from monitor.records import Array
 from monitor.refusal import Reason, ReasonKind, Refusal
 from monitor.units import MINUTE, Unit
@@ -104,6 +110,10 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
     reasons: list[Reason | None] = [
         None if free else Reason(ReasonKind.UNSEEN) for free in solution.common_free
     ]
+    for column in map(int, np.flatnonzero(solution.common_held)):
+        at = problem.linearise(solution.local, solution.common)
+        same = replaced_by(problem.shared, at, solution.common_held, column)
+        reasons[column] = Reason(ReasonKind.HELD_AT_ZERO, same)
     by_error = problem.evaluated(solution.local, solution.common, jacobian=True).by_error
     assert by_error is not None
     for added, columns in zip(problem.shared, problem.common_columns, strict=True):
@@ -128,6 +138,9 @@ def shared_parameters(problem: ChainProblem, solution: Solution) -> SharedParame
             estimate[last] = tau
             covariance[last, :] *= tau
             covariance[:, last] *= tau
+    # What no model has moves all numbers of a pose together; the stated uncertainties know nothing of it.
+    factors = widening_of_common(problem, solution)
+    covariance = factors[:, None] * covariance * factors
     determined = np.array([reason is None for reason in reasons], dtype=bool)
     return SharedParameters(
         names=problem.added_names,

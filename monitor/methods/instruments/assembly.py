@@ -113,18 +113,24 @@ def _sigma(
     """Standard uncertainty (n, d) in mm of every number; infinite where a row has none."""
     sigma = np.full((len(context), max(len(part.reading.numbers) for part in parts)), np.inf)
     for part in parts:
+        setup, kinds = setups[number[part.at[0]]], len(part.reading.numbers)
         angular = part.reading.angular
-        stated = (setups[number[part.at[0]]].standard_uncertainty or np.nan) * (LEVER if angular else 1.0)
-        of_rows = _column(context, U_ANGLE if angular else U_LENGTH)[part.at]
-        u = np.where(np.isfinite(of_rows), of_rows, stated)
-        kinds = len(part.reading.numbers)
+        u = np.tile(_u(context, part, setup.standard_uncertainty, angular=angular)[:, None], kinds)
+        turns = kinds - part.reading.turns
+        u[:, turns:] = _u(context, part, setup.turn_uncertainty, angular=True)[:, None]
         read = np.isfinite(part.rows.measured)
-        # Of a direction all three components together make two numbers.
+        # Of a direction all three components together make two numbers; of a pose all seven make six.
         read = read[:, :kinds] & (
             read.all(axis=1, keepdims=True) if part.rows.measured.shape[1] > kinds else True
         )
-        sigma[part.at, :kinds] = np.where(read, u[:, None], np.inf)
+        sigma[part.at, :kinds] = np.where(read, u, np.inf)
     return sigma
+
+
+def _u(context: Context, part: Part, stated: float | None, *, angular: bool) -> Array:
+    """Standard uncertainty (m,) in mm of the lengths or angles of a setup: of the row, else as ``stated``."""
+    of_rows = _column(context, U_ANGLE if angular else U_LENGTH)[part.at]
+    return np.where(np.isfinite(of_rows), of_rows, (stated or np.nan) * (LEVER if angular else 1.0))
 
 
 def _sight(setups: tuple[Setup, ...], number: npt.NDArray[np.int64]) -> Array | None:

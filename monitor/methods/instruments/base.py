@@ -23,6 +23,7 @@ from monitor.methods.instruments.problem import InstrumentProblem, Part
 from monitor.methods.instruments.reading import Rows
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
+from monitor.methods.instruments.readings.pose import Pose
 from monitor.records import Array, Setup
 
 POSES, SEED = 120, 20260217
@@ -207,6 +208,8 @@ def _generic_problem(
             unknown = not is_first and "frame" not in setup.known
             reading = replace(reading, floating=unknown or setup.id == floating)
             is_first = False
+        if isinstance(reading, Pose):
+            rows = replace(rows, measured=reading.ideal(rows))
         at = number * count + np.arange(count)
         parts.append(Part(setup.id, reading, rows, at))
     rows_in_all = count * len(setups)

@@ -95,6 +95,8 @@ class Reading(Protocol):
     columns: ClassVar[tuple[str, ...]]
     #: Whether the file's numbers are angles in µrad.
     angular: ClassVar[bool]
+    #: How many of the numbers, the last ones, are turns beside lengths, with an uncertainty of their own.
+    turns: ClassVar[int]
     #: Unknowns of each run that a setup may hold, by the word under ``known``.
     holdable: ClassVar[tuple[str, ...]]
 
@@ -138,6 +140,7 @@ class Plain:
 
     holdable: ClassVar[tuple[str, ...]] = ()
     angular: ClassVar[bool] = False
+    turns: ClassVar[int] = 0
 
     @classmethod
     def of(cls, setup: Setup, rows: Rows) -> tuple[Self, Rows]:

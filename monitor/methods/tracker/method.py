@@ -58,6 +58,7 @@ METHOD = ChainMethod(
     advice=advice,
     base_effects=tracker_base,
     trial_rows=150,
+    shares_base=True,
     rehearsal=Rehearsal("robot", virtual_robot, noise_um=20.0),
     coordinates=Unable("points seen by a tracker stand in another frame in every run"),
 )

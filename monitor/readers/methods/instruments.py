@@ -11,11 +11,12 @@ from monitor.exceptions import Fault
 from monitor.readers.faults import quoted
 from monitor.readers.method_rules import MethodRules, Plan
 from monitor.readers.probings_file import SETUP
-from monitor.readers.setups_file import FORMATS, ReadingFormat
+from monitor.readers.setups_file import FORMATS, QUATERNION, ReadingFormat
 from monitor.records import Array, Setup
 from monitor.units import CONDITION_SUFFIXES
 
 U_LENGTH, U_ANGLE = "u_um", "u_urad"
+DIRECTION = FORMATS["direction"].columns
 PLAIN = tuple(
     dict.fromkeys((
         *(column for form in FORMATS.values() for column in form.columns),
@@ -49,8 +50,9 @@ def check(plan: Plan) -> Iterable[Fault]:
             yield Fault("campaign.toml", None, "setups", message)
         yield from _numbers(plan, setup, form, rows)
         yield from _uncertainties(plan, setup, form, rows)
-        if setup.reading == "direction" and all(column in channels for column in form.columns):
-            yield from _directions(plan, form, rows)
+        for columns, what in ((DIRECTION, "direction"), (QUATERNION, "quaternion")):
+            if columns[0] in form.columns and all(column in channels for column in columns):
+                yield from _of_length_one(plan, columns, what, rows)
 
 
 def _numbers(plan: Plan, setup: Setup, form: ReadingFormat, rows: npt.NDArray[np.int64]) -> Iterator[Fault]:
@@ -69,27 +71,33 @@ def _numbers(plan: Plan, setup: Setup, form: ReadingFormat, rows: npt.NDArray[np
 def _uncertainties(
     plan: Plan, setup: Setup, form: ReadingFormat, rows: npt.NDArray[np.int64]
 ) -> Iterator[Fault]:
-    column = U_ANGLE if form.angular else U_LENGTH
-    none: Array = np.full(len(plan.probings), np.nan)
-    stated = plan.probings.channels.get(column, none)[rows]
-    for row in rows[stated <= 0.0][:1]:
-        yield Fault(plan.file, int(plan.lines[row]), column, "a standard uncertainty must be greater than 0")
-    if setup.standard_uncertainty is None:
-        for row in rows[np.isnan(stated)][:1]:
+    needed = [(U_ANGLE if form.angular else U_LENGTH, setup.standard_uncertainty)]
+    if form.turns:
+        needed.append((U_ANGLE, setup.turn_uncertainty))
+    for column, of_setup in needed:
+        none: Array = np.full(len(plan.probings), np.nan)
+        stated = plan.probings.channels.get(column, none)[rows]
+        for row in rows[stated <= 0.0][:1]:
+            yield Fault(
+                plan.file, int(plan.lines[row]), column, "a standard uncertainty must be greater than 0"
+            )
+        for row in rows[np.isnan(stated)][:1] if of_setup is None else ():
             text = (
                 f"nothing states the standard uncertainty of this reading; write standard_uncertainty_"
-                f"{'urad' if form.angular else 'um'} of setup {quoted(setup.id)}, or {column} in every row"
+                f"{column.removeprefix('u_')} of setup {quoted(setup.id)}, or {column} in every row"
             )
             yield Fault(plan.file, int(plan.lines[row]), column, text)
 
 
-def _directions(plan: Plan, form: ReadingFormat, rows: npt.NDArray[np.int64]) -> Iterator[Fault]:
-    vectors = np.column_stack([plan.probings.channels[column][rows] for column in form.columns])
+def _of_length_one(
+    plan: Plan, columns: tuple[str, ...], what: str, rows: npt.NDArray[np.int64]
+) -> Iterator[Fault]:
+    vectors = np.column_stack([plan.probings.channels[column][rows] for column in columns])
     length = np.linalg.norm(vectors, axis=1)
     for row, size in zip(rows, length, strict=True):
         if np.isfinite(size) and abs(size - 1.0) > LENGTH_TOLERANCE:
-            text = f"the direction has length {size:.6g}; a direction has length 1"
-            yield Fault(plan.file, int(plan.lines[row]), form.columns[0], text)
+            text = f"the {what} has length {size:.6g}; a {what} has length 1"
+            yield Fault(plan.file, int(plan.lines[row]), columns[0], text)
 
 
 RULES = MethodRules(

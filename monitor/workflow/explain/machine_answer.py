@@ -91,7 +91,7 @@ def _curve(effect: ChainMissing, unit: Unit) -> tuple[CurvePoint, ...]:
     )
 
 
-def _machine_missing(effect: ChainMissing) -> MachineMissing:
+def _machine_missing(effect: ChainMissing, *, is_touched: bool) -> MachineMissing:
     unit, um = effect.unit or effect.units[0], MICROMETRE.to_display
     return MachineMissing(
         rank=effect.rank,
@@ -129,7 +129,7 @@ def _machine_missing(effect: ChainMissing) -> MachineMissing:
         reversal_value=reversal_value(
             effect.effect, Estimate(unit.to_display(effect.amplitude), unit.to_display(effect.u), unit.name)
         ),
-        ties=ties_of(effect, rivals(effect)),
+        ties=ties_of(effect, rivals(effect), is_touched=is_touched),
     )
 
 
@@ -205,7 +205,8 @@ def _move(change: MovedTarget | ChangedTarget | ChangedParameter, target_word: s
 def machine_explanation(explanation: Explanation) -> MachineExplanation:
     """The explanation of a machine: what a comparison says, what the model lacks, and readings and changes."""
     problem, um = explanation.final.problem, MICROMETRE.to_display
-    missing = tuple(_machine_missing(effect) for effect in explanation.missing)
+    is_touched = problem.touches_centres or problem.touch_normals is not None
+    missing = tuple(_machine_missing(effect, is_touched=is_touched) for effect in explanation.missing)
     comparison = machine_comparison(explanation.comparison)
     suspect_data = tuple(
         BadProbing(point.run, point.sequence, point.target, point.axis, um(point.size), point.p_value)

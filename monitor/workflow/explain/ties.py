@@ -25,6 +25,8 @@ class TieBreak(Enum):
     INDEXATIONS = "indexations"
     #: Poses that `monitor plan --separate` selects for one pair.
     PLAN = "plan"
+    #: More poses over the whole range of ``axes``, or another load: what is seen from outside has no plan of touches.
+    MORE_POSES = "more_poses"
     #: They move the tip alike wherever this machine can touch these targets: a correction serves for both.
     NOTHING = "nothing"
 
@@ -32,7 +34,7 @@ class TieBreak(Enum):
 @dataclass(frozen=True)
 class Tie:
     """``rivals`` that the same action tells from the effect; ``drivers`` are the columns or conditions to vary,
-    ``axes`` those to index."""
+    ``axes`` those to index or to move."""
 
     rivals: tuple[str, ...]
     broken_by: TieBreak
@@ -40,11 +42,15 @@ class Tie:
     axes: tuple[str, ...] = field(default=(), metadata=OMITTED)
 
 
-def ties_of(effect: ChainMissing, rivals: Sequence[str]) -> tuple[Tie, ...]:
-    """What breaks the tie between an effect and each of its ``rivals``, by the action."""
+def ties_of(effect: ChainMissing, rivals: Sequence[str], *, is_touched: bool) -> tuple[Tie, ...]:
+    """What breaks the tie between an effect and each of its ``rivals``, by the action; ``is_touched`` says that touches
+    are planned, and are not poses that something outside sees."""
     actions: dict[tuple[TieBreak, tuple[str, ...], tuple[str, ...]], list[str]] = {}
     for rival in rivals:
-        actions.setdefault(_action(effect, rival), []).append(rival)
+        kind, drivers, axes = _action(effect, rival)
+        if kind is TieBreak.PLAN and not is_touched:
+            kind, axes = TieBreak.MORE_POSES, tuple(dict.fromkeys((_axis(effect.effect), _axis(rival))))
+        actions.setdefault((kind, drivers, axes), []).append(rival)
     return tuple(Tie(tuple(names), kind, drivers, axes) for (kind, drivers, axes), names in actions.items())
 
 

@@ -14,7 +14,7 @@ from monitor.exceptions import DataError, InputError, NotFoundError
 from monitor.machine import Chain
 from monitor.methods import ChainMethod, CurveMethod, methods
 from monitor.methods.chain.base_effects import base_effects
-from monitor.methods.model import Model, chain_of
+from monitor.methods.model import SHARED_BASE, Model, chain_of
 from monitor.store import Database, StoredModel, curve_names, described_machines, load_curve, load_model
 
 Subject = TypeVar("Subject")
@@ -50,6 +50,9 @@ class Machines:
         meaning: dict[str, str] = {}
         for _, chain, _ in self._calibrated():
             for text in effects:
+                if text == SHARED_BASE:
+                    meaning[text] = "the base effects, each one number for all runs of a campaign"
+                    continue
                 try:
                     meaning.setdefault(text, describe(parse_effect(text, chain)).meaning)
                 except InputError:
@@ -60,6 +63,13 @@ class Machines:
         chains = tuple(dict.fromkeys(chain_of(machine) for machine in described_machines(self.db)))
         if not chains:
             raise NotFoundError("there is no machine yet that could have an effect; import a campaign first")
+        if effect == SHARED_BASE:
+            if self.method is None or not self.method.shares_base:
+                raise InputError(
+                    f"{SHARED_BASE}: only where a machine is seen from outside (tracker) can its base effects be "
+                    "shared by all runs of a campaign; elsewhere they are what is followed from run to run"
+                )
+            return effect
         text = _first(chains, lambda chain: parse_effect(effect, chain).text)
         bases = [base for _, _, base in self._calibrated()]
         if bases and all(text in base for base in bases):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from monitor.effects import parse_effect
 from monitor.exceptions import EffectError, InputError, MonitorError, NotFoundError, did_you_mean
 from monitor.methods import ChainMethod, methods
-from monitor.methods.model import chain_of
+from monitor.methods.model import SHARED_BASE, chain_of
 from monitor.store import (
     Database,
     StoredModel,
@@ -73,6 +73,11 @@ def _check_effects(db: Database, model: StoredModel, machine: str) -> None:
         )
     chain = chain_of(described[machine])
     for effect in model.effects:
+        if effect == SHARED_BASE:
+            raise InputError(
+                f"model {label(model)} has one base for all runs of a campaign, so that there is nothing to follow "
+                f"from run to run; choose a model without {SHARED_BASE}"
+            )
         try:
             parse_effect(effect, chain)
         except EffectError as error:

@@ -103,13 +103,15 @@ def _shared(fit: Fit) -> tuple[_Known, list[int], dict[str, RefusedParameters]]:
     estimate: list[float] = []
     indices: list[int] = []
     left_out: dict[str, RefusedParameters] = {}
+    # What is held at zero is in the numbers of others.
+    settled = solution.common_free | solution.common_held
     first = coefficient = 0
     for shared, plain in zip(problem.shared, fixed.added, strict=True):
         unknowns = range(first, first + shared.size)
         first += shared.unknowns
         if not isinstance(plain, ChainEffect):
             left_out |= _refused(shared.names(), ReasonKind.NO_MACHINE_ERROR)
-        elif not all(solution.common_free[list(unknowns)]):
+        elif not all(settled[list(unknowns)]):
             left_out |= _refused(shared.names(), ReasonKind.NOT_DETERMINED)
         else:
             effects.append(plain)
