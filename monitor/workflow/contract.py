@@ -83,6 +83,7 @@ QUESTIONS = {
         "remove effect": "model.change:remove_effect",
         "report": "health.report:report",
         "residuals": "explain.residual_vectors:residual_vectors",
+        "residuals by driver": "explain.residuals_by_driver:residuals_by_driver",
         "restore": "keeping:restore_backup",
         "runs": "intake.campaigns:runs",
         "select": "selections.select:select",
