@@ -141,9 +141,10 @@ def listed(names: Iterable[str], most: int = 6) -> str:
 def what_breaks(tie: Tie) -> str:
     """Say what tells the rivals of a tie apart."""
     drivers = " and ".join(driver.replace("_", " ") for driver in tie.drivers)
+    recorded = "both" if len(tie.drivers) == 2 else "it"
     return {
         TieBreak.POSES: "probe at the poses below too",
-        TieBreak.DRIVERS: f"measure runs at several values of {drivers}, and record {'both' if len(tie.drivers) == 2 else 'it'}",
+        TieBreak.DRIVERS: f"measure runs at several values of {drivers}, and record {recorded}",
         TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
         TieBreak.PLAN: "let the plan choose poses for the pair",
         TieBreak.NOTHING: "no touch of these targets does: they move the tip alike, and one correction serves both",

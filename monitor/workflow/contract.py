@@ -75,6 +75,7 @@ QUESTIONS = {
         "model": "model.show:show_model",
         "model history": "explain.versions:history",
         "models": "model.show:list_all_models",
+        "map over the stroke": "volumetric.over_stroke:over_stroke",
         "plan": "plan.plan:plan",
         "poses": "kinematics:poses",
         "predict": "predict.predict:predict",

@@ -35,7 +35,9 @@ def machine_traces(residuals: ResidualsAnswer) -> list[Trace]:
             traces.append(_line(axis, at, at + 0.06 * span * direction))
             traces.append(_arc(axis, at, 0.045 * span))
         elif axis.kind == "spindle":
-            top = (low + high) / 2.0 + direction * (float((high - low) @ np.abs(direction)) / 2.0 + 0.1 * span)
+            top = (low + high) / 2.0 + direction * (
+                float((high - low) @ np.abs(direction)) / 2.0 + 0.1 * span
+            )
             traces.append(_line(axis, top, top + 0.22 * span * direction))
             traces.append(_arc(axis, top + 0.11 * span * direction, 0.05 * span))
         else:

@@ -25,7 +25,9 @@ MOST_POSES = 80
 def scene_chart(residuals: ResidualsAnswer) -> Chart:
     """Show the machine and the probed places; the script adds the arrows, and changes size, run, pose and effect."""
     frame = {
-        name: axis(f"{name[0].upper()} / mm", backgroundcolor="rgba(0,0,0,0)", showbackground=False, showspikes=False)
+        name: axis(
+            f"{name[0].upper()} / mm", backgroundcolor="rgba(0,0,0,0)", showbackground=False, showspikes=False
+        )
         for name in ("xaxis", "yaxis", "zaxis")
     }
     return Chart(
@@ -108,7 +110,9 @@ def driver_chart(answer: ResidualsByDriverAnswer) -> Chart:
     )  # fmt: skip
 
 
-def _means(against: ResidualAgainst, yaxis: str, title: str, colour: str, marker: str, *, first: bool) -> Trace:
+def _means(
+    against: ResidualAgainst, yaxis: str, title: str, colour: str, marker: str, *, first: bool
+) -> Trace:
     """The means of the groups, with the tried effect where the title's colour is not the model's own."""
     groups = against.groups
     after = colour == "@orange"

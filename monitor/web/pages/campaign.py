@@ -11,6 +11,7 @@ from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.web.charts.chart import Chart
 from monitor.web.charts.statistics import correlation_chart, p_value_chart, region_chart
 from monitor.web.desk import Ticket
+from monitor.web.forms import whole_number
 from monitor.web.rendering import page
 from monitor.workflow.intake.campaigns import RunsAnswer
 from monitor.workflow.run_statistics.answer import StatisticsAnswer
@@ -73,13 +74,9 @@ def _regions_asked(name: str, first: str, second: str, run: str, *, trials: bool
     """The document that asks for the regions of a pair. Raises InputError where it is none."""
     if not (first and second and first != second):
         raise InputError("choose two different parameters for the ellipse and the rectangle")
-    return {"campaign": name, "method": "both" if trials else "guf"} | ({"run": _number(run)} if run else {})
-
-
-def _number(text: str) -> int:
-    if not text.isdecimal() or len(text) > 9:
-        raise InputError(f"run '{text}': a run has a number, such as 20")
-    return int(text)
+    return {"campaign": name, "method": "both" if trials else "guf"} | (
+        {"run": whole_number("run", run)} if run else {}
+    )
 
 
 def _conditions(runs: RunsAnswer) -> list[str]:
