@@ -18,7 +18,17 @@ from monitor.web.gate import Gate
 from monitor.web.interface import ROOT, interface
 from monitor.web.opening import host_user_name
 from monitor.web.pages import campaign as campaign_page
-from monitor.web.pages import certificates, importing, issuing, keeping, model, plan, reports, visiting, volumetric
+from monitor.web.pages import (
+    certificates,
+    importing,
+    issuing,
+    keeping,
+    model,
+    plan,
+    reports,
+    visiting,
+    volumetric,
+)
 from monitor.web.pages import fleet as fleet_page
 from monitor.web.pages import machine as machine_page
 from monitor.web.rendering import refusal_page

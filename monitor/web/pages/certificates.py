@@ -58,9 +58,7 @@ def routes() -> APIRouter:
         """Mark a certificate as withdrawn."""
         async with read_form(request) as form:
             document = {"number": form.text("number"), "reason": form.text("reason")}
-        await run_in_threadpool(
-            request.app.state.asker, request.state.user, "withdraw certificate", document
-        )
+        await run_in_threadpool(request.app.state.asker, request.state.user, "withdraw certificate", document)
         return RedirectResponse("/certificates", status_code=303)
 
     return router
@@ -71,7 +69,14 @@ def _listed(request: Request, status: int = 200, **outcome: Any) -> Response:
     answer = ask(user, "certificates")
     campaigns = [row for row in ask(user, "campaigns").campaigns if row.rows is None]
     context = {"verification": None, "refusal": None, **outcome}
-    return page(request, "certificates.html", status=status, certificates=answer.certificates, campaigns=campaigns, **context)
+    return page(
+        request,
+        "certificates.html",
+        status=status,
+        certificates=answer.certificates,
+        campaigns=campaigns,
+        **context,
+    )
 
 
 def _sent(request: Request, question: str, number: str, media_type: str) -> Response:

@@ -11,11 +11,11 @@ from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError
+from monitor.store import CampaignRow
 from monitor.web.desk import Ticket
 from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
 from monitor.workflow.health.request import ReportAnswer
-from monitor.store.catalogue import CampaignRow
 
 #: Weeks that are listed, the latest first.
 MOST_WEEKS = 60
@@ -44,7 +44,9 @@ def routes() -> APIRouter:
         )  # fmt: skip
 
     @router.get("/report")
-    def report(request: Request, week: str, format: str = "pdf", machine: str = "", part: int = 0) -> Response:
+    def report(
+        request: Request, week: str, format: str = "pdf", machine: str = "", part: int = 0
+    ) -> Response:
         """Send a file of a report; where it is not there yet, show the page that computes it."""
         if format not in ("pdf", "html"):
             raise InputError(f"a report comes as pdf or html, not as {format}")

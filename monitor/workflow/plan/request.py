@@ -24,11 +24,11 @@ class PlanRequest:
     model: str | None = None
     balls: int | None = None
     poses: int | None = None
-    keep: tuple[int, ...] = ()
     wanted: Mapping[str, float] = field(default_factory=dict)
     separate: tuple[str, str] | None = None
     p: float = 0.95
     figures: Path | None = None
+    keep: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if self.balls is not None and not 1 <= self.balls <= MOST_BALLS:
