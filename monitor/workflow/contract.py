@@ -76,6 +76,7 @@ QUESTIONS = {
         "model history": "explain.versions:history",
         "models": "model.show:list_all_models",
         "map over the stroke": "volumetric.over_stroke:over_stroke",
+        "monte carlo cloud": "uncertainty.cloud:cloud",
         "periods": "history.periods:periods",
         "plan": "plan.plan:plan",
         "poses": "kinematics:poses",

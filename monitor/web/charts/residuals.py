@@ -184,9 +184,10 @@ def ranking_chart(missing: Sequence[MachineMissing]) -> Chart:
 
 
 def falling_chart(
-    steps: Sequence[MachineVersion | CurveVersion], proposed: MachineMissing | None
+    steps: Sequence[MachineVersion | CurveVersion], proposed: MachineMissing | None, expected_um: float | None
 ) -> Chart | None:
-    """Show the error of each version, on the fitted runs and on held-out ones, down to the noise; None for curves."""
+    """Show the error of each version, on the fitted runs and on held-out ones, down to what the readings' noise leaves
+    (``expected_um``); None for curves."""
     versions = [step for step in steps if isinstance(step, MachineVersion)]
     if not versions:
         return None
@@ -207,8 +208,11 @@ def falling_chart(
                 "marker": {"color": "@teal", "symbol": "square", "size": 10},
             }
         )  # fmt: skip
-    noise = versions[-1].repeatability_um
-    lines = [] if noise is None else [_level(noise, "repeatability of the runs")]
+    lines = (
+        []
+        if expected_um is None
+        else [_level(expected_um, "noise floor: what the readings' uncertainty leaves")]
+    )
     return Chart(
         key="falling",
         says="RMS of the residual from version to version in µm",
@@ -232,5 +236,8 @@ def _level(value: float, name: str) -> Any:
     return {
         "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value,
         "line": {"color": "@mid", "dash": "longdash", "width": 1.5},
-        "label": {"text": f"{name} {value:.2f} µm", "textposition": "end", "font": {"size": 11, "color": "@mid"}},
+        "label": {
+            "text": f"{name} {value:.2f} µm", "textposition": "end", "yanchor": "top",
+            "font": {"size": 11, "color": "@ink"},
+        },
     }  # fmt: skip

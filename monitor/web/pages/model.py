@@ -64,7 +64,7 @@ def routes() -> APIRouter:
             driven=answers.driven, against=None if answers.driven is None else driver_chart(answers.driven),
             failing=[] if compare is None else failing_charts(compare),
             ranking=ranking_chart(missing) if len(missing) > 1 else None,
-            falling=falling_chart(steps, missing[0] if missing else None), steps=steps,
+            falling=falling_chart(steps, missing[0] if missing else None, _expected(compare)), steps=steps,
             versions=versions, current=_version(versions, label), waiting=answers.waiting,
         )  # fmt: skip
 
@@ -133,6 +133,11 @@ class _Answers:
         except MonitorError as error:
             self.refusals[name] = str(error)
             return None
+
+
+def _expected(compare: Any) -> float | None:
+    """The RMS that the stated uncertainty of the readings would leave; None while nothing is compared."""
+    return None if compare is None else compare.comparison.expected_rms_um
 
 
 async def _asked(request: Request, question: str, document: dict[str, Any]) -> Any:
