@@ -90,18 +90,18 @@ def _prefixes(section: str) -> list[str]:
 def _box(
     section: str, prefix: str, key: str, texts: Mapping[str, str], faults: Mapping[str, str]
 ) -> Box:  # fmt: skip
-    item, name = f"{section}.{key}", f"{prefix}.{key}"
+    key_of_file, name = f"{section}.{key}", f"{prefix}.{key}"
     kind = (
-        "lines" if item in _LINES
-        else "day" if item in _DAYS
-        else "number" if item in _NUMBERS
-        else "language" if item == "laboratory.language"
+        "lines" if key_of_file in _LINES
+        else "day" if key_of_file in _DAYS
+        else "number" if key_of_file in _NUMBERS
+        else "language" if key_of_file == "laboratory.language"
         else "line"
     )  # fmt: skip
     return Box(
         name, key.replace("_degC", " / °C").replace("_", " "), kind, texts.get(name, ""),
-        f"na:{name}" if item in MAY_NOT_APPLY else "", texts.get(f"na:{name}", ""),
-        item in OPTIONAL or prefix.endswith((".1", ".2")), faults.get(name, ""),
+        f"na:{name}" if key_of_file in MAY_NOT_APPLY else "", texts.get(f"na:{name}", ""),
+        key_of_file in OPTIONAL or prefix.endswith((".1", ".2")), faults.get(name, ""),
     )  # fmt: skip
 
 
@@ -133,22 +133,24 @@ def laboratory_file(texts: Mapping[str, str]) -> str:
     return "\n".join(lines)
 
 
-def _answer(item: str, name: str, texts: Mapping[str, str]) -> str | None:
+def _answer(key_of_file: str, name: str, texts: Mapping[str, str]) -> str | None:
     """A box as a value of TOML; None where it is blank."""
     text, reason = texts.get(name, "").strip(), texts.get(f"na:{name}", "").strip()
     if not text:
-        return f"{{ not_applicable = {_quoted(reason)} }}" if reason and item in MAY_NOT_APPLY else None
-    if item in _LINES:
+        return (
+            f"{{ not_applicable = {_quoted(reason)} }}" if reason and key_of_file in MAY_NOT_APPLY else None
+        )
+    if key_of_file in _LINES:
         return f"[{', '.join(_quoted(line.strip()) for line in text.splitlines() if line.strip())}]"
-    if item in _DAYS:
+    if key_of_file in _DAYS:
         parts = text.split("-")
         if [len(part) for part in parts] == [4, 2, 2] and all(part.isdecimal() for part in parts):
             return text
-    if item in _NUMBERS:
+    if key_of_file in _NUMBERS:
         try:
             return repr(float(text.replace(",", ".")))
         except ValueError as error:
-            raise InputError(f"{item}: '{text}' is no number") from error
+            raise InputError(f"{key_of_file}: '{text}' is no number") from error
     return _quoted(text)
 
 

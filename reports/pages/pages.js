@@ -131,7 +131,7 @@ function pointAt(effect, redraw) {
       return;
     }
     status.textContent = answer === null ? effect + " cannot be tried in this model"
-      : "Orange: what " + effect + " explains. Blue: what the model leaves; where both agree, the effect is the cause.";
+      : "Orange: what " + effect + " explains. Blue: what the model leaves. Where the arrows agree, it explains the residual.";
     if (answer !== null) {
       scene.effect = answer;
       redraw();
@@ -173,6 +173,10 @@ function prepareScene() {
   }
 }
 
+// A page that waits loads itself again, where one is in it; an address that ends in #scene would not be by its head alone.
+if (document.querySelector("p.waiting") !== null) {
+  setTimeout(() => location.reload(), 2000);
+}
 prepareScene();
 drawAll();
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);

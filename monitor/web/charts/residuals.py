@@ -69,11 +69,11 @@ def explained_vectors(residuals: ResidualsAnswer) -> Mapping[str, Any]:
 
 
 def first_magnification(residuals: ResidualsAnswer) -> int:
-    """Return the step of the slider at which the longest arrows take some sixth of what was probed."""
+    """Return the step of the slider at which the longest arrows take a quarter of what was probed."""
     places = np.array(residuals.place_mm)
     span = float((places.max(axis=0) - places.min(axis=0)).max())
     lengths = np.linalg.norm(np.array(residuals.residual_um), axis=1)[~np.array(residuals.left_out)]
-    wanted = 0.1 * span / max(float(np.quantile(lengths, 0.9)), 1e-6)
+    wanted = 0.25 * span / max(float(np.quantile(lengths, 0.9)), 1e-6)
     return int(np.argmin(np.abs(np.log(np.array(MAGNIFICATIONS) / max(wanted, 1e-6)))))
 
 
@@ -142,11 +142,12 @@ def failing_charts(answer: CompareAnswer) -> list[Chart]:
         }
         if len(shown) < 2 or name not in ("target", "axis", "run"):
             continue
-        lines = [] if expected is None else [_level(expected, "expected")]
+        lines = [] if expected is None else [_level(expected)]
+        said = "" if expected is None else f"; dashed: {expected:.2f} µm are expected"
         charts.append(
             Chart(
                 key=f"by-{name}",
-                says=f"RMS of the residual by {name} in µm",
+                says=f"RMS of the residual by {name} in µm{said}",
                 traces=[
                     {
                         "type": "bar", "x": list(shown), "y": [part.rms_um for part in shown.values()],
@@ -232,12 +233,14 @@ def _steps(names: list[str], values: Sequence[float | None], title: str, colour:
     }  # fmt: skip
 
 
-def _level(value: float, name: str) -> Any:
-    return {
+def _level(value: float, name: str = "") -> Any:
+    line: dict[str, Any] = {
         "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value,
-        "line": {"color": "@mid", "dash": "longdash", "width": 1.5},
-        "label": {
-            "text": f"{name} {value:.2f} µm", "textposition": "end", "yanchor": "top",
-            "font": {"size": 11, "color": "@ink"},
-        },
+        "line": {"color": "@orange", "dash": "longdash", "width": 1.5},
     }  # fmt: skip
+    if name:
+        font = {"size": 11, "color": "@ink"}
+        line["label"] = {
+            "text": f"{name} {value:.2f} µm", "textposition": "end", "yanchor": "top", "font": font,
+        }  # fmt: skip
+    return line

@@ -33,8 +33,8 @@ def vectors_chart(answer: OverStrokeAnswer) -> Chart:
                 "sizemode": "scaled", "sizeref": 1.1, "anchor": "tail", "colorscale": ARROWS, "cmin": 0,
                 "colorbar": {"title": {"text": "µm"}, "thickness": 12, "len": 0.7},
                 "text": [
-                    f"{place} mm: {number(float(length))} ± {number(float(u), 2)} µm"
-                    for place, length, u in zip(where, lengths, answer.expanded_um, strict=True)
+                    f"{readings} mm: {number(float(length))} ± {number(float(u), 2)} µm"
+                    for readings, length, u in zip(where, lengths, answer.expanded_um, strict=True)
                 ],
                 "hovertemplate": "%{text}<extra></extra>",
             }

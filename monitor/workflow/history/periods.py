@@ -139,7 +139,7 @@ def _compared(
 ) -> ParameterOfPeriods:
     """One parameter; its other days help to say how days differ."""
     steady = whole.steady
-    kept = campaigns[~whole.warm_up] if len(steady.values) < len(whole.values) else campaigns
+    steady_campaigns = campaigns[~whole.warm_up] if len(steady.values) < len(whole.values) else campaigns
     ends = [
         moment.timestamp() / SECONDS_PER_DAY
         for period in (request.earlier, request.later)
@@ -156,7 +156,7 @@ def _compared(
         try:
             judged = before_after(
                 first.values, second.values, first.days, second.days,
-                OtherDays(others.values, others.days, stretch[rest], kept[rest]),
+                OtherDays(others.values, others.days, stretch[rest], steady_campaigns[rest]),
             )  # fmt: skip
         except DataError:
             judged = None

@@ -39,8 +39,8 @@ class CloudRequest:
 
 @dataclass(frozen=True, eq=False)
 class CloudAnswer:
-    """Estimates and standard uncertainties (2,) of the pair in its ``units``, and the first of all ``made`` trials (n,
-    2).
+    """Estimates and standard uncertainties (2,) of the pair in its ``units``, and the first n of all ``trial_count``
+    trials (n, 2).
 
     ``k_p`` of the ellipse and ``k_q`` of the rectangle hold the pair with ``p``, as quantiles of the trials; those
     ``_of_all`` hold all ``parameters`` of the run together.
@@ -59,7 +59,7 @@ class CloudAnswer:
     k_q: float
     k_p_of_all: float
     k_q_of_all: float
-    made: int
+    trial_count: int
     seed: int
     trials: Array
 
@@ -97,7 +97,7 @@ def cloud(db: Database, request: CloudRequest) -> CloudAnswer:
         k_q=quantile_of(largest_deviations(trials, centre, covariance), request.p),
         k_p_of_all=sampled.k_p,
         k_q_of_all=sampled.k_q,
-        made=sampled.trials,
+        trial_count=sampled.trials,
         seed=sampled.seed,
         trials=np.round(trials[: request.trials] * np.array([first, second]), 6),
     )
