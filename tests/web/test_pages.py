@@ -390,3 +390,9 @@ def test_the_report_of_a_week_is_shown_and_sent(local: Any) -> None:
     assert local.client.get("/report?week=2026-W10&format=pdf").content.startswith(b"%PDF")
     assert b"<html" in local.client.get("/report?week=2026-W10&format=html").content
     assert 'role="alert"' in looked_at(local, "/reports?week=2026-10")
+
+
+def test_the_model_page_of_a_curve_has_no_machine(local: Any) -> None:
+    text = looked_at(local, "/model?campaign=load-cell")
+    assert "load_N:poly2" in text
+    assert 'id="scene-run"' not in text
