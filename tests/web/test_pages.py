@@ -392,6 +392,7 @@ def test_the_report_of_a_week_is_shown_and_sent(local: Any) -> None:
     assert 'role="alert"' in looked_at(local, "/reports?week=2026-10")
 
 
+@pytest.mark.slow
 def test_the_model_page_of_a_curve_has_no_machine(local: Any) -> None:
     text = looked_at(local, "/model?campaign=load-cell")
     assert "load_N:poly2" in text
