@@ -18,7 +18,17 @@ from monitor.web.gate import Gate
 from monitor.web.interface import ROOT, interface
 from monitor.web.opening import host_user_name
 from monitor.web.pages import campaign as campaign_page
-from monitor.web.pages import certificates, importing, keeping, model, visiting
+from monitor.web.pages import (
+    certificates,
+    importing,
+    issuing,
+    keeping,
+    model,
+    plan,
+    reports,
+    visiting,
+    volumetric,
+)
 from monitor.web.pages import fleet as fleet_page
 from monitor.web.pages import machine as machine_page
 from monitor.web.rendering import refusal_page
@@ -28,7 +38,20 @@ from monitor.web.static import static_routes
 from monitor.web.users import Role, User, read_users
 
 _log = logging.getLogger("monitor.web")
-_PAGES = (fleet_page, machine_page, campaign_page, model, importing, certificates, keeping, visiting)
+_PAGES = (
+    fleet_page,
+    machine_page,
+    campaign_page,
+    model,
+    volumetric,
+    plan,
+    importing,
+    certificates,
+    issuing,
+    reports,
+    keeping,
+    visiting,
+)
 
 
 def application(db: Database, settings: ServerSettings, working_folder: Path) -> Gate:

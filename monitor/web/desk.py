@@ -77,8 +77,13 @@ class Desk:
         self._lock = RLock()  # a callback runs at once where the answer is there already
         self._count = 0
 
-    def ask(self, user: User, question: str, document: Mapping[str, Any]) -> Ticket:
-        """Return the ticket of a question, a new one where nobody asked it since the last change."""
+    def ask(
+        self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any] | None = None
+    ) -> Ticket:
+        """Return the ticket of a question, a new one where nobody asked it since the last change.
+
+        ``files`` are paths that the server itself fills in; they are no part of what is asked.
+        """
         check_role(user, question)
         key = (question, json.dumps(document, sort_keys=True, default=str), self.asker.generation)
         with self._lock:
@@ -86,7 +91,7 @@ class Desk:
             if ticket is not None and ticket.is_good:
                 return ticket
             self._count += 1
-            future = self._pool.submit(self.asker, user, question, document)
+            future = self._pool.submit(self.asker, user, question, document, files)
             self._tickets[key] = ticket = Ticket(self._count, question, document, user, future)
             if question in IDENTIFIES:
                 future.add_done_callback(self._forget_sums)

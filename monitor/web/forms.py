@@ -60,3 +60,10 @@ def _checked(request: Request, form: FormData) -> Form:
         name: value.strip() for name, value in form.multi_items() if isinstance(value, str) and name != PROOF
     }
     return Form(texts, tuple(files))
+
+
+def whole_number(name: str, text: str) -> int:
+    """Return the number that a field of a form holds. Raises InputError for another text."""
+    if not text.isdecimal() or len(text) > 9:
+        raise InputError(f"'{name}' is a whole number, such as 20, not '{text}'")
+    return int(text)

@@ -59,6 +59,7 @@ def _environment() -> Environment:
         "day": words.day,
         "counted": words.counted,
         "listed": words.listed,
+        "what_breaks": words.what_breaks,
         "embedded": _embedded,
     }
     return environment

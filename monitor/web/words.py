@@ -10,6 +10,7 @@ from datetime import datetime
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
 from monitor.units import DAYS_PER_YEAR
+from monitor.workflow.explain.ties import Tie, TieBreak
 from monitor.workflow.fleet.answer import ATTENTION, Attention, FleetTableRow
 
 
@@ -136,3 +137,16 @@ def listed(names: Iterable[str], most: int = 6) -> str:
     every = list(names)
     rest = f" and {len(every) - most} more" if len(every) > most else ""
     return ", ".join(every[:most]) + rest
+
+
+def what_breaks(tie: Tie) -> str:
+    """Say what tells the rivals of a tie apart."""
+    drivers = " and ".join(driver.replace("_", " ") for driver in tie.drivers)
+    recorded = "both" if len(tie.drivers) == 2 else "it"
+    return {
+        TieBreak.POSES: "probe at the poses below too",
+        TieBreak.DRIVERS: f"measure runs at several values of {drivers}, and record {recorded}",
+        TieBreak.INDEXATIONS: f"index {' and '.join(tie.axes)} to other angles while {drivers} acts",
+        TieBreak.PLAN: "let the plan choose poses for the pair",
+        TieBreak.NOTHING: "no touch of these targets does: they move the tip alike, and one correction serves both",
+    }[tie.broken_by]

@@ -1,4 +1,4 @@
-// The script of the pages: hands the charts of a page to plotly.js in the page's colours, and moves the arrows of the scene.
+// The script of the pages: hands the charts of a page to plotly.js in the page's colours; moves the arrows of the scene.
 "use strict";
 
 function colour(name) {
@@ -36,18 +36,18 @@ function draw(figure) {
   }
 }
 
-// Means of the vectors of the runs at the same place, or those of one run; probings that were left out take no part.
-function arrows(vectors, which, run) {
+// Means of the vectors of the probings that are shown, place by place; probings that were left out take no part.
+function arrows(vectors, list, run, pose) {
   const places = new Map();
   vectors.place.forEach((place, row) => {
-    if (vectors.left_out[row] || (run !== "" && String(vectors.run[row]) !== run)) {
+    if (vectors.left_out[row] || (run !== "" && String(vectors.run[row]) !== run) || (pose !== "" && String(vectors.pose[row]) !== pose)) {
       return;
     }
-    const key = place.map((number) => Math.round(number)).join(" ");
+    const key = vectors.pose[row] + " " + place.map((number) => Math.round(number)).join(" ");
     const sum = places.get(key) || { place: [0, 0, 0], vector: [0, 0, 0], count: 0, target: vectors.target[row] };
     for (let axis = 0; axis < 3; axis += 1) {
       sum.place[axis] += place[axis];
-      sum.vector[axis] += vectors[which][row][axis];
+      sum.vector[axis] += list[row][axis];
     }
     sum.count += 1;
     places.set(key, sum);
@@ -59,11 +59,11 @@ function arrows(vectors, which, run) {
   }));
 }
 
-// Lines from each place along its vector, with a cone as the head.
-function traces(list, magnification, name, shade) {
-  const line = { type: "scatter3d", mode: "lines", name, line: { color: shade, width: 4 }, x: [], y: [], z: [], hoverinfo: "skip" };
-  const head = { type: "cone", name, x: [], y: [], z: [], u: [], v: [], w: [], text: [], anchor: "tip", showscale: false,
-    sizemode: "raw", sizeref: 0.3, colorscale: [[0, shade], [1, shade]], hovertemplate: "%{text}<extra>" + name + "</extra>" };
+// Lines from each place along its vector, with a cone as the head; the line and its head are shown and hidden together.
+function traces(list, magnification, name, shade, visible) {
+  const line = { type: "scatter3d", mode: "lines", name, legendgroup: name, visible, line: { color: shade, width: 5 }, x: [], y: [], z: [], hoverinfo: "skip" };
+  const head = { type: "cone", name, legendgroup: name, visible: visible === true, x: [], y: [], z: [], u: [], v: [], w: [], text: [], anchor: "tip",
+    showscale: false, sizemode: "raw", sizeref: 0.35, colorscale: [[0, shade], [1, shade]], hovertemplate: "%{text}<extra>" + name + "</extra>" };
   for (const { target, place, vector } of list) {
     const end = place.map((number, axis) => number + magnification * vector[axis]);
     ["x", "y", "z"].forEach((axis, index) => {
@@ -76,29 +76,67 @@ function traces(list, magnification, name, shade) {
   return [line, head];
 }
 
-// The directions of the machine's linear axes, at the corner of what was probed.
-function frame(vectors) {
-  const low = [0, 1, 2].map((axis) => Math.min(...vectors.place.map((place) => place[axis])));
-  const high = [0, 1, 2].map((axis) => Math.max(...vectors.place.map((place) => place[axis])));
-  const reach = 0.3 * Math.max(...high.map((number, axis) => number - low[axis]), 1);
-  return vectors.axes.map((name) => {
-    const end = low.slice();
-    end["XYZ".indexOf(name[0])] += reach;
-    return { type: "scatter3d", mode: "lines+text", x: [low[0], end[0]], y: [low[1], end[1]], z: [low[2], end[2]], text: ["", name],
-      line: { color: colour("mid"), width: 6 }, textfont: { color: colour("ink"), size: 14 }, hoverinfo: "skip", showlegend: false };
-  });
+// What is drawn over the residuals: the effect that is pointed at, else the one that the page tries.
+const scene = { vectors: null, effect: null, answers: new Map() };
+
+function chosen(id) {
+  const element = document.getElementById(id);
+  return element === null ? "" : element.value;
 }
 
 function drawScene(canvas, chart) {
-  const vectors = read("scene-vectors");
-  const step = read("scene-magnifications")[Number(document.getElementById("magnification").value)];
-  const run = document.getElementById("scene-run").value;
+  const vectors = scene.vectors;
+  const step = read("scene-magnifications")[Number(chosen("magnification"))];
+  const run = chosen("scene-run");
+  const pose = chosen("scene-pose");
   document.getElementById("magnified").textContent = "1 µm is drawn as " + step + " mm";
-  let data = frame(vectors).concat(traces(arrows(vectors, "residual", run), step, "left by the model", colour("blue")));
-  if (vectors.with_effect) {
-    data = data.concat(traces(arrows(vectors, "with_effect", run), step, "with " + vectors.effect, colour("orange")));
+  const effect = scene.effect;
+  // The axis whose error it is lights up.
+  let data = coloured(chart.data).map((trace) => effect === null || trace.meta !== effect.axis || !trace.meta ? trace
+    : { ...trace, line: { ...trace.line, color: colour("orange"), width: 9 }, textfont: { color: colour("orange"), size: 17 } });
+  data = data.concat(traces(arrows(vectors, vectors.residual, run, pose), step, "left by the model", colour("blue"), true));
+  if (effect !== null) {
+    data = data.concat(traces(arrows(vectors, effect.explained, run, pose), step, "explained by " + effect.effect, colour("orange"), true));
+    data = data.concat(traces(arrows(vectors, effect.remaining, run, pose), step, "left with " + effect.effect, colour("teal"), "legendonly"));
   }
-  Plotly.react(canvas, data, coloured(chart.layout), SETTINGS).then(() => { canvas.dataset.drawn = "1"; });
+  return Plotly.react(canvas, data, coloured(chart.layout), SETTINGS).then(() => { canvas.dataset.drawn = "1"; });
+}
+
+// The arrows of an effect, asked for once; while they are computed the server is asked again.
+function explained(effect) {
+  if (!scene.answers.has(effect)) {
+    const address = read("scene-asked") + "&effect=" + encodeURIComponent(effect);
+    const ask = () => fetch(address, { credentials: "same-origin" }).then((answer) => {
+      if (answer.status === 202) {
+        return ask();
+      }
+      return answer.ok ? answer.json() : null;
+    });
+    scene.answers.set(effect, ask());
+  }
+  return scene.answers.get(effect);
+}
+
+function pointAt(effect, redraw) {
+  const status = document.getElementById("scene-effect");
+  scene.pointed = effect;
+  if (effect === null) {
+    scene.effect = scene.vectors.tried;
+    redraw();
+    return;
+  }
+  status.textContent = "what " + effect + " explains is being computed";
+  explained(effect).then((answer) => {
+    if (scene.pointed !== effect) {
+      return;
+    }
+    status.textContent = answer === null ? effect + " cannot be tried in this model"
+      : "Orange: what " + effect + " explains. Blue: what the model leaves. Where the arrows agree, it explains the residual.";
+    if (answer !== null) {
+      scene.effect = answer;
+      redraw();
+    }
+  });
 }
 
 function drawAll() {
@@ -108,17 +146,37 @@ function drawAll() {
 }
 
 function prepareScene() {
-  const vectors = read("scene-vectors");
-  if (vectors === null) {
+  scene.vectors = read("scene-vectors");
+  if (scene.vectors === null) {
     return;
   }
+  scene.effect = scene.vectors.tried;
   const select = document.getElementById("scene-run");
-  [...new Set(vectors.run)].forEach((run) => select.add(new Option("run " + run, String(run))));
+  [...new Set(scene.vectors.run)].forEach((run) => select.add(new Option("run " + run, String(run))));
   const redraw = () => draw(document.querySelector('figure.chart[data-key="scene"]'));
-  select.addEventListener("change", redraw);
+  ["scene-run", "scene-pose"].forEach((id) => document.getElementById(id)?.addEventListener("change", redraw));
   document.getElementById("magnification").addEventListener("input", redraw);
+  const cards = [...document.querySelectorAll("article.effect[data-effect]")];
+  cards.forEach((card) => {
+    const effect = card.dataset.effect;
+    ["mouseenter", "focusin"].forEach((kind) => card.addEventListener(kind, () => {
+      if (scene.pointed !== effect) {
+        pointAt(effect, redraw);
+      }
+    }));
+    card.addEventListener("mouseleave", () => { if (!card.contains(document.activeElement)) { pointAt(null, redraw); } });
+    card.addEventListener("focusout", (event) => { if (!card.contains(event.relatedTarget)) { pointAt(null, redraw); } });
+  });
+  // The first is what most people point at: it is there when they do.
+  if (cards.length > 0) {
+    explained(cards[0].dataset.effect);
+  }
 }
 
+// A page that waits loads itself again, where one is in it; an address that ends in #scene would not be by its head alone.
+if (document.querySelector("p.waiting") !== null) {
+  setTimeout(() => location.reload(), 2000);
+}
 prepareScene();
 drawAll();
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);

@@ -144,3 +144,17 @@ def test_readings_that_no_step_brings_nearer_do_not_converge() -> None:
         DataError, match=r"did not converge in 50 steps: .* check the axis signs, the topology"
     ):
         solve(at, np.zeros((1, 1)), np.zeros(0))
+
+
+def test_fewer_rows_than_unknowns_span_what_they_can() -> None:
+    """A plan of few touches: the basis reproduces every column, and the null vectors change no residual."""
+    rng = np.random.default_rng(20261123)
+    local = rng.standard_normal((2, 5, 8))
+    space = eliminate(local)
+    assert space.rank.tolist() == [5, 5]
+    assert project_out(space.basis, local) == pytest.approx(np.zeros(local.shape), abs=1e-12)
+    scale = np.linalg.norm(local, axis=1)
+    # Null vectors are those of the scaled columns; there are 8 - 5 of them.
+    nulls = space.null_space / scale[:, None, :]
+    assert np.einsum("rnp,rkp->rnk", local, nulls) == pytest.approx(np.zeros((2, 5, 8)), abs=1e-12)
+    assert [np.linalg.matrix_rank(vectors) for vectors in nulls] == [3, 3]

@@ -1,9 +1,10 @@
 #!/bin/sh
-# What make pages needs besides: Playwright in .venv, and Debian's or Ubuntu's Chromium. No browser is fetched from elsewhere.
+# What make pages needs besides: Playwright and axe-core in .venv, and Debian's or Ubuntu's Chromium. No browser is fetched from elsewhere.
 set -eu
 cd "$(dirname "$0")/../.."
 
-.venv/bin/python -c 'import playwright' 2>/dev/null || .venv/bin/python -m pip install --quiet -c constraints.txt playwright
+.venv/bin/python -c 'import playwright, axe_playwright_python' 2>/dev/null ||
+    .venv/bin/python -m pip install --quiet -c constraints.txt playwright axe-playwright-python
 if [ -z "${CHROMIUM:-}" ] && ! command -v chromium >/dev/null && ! command -v chromium-browser >/dev/null; then
     install="apt-get install -y --no-install-recommends chromium"
     if [ "$(id -u)" = 0 ]; then

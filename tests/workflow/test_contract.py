@@ -116,7 +116,11 @@ def test_the_faces_ask_nothing_but_the_questions_of_the_contract() -> None:
     # What people in Python and the pages ask: the kinematic model alone, and what the command line has in other words.
     assert questions - command_line == {
         "explain.residual_vectors:residual_vectors",
+        "explain.residuals_by_driver:residuals_by_driver",
+        "history.periods:periods",
         "history.values:values_of_machine",
         "kinematics:poses",
         "query:readings",
+        "uncertainty.cloud:cloud",
+        "volumetric.over_stroke:over_stroke",
     }

@@ -12,7 +12,7 @@ from monitor.workflow.intake.importing import ImportRequest, import_folders
 from monitor.workflow.model.change import add_effect
 from monitor.workflow.model.request import AddEffectRequest
 from monitor.workflow.simulation import SimulateRequest, simulate
-from monitor.workflow.volumetric.error_map import at_zero
+from monitor.workflow.volumetric.error_map import at_pose
 from monitor.workflow.volumetric.known_errors import _of_shared
 from monitor.workflow.volumetric.request import VolumetricRequest
 from monitor.workflow.volumetric.stating import map_answer
@@ -92,7 +92,7 @@ def test_what_is_drawn_has_axes_and_vectors_in_the_order_of_the_directions_whate
     # The chain is w C B X b Z Y (C1) t: its axes come in the order X, Z, Y.
     mapped = map_run(database, VolumetricRequest("hidden", 20))
     document = map_answer(mapped)
-    drawn = at_zero(mapped)
+    drawn = at_pose(mapped)
     assert drawn.axes == ("X", "Y", "Z")
     joints = [joint.name for joint in mapped.errors.chain.joints]
     assert joints.index("Z") < joints.index("Y")

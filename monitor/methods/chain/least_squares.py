@@ -82,13 +82,18 @@ class _Elimination:
 
 
 def eliminate(local: Array) -> _Elimination:
-    """Orthonormal basis of what each run's own unknowns can do, and its null space."""
+    """Orthonormal basis of what each run's own unknowns can do, and its null space; rows may be fewer than unknowns."""
+    rows, unknowns = local.shape[1:]
     scale = np.linalg.norm(local, axis=1)
     scale[scale == 0] = 1.0
-    q, triangle = np.linalg.qr(local / scale[:, None, :])
+    whole = local / scale[:, None, :]
+    if rows < unknowns:
+        # Rows of zeros say nothing: without them there would be fewer singular values than unknowns.
+        whole = np.pad(whole, ((0, 0), (0, unknowns - rows), (0, 0)))
+    q, triangle = np.linalg.qr(whole)
     u, s, vt = np.linalg.svd(triangle)
     keep = s > RANK_TOLERANCE * s.max(axis=-1, keepdims=True, initial=0.0)
-    basis = (q @ u) * keep[:, None, :]
+    basis = (q @ u)[:, :rows] * keep[:, None, :]
     inverse_s = np.where(keep, 1.0 / np.where(keep, s, 1.0), 0.0)
     inverse = np.swapaxes(vt, -1, -2) * inverse_s[:, None, :] / scale[:, :, None]
     return _Elimination(basis, inverse, vt * ~keep[:, :, None], keep.sum(axis=-1))

@@ -49,5 +49,5 @@ BASE: Mapping[str, Any] = {
     "font": {"color": "@ink", "family": "DejaVu Sans, sans-serif", "size": 12},
     "margin": {"l": 56, "r": 16, "t": 12, "b": 44},
     "hoverlabel": {"bgcolor": "@paper", "bordercolor": "@mid", "font": {"color": "@ink"}},
-    "legend": {"orientation": "h", "y": -0.22, "x": 0},
+    "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
 }

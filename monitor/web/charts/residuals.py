@@ -5,33 +5,43 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from monitor.reporting.health.comparison import ResidualAgainst
 from monitor.web.charts.chart import Chart, Trace, axis
+from monitor.web.charts.machine import machine_traces
 from monitor.workflow.explain.compare_answer import CompareAnswer, MachinePart
 from monitor.workflow.explain.explain_answer import MachineMissing
 from monitor.workflow.explain.residual_vectors import ResidualsAnswer
+from monitor.workflow.explain.residuals_by_driver import ResidualsByDriverAnswer
 from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 
 #: Steps of the magnification slider: 1 µm is drawn as so many millimetres.
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100)
+#: More rotary poses than this are no list that anybody chooses from.
+MOST_POSES = 80
 
 
 def scene_chart(residuals: ResidualsAnswer) -> Chart:
-    """Show the probed places with the residual of each run; the script magnifies the arrows and changes the run."""
+    """Show the machine and the probed places; the script adds the arrows, and changes size, run, pose and effect."""
     frame = {
-        name: axis(f"{name[0].upper()} / mm", backgroundcolor="rgba(0,0,0,0)", showbackground=False)
+        name: axis(
+            f"{name[0].upper()} / mm", backgroundcolor="rgba(0,0,0,0)", showbackground=False, showspikes=False
+        )
         for name in ("xaxis", "yaxis", "zaxis")
     }
     return Chart(
         key="scene",
         says=f"{len(residuals.run)} residuals of {residuals.campaign} at the probed places, model {residuals.model}",
-        traces=[],
+        traces=machine_traces(residuals),
         layout={
-            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 0.95, "y": -1.15, "z": 0.6}}},
+            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 0.85, "y": -1.15, "z": 0.6}}},
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
             "uirevision": "scene",
             "showlegend": True,
+            "legend": {"orientation": "h", "y": 0.02, "x": 0.02, "bgcolor": "@paper"},
         },
-        height=520,
+        height=560,
     )
 
 
@@ -39,14 +49,84 @@ def scene_vectors(residuals: ResidualsAnswer) -> Mapping[str, Any]:
     """Return the places and vectors for the script; probings that were left out are marked."""
     return {
         "run": residuals.run,
+        "pose": residuals.pose,
         "target": residuals.target,
         "place": residuals.place_mm,
         "residual": residuals.residual_um,
-        "with_effect": residuals.with_effect_um,
-        "effect": residuals.effect,
         "left_out": residuals.left_out,
-        "axes": [name for name in residuals.axes if name[:1] in "XYZ"],
+        "tried": None if residuals.effect is None else explained_vectors(residuals),
     }
+
+
+def explained_vectors(residuals: ResidualsAnswer) -> Mapping[str, Any]:
+    """Return what an effect explains of every residual and what it leaves, for the script."""
+    return {
+        "effect": residuals.effect,
+        "axis": residuals.effect_axis,
+        "explained": residuals.explained_um,
+        "remaining": residuals.with_effect_um,
+    }
+
+
+def first_magnification(residuals: ResidualsAnswer) -> int:
+    """Return the step of the slider at which the longest arrows take a quarter of what was probed."""
+    places = np.array(residuals.place_mm)
+    span = float((places.max(axis=0) - places.min(axis=0)).max())
+    lengths = np.linalg.norm(np.array(residuals.residual_um), axis=1)[~np.array(residuals.left_out)]
+    wanted = 0.25 * span / max(float(np.quantile(lengths, 0.9)), 1e-6)
+    return int(np.argmin(np.abs(np.log(np.array(MAGNIFICATIONS) / max(wanted, 1e-6)))))
+
+
+def pose_names(residuals: ResidualsAnswer) -> list[str]:
+    """Return the rotary poses as people choose among them; none where every probing has a pose of its own."""
+    if not 1 < len(residuals.poses) <= MOST_POSES:
+        return []
+    return [", ".join(f"{name} {value:g}°" for name, value in pose.items()) for pose in residuals.poses]
+
+
+def driver_chart(answer: ResidualsByDriverAnswer) -> Chart:
+    """Show the residual along X, Y and Z against a driver: single probings, means of groups with U (k = 2)."""
+    traces: list[Trace] = []
+    layout: dict[str, Any] = {"xaxis": axis(answer.driver.replace("_", " "), anchor="y3")}
+    for index, (name, against) in enumerate(answer.along.items()):
+        row = "" if index == 0 else str(index + 1)
+        traces.append(
+            {
+                "type": "scatter", "mode": "markers", "name": "single probings", "x": against.at,
+                "y": against.before_um, "yaxis": f"y{row}", "showlegend": index == 0, "legendgroup": "single",
+                "marker": {"color": "@mid", "size": 3, "opacity": 0.5}, "hoverinfo": "skip",
+            }
+        )  # fmt: skip
+        traces.append(_means(against, f"y{row}", "left by the model", "@blue", "circle", first=index == 0))
+        if answer.effect is not None:
+            traces.append(
+                _means(against, f"y{row}", f"with {answer.effect}", "@orange", "diamond", first=index == 0)
+            )
+        layout[f"yaxis{row}"] = axis(f"{name} / µm", domain=[0.7 - 0.35 * index, 1.0 - 0.35 * index])
+    return Chart(
+        key="driver",
+        says=f"residual along X, Y and Z against {answer.driver.replace('_', ' ')}, means with U (k = 2), in µm",
+        traces=traces, layout=layout, height=520,
+    )  # fmt: skip
+
+
+def _means(
+    against: ResidualAgainst, yaxis: str, title: str, colour: str, marker: str, *, first: bool
+) -> Trace:
+    """The means of the groups, with the tried effect where the title's colour is not the model's own."""
+    groups = against.groups
+    after = colour == "@orange"
+    return {
+        "type": "scatter", "mode": "lines+markers", "name": title, "yaxis": yaxis, "showlegend": first,
+        "legendgroup": title, "x": [group.at for group in groups],
+        "y": [group.after_um if after else group.before_um for group in groups],
+        "error_y": {
+            "type": "data", "thickness": 1.5, "width": 3, "color": colour,
+            "array": [2.0 * ((group.u_after_um if after else group.u_before_um) or 0.0) for group in groups],
+        },
+        "line": {"color": colour, "width": 1.5}, "marker": {"color": colour, "symbol": marker, "size": 7},
+        "hovertemplate": "%{x:.4g}: %{y:.2f} µm<extra>" + title + "</extra>",
+    }  # fmt: skip
 
 
 def failing_charts(answer: CompareAnswer) -> list[Chart]:
@@ -62,11 +142,12 @@ def failing_charts(answer: CompareAnswer) -> list[Chart]:
         }
         if len(shown) < 2 or name not in ("target", "axis", "run"):
             continue
-        lines = [] if expected is None else [_level(expected, "expected")]
+        lines = [] if expected is None else [_level(expected)]
+        said = "" if expected is None else f"; dashed: {expected:.2f} µm are expected"
         charts.append(
             Chart(
                 key=f"by-{name}",
-                says=f"RMS of the residual by {name} in µm",
+                says=f"RMS of the residual by {name} in µm{said}",
                 traces=[
                     {
                         "type": "bar", "x": list(shown), "y": [part.rms_um for part in shown.values()],
@@ -104,9 +185,10 @@ def ranking_chart(missing: Sequence[MachineMissing]) -> Chart:
 
 
 def falling_chart(
-    steps: Sequence[MachineVersion | CurveVersion], proposed: MachineMissing | None
+    steps: Sequence[MachineVersion | CurveVersion], proposed: MachineMissing | None, expected_um: float | None
 ) -> Chart | None:
-    """Show the error of each version, on the fitted runs and on held-out ones, down to the noise; None for curves."""
+    """Show the error of each version, on the fitted runs and on held-out ones, down to what the readings' noise leaves
+    (``expected_um``); None for curves."""
     versions = [step for step in steps if isinstance(step, MachineVersion)]
     if not versions:
         return None
@@ -127,8 +209,11 @@ def falling_chart(
                 "marker": {"color": "@teal", "symbol": "square", "size": 10},
             }
         )  # fmt: skip
-    noise = versions[-1].repeatability_um
-    lines = [] if noise is None else [_level(noise, "repeatability of the runs")]
+    lines = (
+        []
+        if expected_um is None
+        else [_level(expected_um, "noise floor: what the readings' uncertainty leaves")]
+    )
     return Chart(
         key="falling",
         says="RMS of the residual from version to version in µm",
@@ -148,9 +233,14 @@ def _steps(names: list[str], values: Sequence[float | None], title: str, colour:
     }  # fmt: skip
 
 
-def _level(value: float, name: str) -> Any:
-    return {
+def _level(value: float, name: str = "") -> Any:
+    line: dict[str, Any] = {
         "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": value, "y1": value,
-        "line": {"color": "@mid", "dash": "longdash", "width": 1.5},
-        "label": {"text": f"{name} {value:.2f} µm", "textposition": "end", "font": {"size": 11, "color": "@mid"}},
+        "line": {"color": "@orange", "dash": "longdash", "width": 1.5},
     }  # fmt: skip
+    if name:
+        font = {"size": 11, "color": "@ink"}
+        line["label"] = {
+            "text": f"{name} {value:.2f} µm", "textposition": "end", "yanchor": "top", "font": font,
+        }  # fmt: skip
+    return line

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from monitor.web.charts.chart import Chart, axis
+from monitor.web.charts.chart import Chart, Trace, axis
 from monitor.workflow.run_statistics.answer import HistogramAnswer, StatisticsAnswer
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+from monitor.workflow.uncertainty.cloud import CloudAnswer
 
+#: The tests as people know them.
+TESTS = {"bartlett": "Bartlett (equal scatter)", "anova": "ANOVA (equal means)"}
 #: Points of the outline of an ellipse.
 OUTLINE = 181
-#: Points of the cloud: enough to see 1 in 20 outside, few enough for an old telephone.
-CLOUD = 2000
 
 
 def correlation_chart(answer: StatisticsAnswer) -> Chart:
@@ -51,7 +53,7 @@ def p_value_chart(name: str, histogram: HistogramAnswer, count: int) -> Chart:
     middles = [(low + high) / 2 for low, high in pairwise(edges)]
     return Chart(
         key=f"p-{name}",
-        says=f"p-values of {count} probed coordinates, {name}; flat where the groups are equal",
+        says=f"p-values of {count} probed coordinates, {TESTS.get(name, name)}; flat where the groups are equal",
         traces=[
             {
                 "type": "bar", "x": middles, "y": list(histogram.counts),
@@ -61,13 +63,13 @@ def p_value_chart(name: str, histogram: HistogramAnswer, count: int) -> Chart:
             }
         ],
         layout={
-            "xaxis": axis(f"p-value, {name}", range=[0, 1]), "yaxis": axis("coordinates"), "bargap": 0,
+            "xaxis": axis(f"p-value, {TESTS.get(name, name)}", range=[0, 1]), "yaxis": axis("coordinates"), "bargap": 0,
             "shapes": [
                 {
                     "type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": histogram.expected,
                     "y1": histogram.expected,
                     "line": {"color": "@orange", "dash": "dash"},
-                    "label": {"text": "equal groups", "font": {"size": 11, "color": "@orange"}, "textposition": "end"},
+                    "label": {"text": "equal groups", "font": {"size": 11, "color": "@ink"}, "textposition": "middle"},
                 }
             ],
         },
@@ -75,52 +77,88 @@ def p_value_chart(name: str, histogram: HistogramAnswer, count: int) -> Chart:
     )  # fmt: skip
 
 
-def region_chart(answer: UncertaintyAnswer, first: str, second: str) -> Chart:
-    """Show two parameters with the ellipse (k_p) and the rectangle (k_q) that hold all parameters together.
+@dataclass(frozen=True)
+class _Region:
+    """An ellipse (k_p) and a rectangle (k_q), and what they hold together."""
 
-    The dots are drawn from the normal distribution of the reported estimate and covariance with the seed of the Monte
-    Carlo result: a picture of what is reported, not the trials themselves, which are not stored.
-    """
-    result = answer.guf if answer.mcm is None else answer.mcm
+    holds: str
+    k_p: float
+    k_q: float
+
+
+def region_chart(answer: UncertaintyAnswer, first: str, second: str) -> Chart:
+    """Show two parameters with the ellipse and the rectangle that hold all parameters together, by the framework."""
+    result = answer.guf
     i, j = (answer.parameters.index(name) for name in (first, second))
-    centre = np.array([result.estimate[first], result.estimate[second]])
-    u = np.array([result.u[first], result.u[second]])
-    r = float(np.asarray(result.correlation)[i, j])
-    k_p, k_q = result.k_p, result.k_q
-    if answer.mcm is None:
-        k_p = answer.guf.k_p_with_degrees_of_freedom or k_p
-        k_q = answer.guf.k_q_with_degrees_of_freedom or k_q
-    root = np.array([[u[0], 0.0], [r * u[1], math.sqrt(max(1.0 - r * r, 0.0)) * u[1]]])
+    count = len(answer.parameters)
+    region = _Region(
+        f"all {count}",
+        result.k_p_with_degrees_of_freedom or result.k_p,
+        result.k_q_with_degrees_of_freedom or result.k_q,
+    )
+    return _regions(
+        f"of run {answer.run}", (first, second), (answer.units[first], answer.units[second]),
+        (result.estimate[first], result.estimate[second]), (result.u[first], result.u[second]),
+        float(np.asarray(result.correlation)[i, j]), [region], [],
+    )  # fmt: skip
+
+
+def cloud_chart(answer: CloudAnswer) -> Chart:
+    """Show the trials of two parameters with the regions that hold the pair, and those that hold all parameters."""
+    trials = np.asarray(answer.trials)
+    cloud: Trace = {
+        "type": "scatter", "mode": "markers", "name": f"{len(trials)} of the Monte Carlo trials",
+        "x": trials[:, 0].tolist(), "y": trials[:, 1].tolist(), "hoverinfo": "skip",
+        "marker": {"size": 3, "color": "@mid", "opacity": 0.5},
+    }  # fmt: skip
+    regions = [
+        _Region("the pair", answer.k_p, answer.k_q),
+        _Region(f"all {answer.parameters}", answer.k_p_of_all, answer.k_q_of_all),
+    ]
+    return _regions(
+        f"of run {answer.run}", answer.names, answer.units, answer.estimate, answer.u, answer.correlation,
+        regions, [cloud],
+    )  # fmt: skip
+
+
+def _regions(
+    of: str, names: tuple[str, str], units: tuple[str, str], estimate: tuple[float, float], u: tuple[float, float],
+    correlation: float, regions: Sequence[_Region], drawn: Sequence[Trace],
+) -> Chart:  # fmt: skip
+    centre, spread = np.array(estimate), np.array(u)
+    root = np.array([[u[0], 0.0], [correlation * u[1], math.sqrt(max(1.0 - correlation**2, 0.0)) * u[1]]])
     angle = np.linspace(0.0, 2.0 * np.pi, OUTLINE)
-    outline = centre[:, None] + k_p * root @ np.array([np.cos(angle), np.sin(angle)])
-    seed = 0 if answer.mcm is None else answer.mcm.seed
-    cloud = centre[:, None] + root @ np.random.default_rng(seed).standard_normal((2, CLOUD))
-    low, high = centre - k_q * u, centre + k_q * u
+    traces = list(drawn)
+    for number, region in enumerate(regions):
+        outline = centre[:, None] + region.k_p * root @ np.array([np.cos(angle), np.sin(angle)])
+        low, high = centre - region.k_q * spread, centre + region.k_q * spread
+        width = 2.5 if number == 0 else 1.2
+        traces += [
+            {
+                "type": "scatter", "mode": "lines", "name": f"ellipse of {region.holds}, k_p = {region.k_p:.2f}",
+                "x": outline[0].tolist(), "y": outline[1].tolist(),
+                "line": {"color": "@blue", "width": width, "dash": "solid" if number == 0 else "dot"},
+                "hoverinfo": "name",
+            },
+            {
+                "type": "scatter", "mode": "lines", "name": f"rectangle of {region.holds}, k_q = {region.k_q:.2f}",
+                "x": [low[0], high[0], high[0], low[0], low[0]], "y": [low[1], low[1], high[1], high[1], low[1]],
+                "line": {"color": "@orange", "width": width, "dash": "dash" if number == 0 else "dot"},
+                "hoverinfo": "name",
+            },
+        ]  # fmt: skip
+    traces.append(
+        {
+            "type": "scatter", "mode": "markers", "name": "estimate", "x": [estimate[0]], "y": [estimate[1]],
+            "marker": {"symbol": "cross", "size": 11, "color": "@ink"},
+        }
+    )  # fmt: skip
+    first = regions[0]
     return Chart(
         key="region",
-        says=f"{first} and {second} of run {answer.run}: ellipse with k_p = {k_p:.2f}, rectangle with k_q = {k_q:.2f}",
-        traces=[
-            {
-                "type": "scatter", "mode": "markers", "name": "drawn from the reported covariance",
-                "x": np.round(cloud[0], 6).tolist(), "y": np.round(cloud[1], 6).tolist(), "hoverinfo": "skip",
-                "marker": {"size": 3, "color": "@mid", "opacity": 0.5},
-            },
-            {
-                "type": "scatter", "mode": "lines", "name": f"ellipse, k_p = {k_p:.2f}", "x": outline[0].tolist(),
-                "y": outline[1].tolist(), "line": {"color": "@blue", "width": 2}, "hoverinfo": "name",
-            },
-            {
-                "type": "scatter", "mode": "lines", "name": f"rectangle, k_q = {k_q:.2f}",
-                "x": [low[0], high[0], high[0], low[0], low[0]], "y": [low[1], low[1], high[1], high[1], low[1]],
-                "line": {"color": "@orange", "width": 2, "dash": "dash"}, "hoverinfo": "name",
-            },
-            {
-                "type": "scatter", "mode": "markers", "name": "estimate", "x": [centre[0]], "y": [centre[1]],
-                "marker": {"symbol": "cross", "size": 11, "color": "@ink"},
-            },
-        ],
-        layout={
-            "xaxis": axis(f"{first} / {answer.units[first]}"), "yaxis": axis(f"{second} / {answer.units[second]}"),
-        },
-        height=440,
-    )  # fmt: skip
+        says=f"{names[0]} and {names[1]} {of}: ellipse with k_p = {first.k_p:.2f}, rectangle with k_q = "
+        f"{first.k_q:.2f}, which hold {first.holds}",
+        traces=traces,
+        layout={"xaxis": axis(f"{names[0]} / {units[0]}"), "yaxis": axis(f"{names[1]} / {units[1]}")},
+        height=480,
+    )

@@ -9,11 +9,14 @@ from starlette.responses import Response
 
 from monitor.exceptions import InputError, MonitorError, NotFoundError
 from monitor.web.charts.chart import Chart
-from monitor.web.charts.statistics import correlation_chart, p_value_chart, region_chart
+from monitor.web.charts.statistics import cloud_chart, correlation_chart, p_value_chart, region_chart
 from monitor.web.desk import Ticket
+from monitor.web.forms import whole_number
 from monitor.web.rendering import page
 from monitor.workflow.intake.campaigns import RunsAnswer
 from monitor.workflow.run_statistics.answer import StatisticsAnswer
+from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+from monitor.workflow.uncertainty.cloud import CloudAnswer
 
 
 def routes() -> APIRouter:
@@ -44,9 +47,8 @@ def routes() -> APIRouter:
         trials = bool(request.query_params.get("trials"))
         regions, why_no_regions = None, ""
         if first or second:
-            tickets.append(
-                desk.ask(user, "uncertainty", _regions_asked(name, first, second, run, trials=trials))
-            )
+            question, document = _regions_asked(name, first, second, run, trials=trials)
+            tickets.append(desk.ask(user, question, document))
             regions, why_no_regions = _answered(tickets[1])
         return page(
             request, "campaign.html",
@@ -69,17 +71,16 @@ def _answered(ticket: Ticket) -> tuple[Any, str]:
         return None, str(error)
 
 
-def _regions_asked(name: str, first: str, second: str, run: str, *, trials: bool) -> dict[str, Any]:
-    """The document that asks for the regions of a pair. Raises InputError where it is none."""
+def _regions_asked(
+    name: str, first: str, second: str, run: str, *, trials: bool
+) -> tuple[str, dict[str, Any]]:
+    """The question for the regions of a pair, by Monte Carlo or not. Raises InputError where it is none."""
     if not (first and second and first != second):
         raise InputError("choose two different parameters for the ellipse and the rectangle")
-    return {"campaign": name, "method": "both" if trials else "guf"} | ({"run": _number(run)} if run else {})
-
-
-def _number(text: str) -> int:
-    if not text.isdecimal() or len(text) > 9:
-        raise InputError(f"run '{text}': a run has a number, such as 20")
-    return int(text)
+    of_run = {"campaign": name} | ({"run": whole_number("run", run)} if run else {})
+    if trials:
+        return "monte carlo cloud", {**of_run, "first": first, "second": second}
+    return "uncertainty", {**of_run, "method": "guf"}
 
 
 def _conditions(runs: RunsAnswer) -> list[str]:
@@ -94,7 +95,9 @@ def _charts(statistics: StatisticsAnswer) -> list[Chart]:
     return [correlation_chart(statistics), *histograms]
 
 
-def _region(regions: Any, first: str, second: str) -> Chart:
+def _region(regions: UncertaintyAnswer | CloudAnswer, first: str, second: str) -> Chart:
+    if isinstance(regions, CloudAnswer):
+        return cloud_chart(regions)
     for name in (first, second):
         if name not in regions.parameters:
             raise InputError(

@@ -8,7 +8,7 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 
 from monitor.exceptions import InputError, MonitorError
 from monitor.web.asking import Asker, check_role
@@ -53,13 +53,30 @@ def routes() -> APIRouter:
             refusal=outcome if refused else None,
         )
 
+    @router.post("/certificates/withdraw")
+    async def withdraw(request: Request) -> Response:
+        """Mark a certificate as withdrawn."""
+        async with read_form(request) as form:
+            document = {"number": form.text("number"), "reason": form.text("reason")}
+        await run_in_threadpool(request.app.state.asker, request.state.user, "withdraw certificate", document)
+        return RedirectResponse("/certificates", status_code=303)
+
     return router
 
 
 def _listed(request: Request, status: int = 200, **outcome: Any) -> Response:
-    answer = request.app.state.asker(request.state.user, "certificates")
+    ask, user = request.app.state.asker, request.state.user
+    answer = ask(user, "certificates")
+    campaigns = [row for row in ask(user, "campaigns").campaigns if row.rows is None]
     context = {"verification": None, "refusal": None, **outcome}
-    return page(request, "certificates.html", status=status, certificates=answer.certificates, **context)
+    return page(
+        request,
+        "certificates.html",
+        status=status,
+        certificates=answer.certificates,
+        campaigns=campaigns,
+        **context,
+    )
 
 
 def _sent(request: Request, question: str, number: str, media_type: str) -> Response:

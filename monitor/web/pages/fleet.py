@@ -27,7 +27,8 @@ PAGE_SIZE = 40
 
 @dataclass(frozen=True)
 class MachineRow:
-    """A machine with its most urgent parameter; ``others`` are further parameters that need attention."""
+    """A machine with its most urgent parameter; ``others`` are further parameters that need attention, the most urgent
+    first; ``latest`` is the date of its latest run, empty where none is known."""
 
     machine: str
     plant: str
@@ -36,7 +37,8 @@ class MachineRow:
     worst: FleetTableRow
     how_far: str
     since: str
-    others: int
+    others: tuple[FleetTableRow, ...]
+    latest: str
 
 
 def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> list[MachineRow]:
@@ -54,7 +56,8 @@ def machine_rows(table: Iterable[FleetTableRow], plants: Mapping[str, str]) -> l
             worst=of_machine[0],
             how_far=how_far(of_machine[0]),
             since=since(of_machine[0]),
-            others=sum(ATTENTION.index(row.attention) < usual for row in of_machine[1:]),
+            others=tuple(row for row in of_machine[1:] if ATTENTION.index(row.attention) < usual),
+            latest=max((row.latest_at[:10] for row in of_machine if row.latest_at), default=""),
         )
         for machine, of_machine in rows.items()
     ]
@@ -84,6 +87,11 @@ def _tally(rows: Iterable[MachineRow]) -> list[tuple[Urgency, int]]:
     return list(counts.values())
 
 
+def _within(latest: str, since: str, until: str) -> bool:
+    """Whether a date lies in a period whose ends belong to it; an end that is not named is open."""
+    return (not since or latest >= since) and (not until or (latest != "" and latest <= until))
+
+
 def plants_of(machines: TableAnswer) -> dict[str, str]:
     """Return the location of every machine that states one."""
     name, location = machines.columns.index("machine"), machines.columns.index("location")
@@ -95,15 +103,21 @@ def routes() -> APIRouter:
     router = APIRouter()
 
     @router.get("/")
-    def fleet(request: Request, state: str = "", plant: str = "", first: int = 0) -> Response:
-        """Show the machines; of one state, of one plant."""
+    def fleet(
+        request: Request, state: str = "", plant: str = "", since: str = "", until: str = "", first: int = 0
+    ) -> Response:
+        """Show the machines; of one state, of one plant, measured last in a period."""
         machines: TableAnswer = request.app.state.asker(request.state.user, "machines")
         answer, waiting = _summed(request, machines)
         rows = [] if answer is None else machine_rows(answer.table, plants_of(machines))
         listed = {row.machine for row in rows}
         every = [str(row[machines.columns.index("machine")]) for row in machines.rows]
         counts = {label: sum(row.attention == label for row in rows) for label in ATTENTION}
-        shown = [row for row in rows if state in ("", row.attention) and plant in ("", row.plant)]
+        shown = [
+            row
+            for row in rows
+            if state in ("", row.attention) and plant in ("", row.plant) and _within(row.latest, since, until)
+        ]
         first = min(max(first, 0), max(len(shown) - 1, 0))
         return page(
             request, "fleet.html",
@@ -112,7 +126,7 @@ def routes() -> APIRouter:
             count=len(shown), first=first, page_size=PAGE_SIZE,
             tally=_tally(rows),
             states=[(label, URGENCIES[label], count) for label, count in counts.items() if count],
-            state=state, plant=plant, plants=sorted({row.plant for row in rows if row.plant}),
+            state=state, plant=plant, since=since, until=until, plants=sorted({row.plant for row in rows if row.plant}),
             unlisted=[name for name in every if name not in listed],
             not_identified=() if answer is None else answer.not_identified,
         )  # fmt: skip

@@ -46,16 +46,19 @@ def routes() -> APIRouter:
         return RedirectResponse("/work", status_code=303)
 
     @router.get("/export")
-    def export(request: Request, format: str = "csv") -> Response:
-        """Send every table as CSV or Parquet, packed."""
+    def export(request: Request, format: str = "csv", machine: str = "") -> Response:
+        """Send every table as CSV or Parquet, packed, or as a workbook; of one machine alone where it is named."""
         with tempfile.TemporaryDirectory(dir=request.app.state.working_folder) as folder:
             target = Path(folder, "export")
-            request.app.state.asker(request.state.user, "export", {"format": format}, {"folder": target})
+            document = {"format": format, **({"machine": machine} if machine else {})}
+            answer = request.app.state.asker(request.state.user, "export", document, {"folder": target})
+            if format == "xlsx":
+                return attachment(f"{machine or 'monitor'}.xlsx", answer.files[0].read_bytes())
             packed = io.BytesIO()
             with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
                 for path in sorted(path for path in target.rglob("*") if path.is_file()):
                     archive.write(path, path.relative_to(folder).as_posix())
-        return attachment(f"export-{format}.zip", packed.getvalue())
+        return attachment(f"{machine or 'export'}-{format}.zip", packed.getvalue())
 
     @router.get("/interface")
     def interface_list(request: Request) -> Response:

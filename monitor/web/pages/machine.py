@@ -5,19 +5,23 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import replace
+from datetime import date, timedelta
 from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import RedirectResponse, Response
 
-from monitor.exceptions import InputError, NotFoundError
+from monitor.exceptions import InputError, MonitorError, NotFoundError
+from monitor.web.charts.periods import periods_chart
 from monitor.web.charts.trend import GROUPINGS, trend_chart
 from monitor.web.forms import read_form
 from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
 from monitor.workflow.history.values import ValuesAnswer
 
+#: Which runs are shown: all, those of a warm machine, those of one that warms up.
+WARMTHS = ("", "warm", "warming up")
 #: Usual kinds of events; any word is one.
 KINDS = ("crash", "repair", "compensation", "probe", "note")
 
@@ -29,7 +33,7 @@ def routes() -> APIRouter:
     @router.get("/machine")
     def machine(
         request: Request, name: str, parameter: str = "", since: str = "", until: str = "",
-        colour: str = GROUPINGS[0], campaign: str = "",
+        colour: str = GROUPINGS[0], campaign: str = "", method: str = "", warm_up: str = "",
     ) -> Response:  # fmt: skip
         """Show a machine; one parameter, one period."""
         ask, user, desk = request.app.state.asker, request.state.user, request.app.state.desk
@@ -42,8 +46,8 @@ def routes() -> APIRouter:
         if trend is not None and not values.parameters:
             # The trend has identified what nobody had identified before.
             values = ask(user, "values", _period(name, since, until))
-        if campaign:
-            values = _of_campaign(values, campaign)
+        methods = sorted(set(values.method))
+        values = _chosen(values, campaign, method, warm_up)
         names = list(values.parameters)
         _check_names(values, parameter, campaign, may_lack=not ticket.is_done)
         shown = (parameter or _most_urgent(request, name, names)) if names else ""
@@ -55,7 +59,7 @@ def routes() -> APIRouter:
             waiting=None if ticket.is_done else ticket,
             chart=trend_chart(values, shown, trend, colour) if shown else None,
             groupings=GROUPINGS, colour=colour, since=since, until=until, campaign=campaign,
-            campaigns=campaigns, kinds=KINDS,
+            campaigns=campaigns, kinds=KINDS, methods=methods, method=method, warmths=WARMTHS, warm_up=warm_up,
         )  # fmt: skip
 
     @router.get("/machine/values.csv")
@@ -65,6 +69,34 @@ def routes() -> APIRouter:
             request.state.user, "values", _period(name, since, until)
         )
         return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
+
+    @router.get("/machine/periods")
+    def two_periods(
+        request: Request,
+        name: str,
+        since_1: str = "",
+        until_1: str = "",
+        since_2: str = "",
+        until_2: str = "",
+    ) -> Response:
+        """Show two periods of a machine side by side; dates belong to the period whole."""
+        ends = {"since_1": since_1, "until_1": until_1, "since_2": since_2, "until_2": until_2}
+        answer, refusal, chart = None, "", None
+        ask, user = request.app.state.asker, request.state.user
+        if all(ends.values()):
+            try:
+                pair = {"earlier": _whole_days(since_1, until_1), "later": _whole_days(since_2, until_2)}
+                answer = ask(user, "periods", {"machine": name, **pair})
+            except MonitorError as error:
+                refusal = str(error)
+            chart = None if answer is None else periods_chart(answer)
+        values: ValuesAnswer = ask(user, "values", {"machine": name})
+        days = [f"{at:%Y-%m-%d}" for at in values.started_at]
+        return page(
+            request, "periods.html",
+            name=name, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
+            first=min(days, default=""), last=max(days, default=""),
+        )  # fmt: skip
 
     @router.post("/machine/event")
     async def event(request: Request) -> Response:
@@ -100,14 +132,33 @@ def _asked(name: str, since: str, campaign: str) -> dict[str, Any]:
     return document
 
 
+def _whole_days(since: str, until: str) -> dict[str, str]:
+    """The period from the beginning of one day to the end of another. Raises InputError for what is no date."""
+    try:
+        first, last = date.fromisoformat(since), date.fromisoformat(until)
+    except ValueError as error:
+        raise InputError(f"write dates such as 2026-03-02: {error}") from error
+    return {"since": f"{first}T00:00:00Z", "until": f"{last + timedelta(days=1)}T00:00:00Z"}
+
+
 def _period(name: str, since: str, until: str) -> dict[str, Any]:
     ends = {"since": since, "until": until}
     return {"machine": name, **{key: f"{date}T00:00:00Z" for key, date in ends.items() if date}}
 
 
-def _of_campaign(values: ValuesAnswer, campaign: str) -> ValuesAnswer:
-    """The runs of one campaign alone, all parameters and conditions."""
-    rows = [row for row, name in enumerate(values.campaign) if name == campaign]
+def _chosen(values: ValuesAnswer, campaign: str, method: str, warm_up: str) -> ValuesAnswer:
+    """The runs of one campaign, one method, warm or warming up alone; all parameters and conditions that they have."""
+    if warm_up not in WARMTHS:
+        raise InputError(f"runs are shown {', '.join(word for word in WARMTHS if word)}, not '{warm_up}'")
+    rows = [
+        row
+        for row, warming in enumerate(values.warm_up)
+        if campaign in ("", values.campaign[row])
+        and method in ("", values.method[row])
+        and warm_up in ("", WARMTHS[2 if warming else 1])
+    ]
+    if len(rows) == len(values.run):
+        return values
 
     def taken(column: tuple[Any, ...]) -> tuple[Any, ...]:
         return tuple(column[row] for row in rows)

@@ -6,13 +6,17 @@ from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
-from starlette.responses import RedirectResponse, Response
+from starlette.responses import JSONResponse, RedirectResponse, Response
 
 from monitor.exceptions import MonitorError, NotFoundError
 from monitor.web.charts.residuals import (
     MAGNIFICATIONS,
+    driver_chart,
+    explained_vectors,
     failing_charts,
     falling_chart,
+    first_magnification,
+    pose_names,
     ranking_chart,
     scene_chart,
     scene_vectors,
@@ -23,19 +27,24 @@ from monitor.web.rendering import link, page
 from monitor.workflow.explain.explain_answer import MachineExplanation
 from monitor.workflow.model.answer import ChangeModelAnswer
 
+#: So long the script's question for an effect's arrows is held before it has to ask again.
+FETCH_S = 20.0
+
 
 def routes() -> APIRouter:
-    """Return the routes of the page and of its two buttons."""
+    """Return the routes of the page, of its two buttons and of what its script asks for."""
     router = APIRouter()
 
     @router.get("/model")
-    def model(request: Request, campaign: str, model: str = "", effect: str = "", note: str = "") -> Response:
+    def model(
+        request: Request, campaign: str, model: str = "", effect: str = "", driver: str = "", note: str = ""
+    ) -> Response:
         """Compare a model with a campaign; with an effect tried beside it."""
         ask, user = request.app.state.asker, request.state.user
         row = next((row for row in ask(user, "campaigns").campaigns if row.campaign == campaign), None)
         if row is None:
             raise NotFoundError(f"there is no campaign '{campaign}'; the page Campaigns lists them")
-        answers = _Answers(request, campaign, model, effect, in_machine=row.rows is None)
+        answers = _Answers(request, campaign, model, effect, driver, in_machine=row.rows is None)
         compare, explanation = answers.compare, answers.explanation
         missing = explanation.missing if isinstance(explanation, MachineExplanation) else ()
         residuals, steps = answers.residuals, answers.steps
@@ -50,11 +59,21 @@ def routes() -> APIRouter:
             scene=None if residuals is None else scene_chart(residuals),
             vectors=None if residuals is None else scene_vectors(residuals),
             residuals=residuals, magnifications=MAGNIFICATIONS,
+            magnification=None if residuals is None else first_magnification(residuals),
+            poses=[] if residuals is None else pose_names(residuals),
+            driven=answers.driven, against=None if answers.driven is None else driver_chart(answers.driven),
             failing=[] if compare is None else failing_charts(compare),
-            ranking=ranking_chart(missing) if missing else None,
-            falling=falling_chart(steps, missing[0] if missing else None), steps=steps,
+            ranking=ranking_chart(missing) if len(missing) > 1 else None,
+            falling=falling_chart(steps, missing[0] if missing else None, _expected(compare)), steps=steps,
             versions=versions, current=_version(versions, label), waiting=answers.waiting,
         )  # fmt: skip
+
+    @router.get("/model/explained")
+    def explained(request: Request, campaign: str, model: str, effect: str) -> Response:
+        """Send what an effect explains of every residual, for the script; 202 while it is being computed."""
+        document = {"campaign": campaign, "model": model, "effect": effect}
+        residuals = request.app.state.desk.ask(request.state.user, "residuals", document).answer(FETCH_S)
+        return JSONResponse(None, 202) if residuals is None else JSONResponse(explained_vectors(residuals))
 
     @router.post("/model/add")
     async def add(request: Request) -> Response:
@@ -81,15 +100,20 @@ def routes() -> APIRouter:
 class _Answers:
     """What the page shows of a model and a campaign, as far as it is computed; ``refusals`` say why a part is not."""
 
-    def __init__(self, request: Request, campaign: str, model: str, effect: str, *, in_machine: bool) -> None:
+    def __init__(
+        self, request: Request, campaign: str, model: str, effect: str, driver: str, *, in_machine: bool
+    ) -> None:
         user, desk = request.state.user, request.app.state.desk
         asked = {"campaign": campaign, **({"model": model} if model else {})}
         # All are asked before any is waited for.
         tickets: dict[str, Ticket] = {"explain": desk.ask(user, "explain", asked)}
         if in_machine:
-            tickets["residuals"] = desk.ask(user, "residuals", asked | ({"effect": effect} if effect else {}))
+            tried = asked | ({"effect": effect} if effect else {})
+            tickets["residuals"] = desk.ask(user, "residuals", tried)
+            by_driver = tried | ({"driver": driver} if driver else {})
+            tickets["driven"] = desk.ask(user, "residuals by driver", by_driver)
         tickets["compare"] = desk.ask(user, "compare", asked)
-        self.refusals = dict.fromkeys(("explain", "residuals", "compare", "history"), "")
+        self.refusals = dict.fromkeys(("explain", "residuals", "driven", "compare", "history"), "")
         self.compare = self._take("compare", tickets["compare"])
         if self.compare is not None:
             version = {"campaign": campaign, "model": self.compare.comparison.model}
@@ -97,6 +121,7 @@ class _Answers:
         explained = self._take("explain", tickets["explain"])
         self.explanation = None if explained is None else explained.explanation
         self.residuals = self._take("residuals", tickets.get("residuals"))
+        self.driven = self._take("driven", tickets.get("driven"))
         history = self._take("history", tickets.get("history"))
         self.steps = () if history is None else history.steps
         self.waiting = next((ticket for ticket in tickets.values() if not ticket.is_done), None)
@@ -108,6 +133,11 @@ class _Answers:
         except MonitorError as error:
             self.refusals[name] = str(error)
             return None
+
+
+def _expected(compare: Any) -> float | None:
+    """The RMS that the stated uncertainty of the readings would leave; None while nothing is compared."""
+    return None if compare is None else compare.comparison.expected_rms_um
 
 
 async def _asked(request: Request, question: str, document: dict[str, Any]) -> Any:

@@ -10,14 +10,14 @@ from monitor.reporting.refused import refusal_of
 from monitor.units import DEGREE, MICROMETRE
 from monitor.workflow.models import as_model
 from monitor.workflow.uncertainty.stored import StatedUncertainty
-from monitor.workflow.volumetric.error_map import VolumetricMap, at_zero, map_of
+from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose, map_of
 
 
 def volumetric_result(evaluated: StatedUncertainty, state: str) -> VolumetricResult:
     """The map of an evaluated run in display units. Raises InputError where not three linear axes moved."""
     problem = campaign_method(evaluated.campaign).problem_of(evaluated.campaign, as_model(evaluated.model))
     mapped = map_of(evaluated, fit(problem))
-    drawn = at_zero(mapped)
+    drawn = at_pose(mapped)
     error, p = mapped.error, evaluated.answer.p
     k = error.factor(p)
     worst = error.worst

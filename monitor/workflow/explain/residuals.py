@@ -63,15 +63,22 @@ def drivers_followed(fit: Fit) -> list[tuple[str, Array, str, Array]]:
     _, vectors = in_machine_frame(fit)
     weighed = ~fit.left_out
     scored = []
-    columns = {name: values[weighed] for name, values in _drivers(fit).items()}
+    columns = drivers_of(fit)
     for name, values in columns.items():
-        if np.isfinite(values).all() and np.ptp(values) > 0.0:
-            scored += [(_explained(values, vectors[weighed, axis]), name, axis) for axis in range(3)]
+        scored += [(_explained(values, vectors[weighed, axis]), name, axis) for axis in range(3)]
     best: dict[str, tuple[float, int]] = {}
     for score, name, axis in sorted(scored, reverse=True):
         best.setdefault(name, (score, axis))
     names = sorted(best, key=lambda name: -best[name][0])[:MOST_DRIVERS]
     return [(name, columns[name], "XYZ"[best[name][1]], vectors[weighed, best[name][1]]) for name in names]
+
+
+def drivers_of(fit: Fit) -> dict[str, Array]:
+    """Return what changed during the campaign and that a residual may depend on, of the probings that have weight."""
+    columns = {name: values[~fit.left_out] for name, values in _drivers(fit).items()}
+    return {
+        name: values for name, values in columns.items() if np.isfinite(values).all() and np.ptp(values) > 0.0
+    }
 
 
 def _drivers(fit: Fit) -> dict[str, Array]:

@@ -199,11 +199,11 @@ def pictures_of(
     if against is None and in_space:
         name, values, axis, residual = drivers_followed(fit)[0]
         against = Against(name.replace("_", " "), axis, values, residual, None)
-    return residual_map, None if against is None else _grouped(against)
+    return residual_map, None if against is None else grouped(against)
 
 
-def _grouped(against: Against) -> ResidualAgainst:
-    """The means of the groups in the order of the driver, and some of the single points."""
+def grouped(against: Against) -> ResidualAgainst:
+    """State the means of the groups in the order of the driver, and some of the single points."""
     group = against.groups
     count = np.bincount(group)
     middle = _means(against.at, group)[0]

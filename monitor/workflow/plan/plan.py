@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from monitor.documents import to_document
+from monitor.exceptions import InputError
 from monitor.methods import AnglePlan, campaign_method
 from monitor.methods.planning.candidates import Choice
 from monitor.methods.planning.search import best_plan, quickest_plan
@@ -29,6 +32,8 @@ def plan(db: Database, request: PlanRequest) -> PlanAnswer:
     campaign = machine_campaign(db, request.campaign, "plan", lambda method: method.plan)
     model = resolve_for(db, request.model, campaign.method, campaign.machine.id)
     method = campaign_method(campaign).plan
+    if request.keep and isinstance(method, AnglePlan):
+        raise InputError(f"{campaign.name} is planned by angles of a table; there are no indexations to keep")
     answer: PlanAnswer = (
         plan_angles(method, campaign, model, request)
         if isinstance(method, AnglePlan)
@@ -72,6 +77,8 @@ def _plan_balls(campaign: Campaign, model: StoredModel, request: PlanRequest) ->
 def _proposed(weighed: PlannedCampaign, request: PlanRequest) -> Choice | None:
     """The plan that is asked for: the quickest for wanted uncertainties, the best of so many balls and indexations."""
     candidates = weighed.candidates
+    if request.keep:
+        return _kept(weighed, request.keep)
     if request.wanted:
         units = weighed.problem.base_units
         wanted = {
@@ -82,3 +89,16 @@ def _proposed(weighed: PlannedCampaign, request: PlanRequest) -> Choice | None:
         return None
     balls = len(candidates.balls) if request.balls is None else request.balls
     return best_plan(candidates, balls, request.poses, present=weighed.present.poses)
+
+
+def _kept(weighed: PlannedCampaign, numbers: tuple[int, ...]) -> Choice:
+    """The present plan with some of its indexations alone. Raises InputError for one that it does not have."""
+    present = weighed.present
+    if max(numbers) > len(present.poses):
+        raise InputError(
+            f"the plan has {len(present.poses)} indexations; there is no number {max(numbers)} to keep"
+        )
+    poses = tuple(present.poses[number - 1] for number in sorted(numbers))
+    touched = np.zeros_like(present.touched)
+    touched[list(poses)] = present.touched[list(poses)]
+    return weighed.candidates.choice(poses, present.balls, touched)

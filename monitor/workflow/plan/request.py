@@ -15,7 +15,8 @@ class PlanRequest:
     """Weigh the plan of a campaign, and propose a better one where numbers or uncertainties are named.
 
     ``balls`` and ``poses`` ask for the best plan of so many; ``wanted`` (parameter to display unit) for the quickest
-    that reaches these standard uncertainties; ``separate`` for poses that separate two effects. Expanded
+    that reaches these standard uncertainties; ``keep`` weighs the campaign's own plan with these of its indexations
+    alone (numbers from 1 on in their order); ``separate`` asks for poses that separate two effects. Expanded
     uncertainties are of the coverage probability ``p``. Raises InputError.
     """
 
@@ -27,6 +28,7 @@ class PlanRequest:
     separate: tuple[str, str] | None = None
     p: float = 0.95
     figures: Path | None = None
+    keep: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if self.balls is not None and not 1 <= self.balls <= MOST_BALLS:
@@ -36,5 +38,11 @@ class PlanRequest:
                 "--wanted looks for the quickest plan that reaches an uncertainty, --balls and --poses for the best "
                 "plan of a size; name one of them"
             )
+        if self.keep and (self.wanted or self.balls is not None or self.poses is not None):
+            raise InputError(
+                "choose indexations of the present plan, or let a plan of a size or an uncertainty be found; not both"
+            )
+        if len(set(self.keep)) < len(self.keep) or any(number < 1 for number in self.keep):
+            raise InputError("the indexations to keep are numbers from 1 on, each once")
         if self.separate is not None and self.separate[0] == self.separate[1]:
             raise InputError(f"--separate {','.join(self.separate)}: name two different effects")

@@ -84,8 +84,8 @@ def map_of(
 
 
 @dataclass(frozen=True)
-class AtZero:
-    """The grid with the rotary axes at zero: the ``axes`` along X, Y and Z, ``readings_mm`` (n, 3) of these, error
+class AtPose:
+    """The grid at one rotary pose: the ``axes`` along X, Y and Z, ``readings_mm`` (n, 3) of these, error
     ``vectors_um`` (n, 3) along X, Y and Z, and the standard uncertainties ``u_um`` (n,) of its lengths."""
 
     axes: tuple[str, str, str]
@@ -94,8 +94,11 @@ class AtZero:
     u_um: Array
 
 
-def at_zero(mapped: VolumetricMap) -> AtZero:
-    """The part of a map that can be drawn. Raises InputError for a machine without three linear axes that moved."""
+def at_pose(mapped: VolumetricMap, pose: int = 0) -> AtPose:
+    """The part of a map that can be drawn; the first ``pose`` has all rotary axes at zero.
+
+    Raises InputError for a machine without three linear axes that moved.
+    """
     error, chain = mapped.error, mapped.errors.chain
     # In the order of the machine's directions, as the components of the vectors are; a chain has its own.
     linear = sorted(
@@ -113,12 +116,13 @@ def at_zero(mapped: VolumetricMap) -> AtZero:
             f"the map is drawn over a volume, but the campaign stood still along {' and '.join(flat)}: say the "
             "strokes in [machine.axes] of its campaign.toml, or leave the map out"
         )
-    each = mapped.points**3  # the first pose
+    each = mapped.points**3
+    rows = slice(pose * each, (pose + 1) * each)
     signs = np.array([chain.joints[index].sign for index in linear])
     first, second, third = (chain.joints[index].name for index in linear)
-    return AtZero(
+    return AtPose(
         (first, second, third),
-        error.positions[:each][:, linear] * signs,
-        error.vectors[:each] / MICROMETRE.factor,
-        error.u_lengths[:each] / MICROMETRE.factor,
+        error.positions[rows][:, linear] * signs,
+        error.vectors[rows] / MICROMETRE.factor,
+        error.u_lengths[rows] / MICROMETRE.factor,
     )

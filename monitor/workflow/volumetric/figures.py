@@ -7,12 +7,12 @@ from pathlib import Path
 from monitor.reporting.figures.volumetric import volumetric_slices
 from monitor.workflow.figure_files import make_folder, save_figure
 from monitor.workflow.volumetric.answer import VolumetricAnswer
-from monitor.workflow.volumetric.error_map import VolumetricMap, at_zero
+from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose
 
 
 def map_figures(answer: VolumetricAnswer, mapped: VolumetricMap, folder: Path) -> tuple[str, ...]:
     """The slices with arrows; the files. Raises InputError where there is nothing to draw."""
-    drawn = at_zero(mapped)
+    drawn = at_pose(mapped)
     worst = answer.worst
     figure = volumetric_slices(
         drawn.readings_mm,

@@ -18,7 +18,7 @@ from monitor.workflow.volumetric.answer import (
     PoseError,
     VolumetricAnswer,
 )
-from monitor.workflow.volumetric.error_map import VolumetricMap, at_zero
+from monitor.workflow.volumetric.error_map import VolumetricMap, at_pose
 
 AXES = "xyz"
 
@@ -112,7 +112,7 @@ def _pose(mapped: VolumetricMap, number: int) -> PoseError:
 def _slices(mapped: VolumetricMap, k: float) -> tuple[Slice, ...]:
     """The middle of the map for the page of a health report; empty where there is nothing to draw."""
     try:
-        drawn = at_zero(mapped)
+        drawn = at_pose(mapped)
     except InputError:
         return ()
     return tuple(slices_of(drawn.readings_mm, drawn.vectors_um, k * drawn.u_um, drawn.axes))

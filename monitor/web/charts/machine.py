@@ -1,0 +1,93 @@
+"""The machine in three dimensions: its axes as the topology says, around the places that were probed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from monitor.records import Array
+from monitor.web.charts.chart import Trace
+from monitor.workflow.explain.residual_vectors import AxisPlace, ResidualsAnswer
+
+#: Points of the arc that says how a rotary axis turns, which leaves a part of the circle open.
+ARC, TURN = 40, np.radians(300.0)
+
+
+def machine_traces(residuals: ResidualsAnswer) -> list[Trace]:
+    """Draw every axis: a linear one as an arrow, a rotary one as its line with the arc of its positive turn.
+
+    Lengths follow what was probed, because a topology has none. A machine seen from outside whose axes lie apart (a
+    robot) is drawn as its arm with all axes at zero.
+    """
+    places = np.array(residuals.place_mm)
+    low, high = places.min(axis=0), places.max(axis=0)
+    span = max(float((high - low).max()), 1.0)
+    arm = [axis for axis in residuals.machine if any(axis.at_mm)]
+    traces = [] if not arm else [_arm(residuals.machine)]
+    corner = low - 0.12 * span
+    for axis in residuals.machine:
+        direction = np.array(axis.direction)
+        if axis.kind == "linear":
+            traces.append(_line(axis, corner, corner + 0.26 * span * direction))
+        elif arm:
+            at = np.array(axis.at_mm)
+            traces.append(_line(axis, at, at + 0.06 * span * direction))
+            traces.append(_arc(axis, at, 0.045 * span))
+        elif axis.kind == "spindle":
+            top = (low + high) / 2.0 + direction * (
+                float((high - low) @ np.abs(direction)) / 2.0 + 0.1 * span
+            )
+            traces.append(_line(axis, top, top + 0.22 * span * direction))
+            traces.append(_arc(axis, top + 0.11 * span * direction, 0.05 * span))
+        else:
+            along = places @ direction
+            ends = [np.array(axis.at_mm) + direction * level for level in _ends(along, span)]
+            traces.append(_line(axis, *ends))
+            traces.append(_arc(axis, ends[0], 0.22 * span))
+    return traces
+
+
+def _ends(along: Array, span: float) -> tuple[float, float]:
+    """Where a rotary axis is drawn from and to: a little further than what was probed along it."""
+    return min(float(along.min()), 0.0) - 0.14 * span, max(float(along.max()), 0.0) + 0.14 * span
+
+
+def _line(axis: AxisPlace, start: Array, end: Array) -> Trace:
+    what = f"{axis.name}, {axis.kind}, carries the {axis.carries}"
+    return {
+        "type": "scatter3d", "mode": "lines+text", **_points([start, end]), "text": ["", axis.name],
+        "meta": axis.name, "line": {"color": "@mid", "width": 7 if axis.kind == "linear" else 4},
+        "textfont": {"color": "@ink", "size": 15}, "hovertemplate": what + "<extra></extra>", "showlegend": False,
+    }  # fmt: skip
+
+
+def _arc(axis: AxisPlace, centre: Array, radius: float) -> Trace:
+    """Part of a circle about an axis in the sense of its positive turn, with an arrow's head at its end."""
+    direction = np.array(axis.direction)
+    across = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
+    across /= np.linalg.norm(across)
+    further = np.cross(direction, across)
+    angles = np.linspace(0.0, TURN, ARC)
+    points = [centre + radius * (np.cos(angle) * across + np.sin(angle) * further) for angle in angles]
+    back = points[-1] - 0.35 * radius * (-np.sin(TURN) * across + np.cos(TURN) * further)
+    outwards = (points[-1] - centre) / radius
+    head = [back + 0.16 * radius * outwards, points[-1], back - 0.16 * radius * outwards]
+    return {
+        "type": "scatter3d", "mode": "lines", **_points([*points, *head]), "meta": axis.name,
+        "line": {"color": "@mid", "width": 4}, "hoverinfo": "skip", "showlegend": False,
+    }  # fmt: skip
+
+
+def _arm(machine: Sequence[AxisPlace]) -> Trace:
+    """The arm of a machine whose axes lie apart: from the bed from axis to axis, all at zero."""
+    points = [np.zeros(3), *(np.array(axis.at_mm) for axis in machine if axis.carries == "tool")]
+    return {
+        "type": "scatter3d", "mode": "lines", **_points(points), "line": {"color": "@rule", "width": 12},
+        "hoverinfo": "skip", "showlegend": False, "name": "arm",
+    }  # fmt: skip
+
+
+def _points(points: Sequence[Array]) -> dict[str, list[float]]:
+    rounded = np.round(np.array(points), 3) + 0.0
+    return {name: rounded[:, index].tolist() for index, name in enumerate("xyz")}

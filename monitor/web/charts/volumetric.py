@@ -1,0 +1,78 @@
+"""The volumetric error over the stroke: its vectors in space, and slices with lengths and uncertainties."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from monitor.reporting.svg.map_slices import Slice
+from monitor.web.charts.chart import Chart, axis
+from monitor.web.words import number
+from monitor.workflow.volumetric.over_stroke import OverStrokeAnswer
+
+#: The scales of lengths: of arrows, and of cells that numbers are written on.
+ARROWS = [[0, "@mid"], [1, "@orange"]]
+CELLS = [[0, "@paper"], [1, "@heat"]]
+
+
+def vectors_chart(answer: OverStrokeAnswer) -> Chart:
+    """Show the error at every point of the grid as an arrow; its colour is the length in µm."""
+    at, vector = np.asarray(answer.readings_mm), np.asarray(answer.vectors_um)
+    lengths = np.linalg.norm(vector, axis=1)
+    frame = {
+        name: axis(f"{of} / mm", backgroundcolor="rgba(0,0,0,0)", showbackground=False, showspikes=False)
+        for name, of in zip(("xaxis", "yaxis", "zaxis"), answer.axes, strict=True)
+    }
+    where = [", ".join(f"{of} {value:.0f}" for of, value in zip(answer.axes, row, strict=True)) for row in at]
+    return Chart(
+        key="vectors",
+        says=f"error vectors at {len(at)} points over the strokes, the largest {number(float(lengths.max()))} µm",
+        traces=[
+            {
+                "type": "cone", "x": at[:, 0].tolist(), "y": at[:, 1].tolist(), "z": at[:, 2].tolist(),
+                "u": vector[:, 0].tolist(), "v": vector[:, 1].tolist(), "w": vector[:, 2].tolist(),
+                "sizemode": "scaled", "sizeref": 1.1, "anchor": "tail", "colorscale": ARROWS, "cmin": 0,
+                "colorbar": {"title": {"text": "µm"}, "thickness": 12, "len": 0.7},
+                "text": [
+                    f"{readings} mm: {number(float(length))} ± {number(float(u), 2)} µm"
+                    for readings, length, u in zip(where, lengths, answer.expanded_um, strict=True)
+                ],
+                "hovertemplate": "%{text}<extra></extra>",
+            }
+        ],
+        layout={
+            "scene": {**frame, "aspectmode": "data", "camera": {"eye": {"x": 1.05, "y": -1.25, "z": 0.7}}},
+            "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        },
+        height=520,
+    )  # fmt: skip
+
+
+def slice_charts(answer: OverStrokeAnswer) -> list[Chart]:
+    """Show the three middle slices: the length at every node and, written on it, its expanded uncertainty."""
+    longest = max(max(map(max, part.lengths_um)) for part in answer.slices)
+    return [_slice(part, longest) for part in answer.slices]
+
+
+def _slice(part: Slice, longest: float) -> Chart:
+    first, second = part.along
+    # Rows of the picture run along the second axis.
+    lengths = np.array(part.lengths_um).T
+    expanded = np.array(part.expanded_um).T
+    return Chart(
+        key=f"slice-{part.across}",
+        says=f"length of the error at {part.across} = {number(part.at_mm)} mm in µm, ± U on every node",
+        traces=[
+            {
+                "type": "heatmap", "x": part.first_mm, "y": part.second_mm, "z": lengths.tolist(), "zmin": 0,
+                "zmax": longest, "colorscale": CELLS, "showscale": False, "xgap": 1, "ygap": 1,
+                "text": [
+                    [f"{number(value)}<br>± {number(u, 2)}" for value, u in zip(*rows, strict=True)]
+                    for rows in zip(lengths.tolist(), expanded.tolist(), strict=True)
+                ],
+                "texttemplate": "%{text}", "textfont": {"size": 10, "color": "@ink"},
+                "hovertemplate": f"{first} %{{x:.0f}} mm, {second} %{{y:.0f}} mm: %{{text}} µm<extra></extra>",
+            }
+        ],
+        layout={"xaxis": axis(f"{first} / mm", showgrid=False), "yaxis": axis(f"{second} / mm", showgrid=False)},
+        height=330,
+    )  # fmt: skip

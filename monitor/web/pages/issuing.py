@@ -1,0 +1,148 @@
+"""Issue or amend a certificate: a form with a box for all that the laboratory states, and refusals at their boxes."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response
+
+from monitor.exceptions import InputError, MonitorError
+from monitor.reporting.certificate.completeness import IncompleteCertificateError
+from monitor.reporting.certificate.grounds import GroundKind
+from monitor.web.asking import Asker, check_role
+from monitor.web.faults import Refusal, refusal_of
+from monitor.web.forms import Form, read_form, whole_number
+from monitor.web.interface import attachment
+from monitor.web.laboratory_form import box_of, groups, laboratory_file, texts_of_file
+from monitor.web.rendering import page
+from monitor.web.users import User
+from monitor.workflow.certificate.request import METHODS, RULES
+
+#: The largest laboratory's file that fills the form.
+FILE_BYTES = 2**20
+#: The file that the answers are kept in.
+FILE_NAME = "laboratory.toml"
+#: A preview is a draft under this number: the next one of the campaign takes its place.
+PREVIEW = "preview {}"
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a button of the form led to: a certificate's ``number``, or a ``refusal`` with what is wrong at each box."""
+
+    number: str = ""
+    is_draft: bool = False
+    refusal: Refusal | None = None
+    faults: Mapping[str, str] = field(default_factory=dict)
+    grounds: bool = False
+
+
+def routes() -> APIRouter:
+    """Return the routes of the form and its buttons."""
+    router = APIRouter()
+
+    @router.get("/certificate/new")
+    def form(request: Request, campaign: str, run: str = "", replaces: str = "") -> Response:
+        """Show the form, empty."""
+        texts = {"campaign": campaign, "run": run, "replaces": replaces, "laboratory.language": "en"}
+        return _shown(request, texts, _Outcome())
+
+    @router.post("/certificate/new")
+    async def press(request: Request) -> Response:
+        """Do what the button that was pressed says."""
+        async with read_form(request) as filled:
+            button = filled.texts.get("button", "")
+            texts = dict(filled.texts)
+            if button == "fill":
+                texts |= _from_file(filled)
+                return await run_in_threadpool(_shown, request, texts, _Outcome())
+            if button == "keep":
+                return attachment(FILE_NAME, laboratory_file(texts).encode("utf-8"))
+            outcome = await run_in_threadpool(
+                _pressed, request.app.state.asker, request.state.user, texts, request.app.state.working_folder
+            )
+        return await run_in_threadpool(_shown, request, texts, outcome)
+
+    return router
+
+
+def _from_file(form: Form) -> dict[str, str]:
+    if not form.files:
+        raise InputError("choose the laboratory's file, which monitor certificate template writes")
+    content = form.files[0].content.read(FILE_BYTES + 1)
+    if len(content) > FILE_BYTES:
+        raise InputError("this file is too large to be a laboratory's")
+    return texts_of_file(content)
+
+
+def _shown(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> Response:
+    campaign = texts.get("campaign", "")
+    runs = request.app.state.asker(request.state.user, "runs", {"campaign": campaign}).runs
+    return page(
+        request, "certificate_new.html", status=outcome.refusal.status if outcome.refusal else 200,
+        campaign=campaign, texts=texts, runs=runs, groups=groups(texts, outcome.faults), outcome=outcome,
+        methods=METHODS, rules=RULES, grounds=tuple(GroundKind),
+    )  # fmt: skip
+
+
+def _pressed(asker: Asker, user: User, texts: Mapping[str, str], working_folder: Path) -> _Outcome:
+    """Preview or issue what the form says."""
+    draft = texts.get("button") != "issue"
+    question = "amend certificate" if texts.get("replaces") and not draft else "issue certificate"
+    check_role(user, question)
+    with tempfile.TemporaryDirectory(dir=working_folder) as folder:
+        laboratory = Path(folder, FILE_NAME)
+        try:
+            laboratory.write_text(laboratory_file(texts), encoding="utf-8")
+            document = _document(texts, draft=draft)
+            answer = asker(user, question, document, {"laboratory": laboratory, "out": Path(folder)})
+        except MonitorError as error:
+            return _refused(error, folder)
+        return _Outcome(number=answer.certificate.number, is_draft=draft)
+
+
+def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
+    campaign = texts.get("campaign", "")
+    document: dict[str, Any] = {"campaign": campaign, "method": texts.get("method") or METHODS[0]}
+    for name in ("run", "as_left"):
+        if texts.get(name):
+            document[name] = whole_number(name, texts[name])
+    for name in ("number", "issued_on", "conformity"):
+        if texts.get(name):
+            document[name] = texts[name]
+    accepted = {kind.value: texts.get(f"accept.{kind}", "") for kind in GroundKind}
+    document["accept"] = {kind: reason for kind, reason in accepted.items() if reason}
+    document["with_map"] = bool(texts.get("with_map"))
+    if draft:
+        return {**document, "draft": True, "number": PREVIEW.format(campaign)[:60]}
+    if texts.get("replaces"):
+        return {**document, "replaces": texts["replaces"], "reason": texts.get("reason", "")}
+    return document
+
+
+def _refused(error: MonitorError, folder: str) -> _Outcome:
+    """The refusal in words, and at every box that it names what is missing there."""
+    refusal = refusal_of(error)
+    lines = [line.strip() for line in refusal.error.replace(f"{folder}/", "").splitlines()]
+    faults: dict[str, str] = {}
+    if isinstance(error, IncompleteCertificateError):
+        for gap in error.missing:
+            for box in box_of(gap.key):
+                faults.setdefault(box, f"{gap.item}{f', {gap.part}' if gap.part else ''} ({gap.clause})")
+        lines = [lines[0], *map(str, error.missing)]
+    else:
+        for line in lines:
+            named = re.match(r"(\w+)\.(\w+) ", line)
+            for box in box_of(f"[{named[1]}] {named[2]}") if named else ():
+                faults.setdefault(box, line)
+    return _Outcome(
+        refusal=Refusal(refusal.status, lines[0], tuple(lines[1:])), faults=faults,
+        grounds="--accept" in refusal.error,
+    )  # fmt: skip

@@ -1,0 +1,183 @@
+"""Two periods of a machine side by side: what each parameter and each condition was, and whether it differs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import DataError, InputError
+from monitor.statistics.before_after import BeforeAfter, OtherDays, before_after
+from monitor.store import Database, MachineHistory, followed_by, machine_history
+from monitor.workflow.history.calendar import SECONDS_PER_DAY
+from monitor.workflow.history.series import Series, parameter_series
+
+
+@dataclass(frozen=True)
+class Period:
+    """A period: ``since`` belongs to it, ``until`` does not; both with an offset from UTC.
+
+    Raises InputError for one without an offset, or that is empty.
+    """
+
+    since: datetime
+    until: datetime
+
+    def __post_init__(self) -> None:
+        for moment in (self.since, self.until):
+            if moment.tzinfo is None:
+                raise InputError(
+                    f"{moment.isoformat()} has no offset from UTC; write for example {moment.isoformat()}+01:00"
+                )
+        if self.since >= self.until:
+            raise InputError(
+                f"the period from {self.since:%Y-%m-%d} to {self.until:%Y-%m-%d} is empty; begin it before its end"
+            )
+
+
+@dataclass(frozen=True)
+class PeriodsRequest:
+    """The ``earlier`` and the ``later`` period of a machine, which do not overlap."""
+
+    machine: str
+    earlier: Period
+    later: Period
+
+    def __post_init__(self) -> None:
+        if self.later.since < self.earlier.until:
+            raise InputError(
+                "the periods overlap, or the later one comes first; end one before the other begins"
+            )
+
+
+@dataclass(frozen=True)
+class ParameterOfPeriods:
+    """A parameter in both periods, None where one has no run: means over the days, their difference (later less
+    earlier) with its standard uncertainty by the scatter of the days and its coverage factor ``k`` for 95 %.
+
+    ``differs`` is whether the difference exceeds its uncertainty; None where the days do not say how days differ, or
+    days that follow each other may explain it.
+    """
+
+    unit: str
+    earlier: float | None
+    later: float | None
+    difference: float | None
+    u: float | None
+    k: float | None
+    differs: bool | None
+    tolerance: float | None
+
+
+@dataclass(frozen=True)
+class ConditionOfPeriods:
+    """Means of a recorded condition in both periods."""
+
+    earlier: float | None
+    later: float | None
+
+
+@dataclass(frozen=True)
+class PeriodsAnswer:
+    """Both periods with their numbers of runs and days, and every parameter and condition."""
+
+    machine: str
+    earlier: Period
+    later: Period
+    runs: tuple[int, int]
+    days: tuple[int, int]
+    parameters: Mapping[str, ParameterOfPeriods]
+    conditions: Mapping[str, ConditionOfPeriods]
+
+
+def periods(db: Database, request: PeriodsRequest) -> PeriodsAnswer:
+    """Compare two periods of a machine as events are compared: by the means of days. Nothing is stored.
+
+    Runs that are marked as warming up take no part where enough others remain. Raises NotFoundError for a machine that
+    is not there, DataError where a period has no run.
+    """
+    history = machine_history(db, request.machine, followed_by=followed_by(db, request.machine))
+    masks = [_within(history, period) for period in (request.earlier, request.later)]
+    for mask, period in zip(masks, (request.earlier, request.later), strict=True):
+        if not mask.any():
+            raise DataError(
+                f"machine {request.machine} has no identified run from {period.since:%Y-%m-%d} to "
+                f"{period.until:%Y-%m-%d}"
+            )
+    days = [len({at.date() for at in history.part(mask).started_at}) for mask in masks]
+    return PeriodsAnswer(
+        machine=request.machine,
+        earlier=request.earlier,
+        later=request.later,
+        runs=(int(masks[0].sum()), int(masks[1].sum())),
+        days=(days[0], days[1]),
+        parameters={
+            name: _compared(series, history.campaign[of], request, history.tolerances.get(name))
+            for name, (series, of) in parameter_series(history).items()
+        },
+        conditions={
+            name: ConditionOfPeriods(*(_mean(values[mask]) for mask in masks))
+            for name, values in history.conditions.items()
+        },
+    )
+
+
+def _within(history: MachineHistory, period: Period) -> npt.NDArray[np.bool_]:
+    return np.array([period.since <= at < period.until for at in history.started_at], dtype=np.bool_)
+
+
+def _mean(values: npt.NDArray[np.float64]) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if len(finite) else None
+
+
+def _compared(
+    whole: Series, campaigns: npt.NDArray[np.str_], request: PeriodsRequest, tolerance: float | None
+) -> ParameterOfPeriods:
+    """One parameter; its other days help to say how days differ."""
+    steady = whole.steady
+    steady_campaigns = campaigns[~whole.warm_up] if len(steady.values) < len(whole.values) else campaigns
+    ends = [
+        moment.timestamp() / SECONDS_PER_DAY
+        for period in (request.earlier, request.later)
+        for moment in (period.since, period.until)
+    ]
+    # 0 before both, 1 the earlier, 2 between, 3 the later, 4 after.
+    stretch = np.searchsorted(np.array(ends), steady.t, side="right")
+    first, second = steady.part(stretch == 1), steady.part(stretch == 3)
+    means = [_mean_of_days(side) for side in (first, second)]
+    judged = None
+    rest = (stretch != 1) & (stretch != 3)
+    others = steady.part(rest)
+    if len(first.values) and len(second.values):
+        try:
+            judged = before_after(
+                first.values, second.values, first.days, second.days,
+                OtherDays(others.values, others.days, stretch[rest], steady_campaigns[rest]),
+            )  # fmt: skip
+        except DataError:
+            judged = None
+    return ParameterOfPeriods(
+        unit=whole.unit,
+        earlier=means[0],
+        later=means[1],
+        difference=None if means[0] is None or means[1] is None else means[1] - means[0],
+        u=None if judged is None else judged.u,
+        k=None if judged is None else judged.k,
+        differs=_differs(judged),
+        tolerance=tolerance,
+    )
+
+
+def _mean_of_days(series: Series) -> float | None:
+    if not len(series.values):
+        return None
+    index = np.unique(series.days, return_inverse=True)[1]
+    return float((np.bincount(index, series.values) / np.bincount(index)).mean())
+
+
+def _differs(judged: BeforeAfter | None) -> bool | None:
+    return None if judged is None or judged.agree is None else not judged.agree

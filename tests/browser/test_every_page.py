@@ -1,0 +1,75 @@
+"""Every page in a real browser: whole, readable to everybody, by keyboard, on paper; a picture of each is kept.
+
+Pictures are in ``pages-output/``: 1440 and 390 pixels wide, light and dark. axe-core looks for what keeps people out
+who cannot see, or cannot use a mouse (WCAG 2.2, levels A and AA, and its best practices).
+"""
+
+from __future__ import annotations
+
+import io
+import unicodedata
+
+import pytest
+
+from tests.browser.visits import PAGES, Site, Visit, picture
+
+#: What a page lets one press or fill in, as an expression of the browser; charts have controls of their own.
+REACHABLE = (
+    "[...document.querySelectorAll('main a[href], main button, main input, main select, main textarea, main summary')]"
+    ".filter((element) => element.checkVisibility() && element.type !== 'hidden' && !element.closest('.canvas'))"
+)
+pypdf = pytest.importorskip("pypdf")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1440, 390])
+@pytest.mark.parametrize("name", PAGES)
+def test_every_page_is_whole_and_open_to_everybody(site: Site, name: str, width: int, scheme: str) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="make pages installs it")
+    with Visit(site, width, scheme) as visit:
+        answer = visit.open(PAGES[name])
+        assert answer.status == 200
+        visit.page.screenshot(path=picture(f"{name}-{width}-{scheme}"), full_page=True)
+        assert visit.faults() == []
+        assert visit.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+        assert visit.page.locator("h1").count() == 1
+        assert visit.page.locator("label:not(:has(input, select, textarea))").count() == 0
+        results = axe.Axe().run(visit.page)
+        found_by_axe = [
+            f"{rule['id']}: {node['target']}"
+            for rule in results.response["violations"]
+            for node in rule["nodes"]
+        ]
+        assert found_by_axe == []
+
+
+@pytest.mark.parametrize("name", ["machine", "model", "certificate"])
+def test_a_page_works_by_keyboard_alone(site: Site, name: str) -> None:
+    """Everything that can be pressed or filled in is reached by Tab, and one sees where one is."""
+    with Visit(site) as visit:
+        visit.open(PAGES[name])
+        visit.page.keyboard.press("Tab")
+        assert visit.page.evaluate("document.activeElement.className") == "skip"
+        wanted = visit.page.evaluate(f"{REACHABLE}.length")
+        reached = set()
+        for _ in range(3 * wanted + 60):
+            visit.page.keyboard.press("Tab")
+            at = visit.page.evaluate(
+                f"[{REACHABLE}.indexOf(document.activeElement), getComputedStyle(document.activeElement).outlineStyle]"
+            )
+            if at[0] >= 0:
+                reached.add(at[0])
+                assert at[1] != "none"
+        assert reached == set(range(wanted))
+
+
+@pytest.mark.parametrize("name", ["machine", "model", "campaign", "map"])
+def test_a_page_prints_without_its_forms(site: Site, name: str) -> None:
+    with Visit(site) as visit:
+        visit.open(PAGES[name])
+        printed = visit.page.pdf(format="A4", print_background=False)
+        text = "\n".join(page.extract_text() for page in pypdf.PdfReader(io.BytesIO(printed)).pages)
+        text = unicodedata.normalize("NFKC", text)  # ligatures of the font
+        assert visit.page.locator("h1").inner_text().split()[0] in text
+        for word in ("show\n", "record the event", "log out"):
+            assert word not in text
