@@ -31,9 +31,11 @@ class Asker:
 
     def __call__(
         self, user: User, question: str, document: Mapping[str, Any] | None = None,
-        files: Mapping[str, Any] | None = None,
+        files: Mapping[str, Any] | None = None, tolerances: Mapping[str, Mapping[str, float]] | None = None,
     ) -> Any:  # fmt: skip
         """Return the typed answer; ``files`` are paths that the server itself fills in.
+
+        ``tolerances`` are limits by machine type of whoever asks (None: those of the server's configuration).
 
         Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
         """
@@ -45,6 +47,8 @@ class Asker:
             return asked.load()(*arguments)
         try:
             with closing(self._db.session(user.name)) as session:
+                if tolerances is not None:
+                    session.type_tolerances = tolerances
                 return asked.load()(session, *arguments)
         finally:
             if writes(question):

@@ -12,11 +12,15 @@ OUR_FAULT = "this is a fault of the software, please report it; nothing was stor
 
 @dataclass(frozen=True)
 class Refusal:
-    """A refusal: its ``status``, its sentence, and where a campaign was refused every fault with file and line."""
+    """A refusal: its ``status``, its sentence, and where a campaign was refused every fault with file and line.
+
+    ``in_full`` is what the command line prints of such a campaign.
+    """
 
     status: int
     error: str
     faults: tuple[str, ...] = ()
+    in_full: str = ""
 
 
 def refusal_of(error: Exception) -> Refusal:
@@ -26,7 +30,9 @@ def refusal_of(error: Exception) -> Refusal:
     if isinstance(error, NotFoundError):
         return Refusal(404, str(error))
     if isinstance(error, CampaignError):
-        return Refusal(422, str(error).splitlines()[0], tuple(str(fault) for fault in error.faults))
+        return Refusal(
+            422, str(error).splitlines()[0], tuple(str(fault) for fault in error.faults), str(error)
+        )
     if isinstance(error, InputError):
         return Refusal(400, str(error))
     if isinstance(error, MonitorError):

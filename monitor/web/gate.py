@@ -66,7 +66,7 @@ class Gate:
         self.close = close
         self._app = app
         self._settings = settings
-        self._sessions = sessions
+        self.sessions = self._sessions = sessions
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request (ASGI 3)."""
@@ -132,8 +132,8 @@ class Gate:
     ) -> tuple[User | None, str | None, str | None]:
         """Return the user, the key of the session, and the cookie to set where a session begins."""
         scheme, _, token = headers.get("authorization", "").partition(" ")
-        if scheme.lower() == "bearer" and self._sessions.users is not None:
-            return self._sessions.users.of_token(token.strip()), None, None
+        if scheme.lower() == "bearer":
+            return self._sessions.of_bearer(token.strip()), None, None
         key = _cookie(headers.get("cookie", ""))
         user = self._sessions.user_of(key)
         if user is not None:

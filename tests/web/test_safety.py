@@ -187,6 +187,7 @@ def test_every_write_is_in_the_audit_with_the_user(guarded: Any) -> None:
 
 def test_read_only_makes_everybody_a_viewer(tmp_path: Path) -> None:
     token = add_user(tmp_path / "users.toml", "ada", "approver")
+    assert token is not None
     assert read_users(tmp_path / "users.toml").looking_only().of_token(token) == User("ada", Role.VIEWER)
 
 
