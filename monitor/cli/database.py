@@ -30,7 +30,8 @@ PATIENCE_S = 300.0
 def opened(options: Namespace, *, threads: int | None = None, judging: bool = False) -> Database | Server:
     """The open database, held only while it is read or written, or the server that has it.
 
-    The audit says who changed it. ``judging``: with the tolerances by machine type of the configuration. Raises StoreError, InputError.
+    The audit says who changed it. ``judging``: with the tolerances by machine type of the configuration. Raises
+    StoreError, InputError.
     """
     server = _server(options, (configuration().tolerances or {}) if judging else None)
     return server if server is not None else opened_file(options, threads=threads, judging=judging)

@@ -67,14 +67,37 @@ class RunRow:
     conditions: Mapping[str, float]
 
 
-def list_campaigns(db: Database) -> tuple[CampaignRow, ...]:
-    """Return all campaigns that count, in the order of import."""
-    return db.records(
-        CampaignRow,
-        'SELECT v.*, c."rows" FROM v_campaigns AS v LEFT JOIN ('
-        'SELECT campaign_id, count(*) AS "rows" FROM curve_row GROUP BY campaign_id) AS c USING (campaign_id) '
-        "ORDER BY campaign_id",
-    )
+_CAMPAIGNS = """
+SELECT v.*, c."rows" FROM v_campaigns AS v LEFT JOIN (
+    SELECT campaign_id, count(*) AS "rows" FROM curve_row {where} GROUP BY campaign_id
+) AS c USING (campaign_id) {where} ORDER BY campaign_id
+"""
+
+
+def list_campaigns(
+    db: Database, machine: str | None = None, campaign: str | None = None, latest: int | None = None
+) -> tuple[CampaignRow, ...]:
+    """Return the campaigns that count, in the order of import: all, of a machine, of a name, the ``latest`` so many."""
+    numbers: list[int] | None = None
+    if machine is not None:
+        numbers = [number for number, _, _ in imported_campaigns(db, machine)]
+    if campaign is not None:
+        named = {
+            number for (number,) in db.rows("SELECT campaign_id FROM campaign WHERE campaign = ?", [campaign])
+        }
+        numbers = sorted(named if numbers is None else named.intersection(numbers))
+    if latest is not None:
+        if numbers is None:
+            last = "SELECT campaign_id FROM campaign ORDER BY campaign_id DESC LIMIT ?"
+            numbers = sorted(number for (number,) in db.rows(last, [latest]))
+        numbers = numbers[-latest:]
+    if numbers is None:
+        return db.records(CampaignRow, _CAMPAIGNS.format(where=""))
+    if not numbers:
+        return ()
+    # As numbers in the text: with them DuckDB groups the runs and probings of these campaigns alone.
+    listed = ", ".join(str(int(number)) for number in numbers)
+    return db.records(CampaignRow, _CAMPAIGNS.format(where=f"WHERE campaign_id IN ({listed})"))
 
 
 def list_withdrawn(db: Database) -> tuple[WithdrawnCampaign, ...]:

@@ -20,8 +20,8 @@ from monitor.web.users import User
 
 #: Two cores are the smallest machine that this runs on; answers of more at once only wait for each other.
 WORKERS = 2
-#: A page waits so long before it shows that something is being computed.
-PATIENCE_S = 1.5
+#: A page waits so long before it shows that something is being computed; the first page has to come within 0.5 s.
+PATIENCE_S = 0.3
 #: Questions that identify what nobody has identified yet.
 IDENTIFIES = frozenset({"trend", "identify"})
 #: Answers that are held; the oldest is forgotten, and computed again when somebody asks.
@@ -60,9 +60,12 @@ class Ticket:
         return self.future.running()
 
     def answer(self, patience: float = PATIENCE_S) -> Any:
-        """Return the answer, None where it is not there yet or was cancelled. Raises what the question raised."""
+        """Return the answer, None where it is not there yet or was cancelled. Raises what the question raised.
+
+        The patience counts from when it was asked first, so that a page with four questions waits once.
+        """
         try:
-            return self.future.result(timeout=patience)
+            return self.future.result(timeout=max(patience - self.seconds, 0.0))
         except (StillWorking, CancelledError):
             return None
 

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from starlette.exceptions import HTTPException
+
 from monitor.exceptions import CampaignError, InputError, MonitorError, NotFoundError
 from monitor.web.asking import ForbiddenError
 
 OUR_FAULT = "this is a fault of the software, please report it; nothing was stored by this request"
+
+
+class TooLargeError(Exception):
+    """More came than was announced or is allowed; the message is a sentence."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +31,11 @@ class Refusal:
 
 def refusal_of(error: Exception) -> Refusal:
     """Return the refusal for what a question raised; 500 for what it should not have raised."""
+    if isinstance(error, HTTPException):
+        # A form that cannot be read, such as one without its boundary.
+        return Refusal(error.status_code, f"the request cannot be read: {error.detail}")
+    if isinstance(error, TooLargeError):
+        return Refusal(413, str(error))
     if isinstance(error, ForbiddenError):
         return Refusal(403, str(error))
     if isinstance(error, NotFoundError):

@@ -4,7 +4,7 @@ The document of a question is that of the typed request, with its paths as the c
 the server, which puts files of its own in their place and the labels back into the texts of the answer. So an
 answer reads as if it had been given where the files are.
 
-A question holds ``request.json`` (``{"document": ..., "tolerances": ...}``) and its files as ``FIELD/INDEX/NAME...``; an
+A question holds ``request.json`` (``{"document": ..., "tolerances": ...}``) and its files as ``FIELD/INDEX/NAME``; an
 answer ``answer.json`` and its files as ``FIELD/NAME...``, where NAME is the last part of the label.
 """
 

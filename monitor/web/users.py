@@ -115,7 +115,7 @@ def read_users(path: Path) -> Users:
 
 
 class UserFile:
-    """The users of a file as it is now: who is taken out of it, or gets another role, is so from the next request on."""
+    """The users of a file as it is now: who is taken out, or gets another role, is so from the next request on."""
 
     def __init__(self, path: Path, *, looking_only: bool) -> None:
         self._path = path

@@ -31,7 +31,8 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CAMPAIGN, CURVE, MACHINE = "hidden-spindle-growth", "load-cell", "HU40-T"
 #: Differ from one time of asking to the next: moments, times of computing, and hashes over them.
 VOLATILE = {
-    "at", "seconds", "sha256", "last_sha256", "recorded_at", "withdrawn_at", "created_at", "imported_at", "made_at", "issued_at",
+    "at", "seconds", "sha256", "last_sha256", "recorded_at", "withdrawn_at", "created_at", "imported_at", "made_at",
+    "issued_at",
     "previous_sha256", "applied_at", "time",
 }  # fmt: skip
 #: Every question of the contract in an order in which each has what it asks for: the fields of its request.
@@ -62,18 +63,22 @@ ASKED: list[tuple[str, Callable[[Path], dict[str, Any]]]] = [
     ("model history", lambda out: {"model": "bent", "campaign": CURVE, "figures": out / "figures"}),
     ("remove effect", lambda out: {"effect": "load_N:poly2", "model": "bent", "new_name": "straight"}),
     ("use model", lambda out: {"model": "samba", "machine": MACHINE, "reason": "as before"}),
-    ("event", lambda out: {"machine": MACHINE, "text": "belt changed", "at": datetime(2026, 3, 1, 7, tzinfo=UTC), "kind": "repair"}),
+    ("event", lambda out: {
+        "machine": MACHINE, "text": "belt changed", "at": datetime(2026, 3, 1, 7, tzinfo=UTC), "kind": "repair"}),
     ("trend", lambda out: {"machine": MACHINE, "parameter": "EB0C"}),
     ("fleet", lambda out: {}),
-    ("map", lambda out: {"campaign": CAMPAIGN, "points": 3, "compensation": "positioning-csv", "out": out / "tables"}),
+    ("map", lambda out: {
+        "campaign": CAMPAIGN, "points": 3, "compensation": "positioning-csv", "out": out / "tables"}),
     ("plan", lambda out: {"campaign": CAMPAIGN}),
-    ("poses", lambda out: {"topology": "w C B X b Z Y (C1) t", "readings": {"X": [0.0, 1.0]}, "errors": {"EXX:poly1": (1.0,)}}),
+    ("poses", lambda out: {
+        "topology": "w C B X b Z Y (C1) t", "readings": {"X": [0.0, 1.0]}, "errors": {"EXX:poly1": (1.0,)}}),
     ("uncertainty", lambda out: {"campaign": CAMPAIGN, "method": "guf"}),
     ("certificate template", lambda out: {"out": out / "laboratory.toml"}),
     (
         "issue certificate",
         lambda out: {
-            "campaign": "nothing-hidden", "run": 20, "laboratory": EXAMPLES / "laboratory.toml", "out": out / "first.pdf",
+            "campaign": "nothing-hidden", "run": 20, "laboratory": EXAMPLES / "laboratory.toml",
+            "out": out / "first.pdf",
             "issued_on": date(2026, 4, 1),
         },
     ),
@@ -227,7 +232,7 @@ def test_a_command_asks_the_server_that_has_the_file(
     sides.db.close()
     here = Path(sides.db.path)
     note = Note(str(sides.server.address), sides.secret, 1)
-    assert "in use by" in printed(sides.served, "event", MACHINE, status=2)
+    assert "is open in this process" in printed(sides.served, "event", MACHINE, status=2)
     with posted(sides.served, note) as is_posted:
         assert is_posted
         for words in (
