@@ -25,7 +25,7 @@ _SCALARS: Mapping[Any, Schema] = {
     int: {"type": "integer"},
     float: {"type": ["number", "null"]},  # what is not finite is null: JSON has no such number
     bool: {"type": "boolean"},
-    datetime: {"type": "string", "format": "date-time"},
+    datetime: {"type": "string"},  # a local time has no offset, so that it is no date-time of RFC 3339
     date: {"type": "string", "format": "date"},
     Path: {"type": "string"},
     type(None): {"type": "null"},
@@ -49,6 +49,13 @@ class Schemas:
             return {"enum": list(members)}
         if origin is np.ndarray:
             return {"type": "array", "items": {}}
+        if origin is tuple and len(set(members)) == 1:
+            return {
+                "type": "array",
+                "items": self.of(members[0]),
+                "minItems": len(members),
+                "maxItems": len(members),
+            }
         if origin is tuple and Ellipsis not in members:
             return {"type": "array", "prefixItems": [self.of(member) for member in members]}
         if origin in (tuple, list, Sequence):

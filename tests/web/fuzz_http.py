@@ -94,7 +94,9 @@ def main() -> int:
         try:
             with urllib.request.urlopen(f"{address}/api/v1/openapi.json") as answer:
                 schema = json.load(answer)
-            for path in schema["paths"].values():
+            for address_of_question, path in schema["paths"].items():
+                if "withdraw" in address_of_question:
+                    continue  # what is withdrawn is not there for the other questions
                 for content in path["post"]["requestBody"]["content"].values():
                     content["schema"] = with_names(content["schema"])
             described = Path(folder, "openapi.json")
