@@ -69,8 +69,30 @@ class RunRow:
 
 _CAMPAIGNS = """
 SELECT v.*, c."rows" FROM v_campaigns AS v LEFT JOIN (
-    SELECT campaign_id, count(*) AS "rows" FROM curve_row {where} GROUP BY campaign_id
-) AS c USING (campaign_id) {where} ORDER BY campaign_id
+    SELECT campaign_id, count(*) AS "rows" FROM curve_row GROUP BY campaign_id
+) AS c USING (campaign_id) ORDER BY campaign_id
+"""
+#: The same for a few by their numbers, which stand in each part: the view counts the runs of every campaign first,
+#: 1.5 s of processor time where there are 1.7 million.
+_NUMBERED = """
+SELECT c.campaign_id, c.campaign, c.machine, c.method, coalesce(len(r.run), 0) AS runs,
+       coalesce(p.probings, 0) AS probings, list_min(r.started_at) AS first_run_at,
+       list_max(r.started_at) AS last_run_at,
+       nullif(len(list_distinct(r.day)), 0) AS days, c.probe ->> 'id' AS probe,
+       CAST(c.probe ->> 'standard_uncertainty' AS DOUBLE) / 0.001 AS probe_u_um, c.artefact ->> 'id' AS artefact,
+       CAST(c.artefact -> 'scale_bar' ->> 'length' AS DOUBLE) AS scale_bar_mm,
+       c.artefact -> 'scale_bar' ->> 'certificate' AS scale_bar_certificate, c.imported_at, q."rows"
+FROM (SELECT * FROM imported_campaign WHERE campaign_id IN ({numbers})) AS c
+ANTI JOIN withdrawn_campaign USING (campaign_id)
+LEFT JOIN (SELECT campaign_id, run, started_at, day FROM campaign_runs WHERE campaign_id IN ({numbers})) AS r
+    USING (campaign_id)
+LEFT JOIN (
+    SELECT campaign_id, count(*) AS probings FROM probing WHERE campaign_id IN ({numbers}) GROUP BY campaign_id
+) AS p USING (campaign_id)
+LEFT JOIN (
+    SELECT campaign_id, count(*) AS "rows" FROM curve_row WHERE campaign_id IN ({numbers}) GROUP BY campaign_id
+) AS q USING (campaign_id)
+ORDER BY campaign_id
 """
 
 
@@ -92,12 +114,11 @@ def list_campaigns(
             numbers = sorted(number for (number,) in db.rows(last, [latest]))
         numbers = numbers[-latest:]
     if numbers is None:
-        return db.records(CampaignRow, _CAMPAIGNS.format(where=""))
+        return db.records(CampaignRow, _CAMPAIGNS)
     if not numbers:
         return ()
-    # As numbers in the text: with them DuckDB groups the runs and probings of these campaigns alone.
     listed = ", ".join(str(int(number)) for number in numbers)
-    return db.records(CampaignRow, _CAMPAIGNS.format(where=f"WHERE campaign_id IN ({listed})"))
+    return db.records(CampaignRow, _NUMBERED.format(numbers=listed))
 
 
 def list_withdrawn(db: Database) -> tuple[WithdrawnCampaign, ...]:

@@ -92,7 +92,8 @@ def check_role(user: User, question: str) -> None:
     role = role_needed(question)
     if user.role < role:
         raise ForbiddenError(
-            f"{user.name} is a {user.role.word}; '{question}' needs the role {role.word}: ask whoever keeps the users"
+            f"{user.name} has the role {user.role.word}; '{question}' needs the role {role.word}: ask whoever keeps "
+            "the users"
         )
 
 

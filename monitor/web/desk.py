@@ -21,8 +21,8 @@ from monitor.web.users import User
 
 #: Two cores are the smallest machine that this runs on; answers of more at once only wait for each other.
 WORKERS = 2
-#: A page waits so long before it shows that something is being computed; the first page has to come within 0.5 s.
-PATIENCE_S = 0.3
+#: A page waits so long before it shows that something is being computed; a trend page has to come within 0.3 s.
+PATIENCE_S = 0.1
 #: Answers that are held; the oldest is forgotten, and computed again when somebody asks.
 MOST = 200
 
