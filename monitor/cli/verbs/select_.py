@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from monitor.cli import output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
 from monitor.workflow.selections.request import (
     SelectionAnswer,
@@ -63,7 +64,7 @@ def run(options: Namespace) -> int:
             f"{answer.selection}: {len(answer.runs)} runs of {answer.campaign} where {answer.condition}"
         )
     elif isinstance(answer, SideBySideAnswer):
-        _comparison(answer)
+        _comparison(on_screen(answer))
     else:
         output.listing(answer.selections, "there is no selection yet")
     return 0
