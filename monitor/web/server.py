@@ -19,6 +19,7 @@ from monitor.exceptions import InputError
 from monitor.web.app import application
 from monitor.web.note import Note, posted
 from monitor.web.opening import opened
+from monitor.web.rendering import prepare
 from monitor.web.settings import ServerSettings
 
 #: A page asks some ten short queries, and waits so long behind every computation to go on after each (Python's usual
@@ -70,6 +71,7 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
                     f"{settings.database} is served at {_address(scheme, settings.host, port)}/ ; Ctrl-C ends it"
                 )
 
+            prepare()
             sys.setswitchinterval(_SWITCH_S)
             _Server(config, listens).run()
             beside.close()
