@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: supply browser challenge concurrency kills manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
+.PHONY: supply browser challenge fuzz-http load concurrency kills manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -49,6 +49,14 @@ browser: setup
 
 pages: browser  ## the pages in a real browser; pictures of every page in pages-output/
 	@$(PYTEST) -n 0 tests/browser $(ARGS)
+
+fuzz-http: setup  ## the whole HTTP interface by schemathesis (docs/reliability.md); some ten minutes
+	@$(RUN) -c 'import schemathesis' 2>/dev/null || $(RUN) -m pip install --quiet --constraint constraints.txt 'schemathesis>=4'
+	@OMP_NUM_THREADS=1 $(RUN) tests/web/fuzz_http.py $(ARGS)
+
+load: setup  ## 50 engineers at once while an import runs; trend pages of a large fleet (docs/benchmarks.md)
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/load_pages.py many $(ARGS)
+	@OMP_NUM_THREADS=1 $(RUN) tests/benchmarks/load_pages.py large --machines 1000 --weeks 100 $(ARGS)
 
 manual: setup  ## the manual as a site in manual-output/, and every block of code of its pages
 	@$(RUN) -c 'import furo, latex2mathml, myst_parser, sphinx' 2>/dev/null || $(RUN) -m pip install --quiet --constraint constraints.txt furo latex2mathml myst-parser sphinx

@@ -57,6 +57,11 @@ def from_document(kind: type[Record], document: Mapping[str, Any]) -> Record:
     return record
 
 
+def answer_from_document(kind: Any, document: object) -> Any:
+    """Restore an answer of the contract, which may be of several kinds. Raises StoreError where it is of none."""
+    return _typed(kind, document, "answer")
+
+
 def inlined_parts(record: object) -> tuple[object, ...]:
     """Return a record and the records that are written into its document, at any depth."""
     if not dataclasses.is_dataclass(record):

@@ -22,7 +22,7 @@ from monitor.cli.parser import VERBS, verb_parser
 PACKAGE = Path(monitor.__file__).parent
 COMMAND_LINE = Path(__file__).resolve().parents[1] / "docs" / "command-line.md"
 #: Options that all verbs have; the document says so once.
-COMMON = {"-h", "--help", "--db", "--json", "--quiet", "--wait"}
+COMMON = {"-h", "--help", "--db", "--json", "--quiet", "--wait", "--server", "--server-token"}
 
 #: Functions of a verb's file: what they do is the same in each, and the file's docstring is the verb's help.
 VERB_FUNCTIONS = {"options", "run"}

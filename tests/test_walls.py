@@ -68,6 +68,7 @@ KEEPERS: dict[str, set[str]] = {
     "starlette": {"web"},
     "uvicorn": {"web"},
     "pydantic": {"web"},
+    "argon2": {"web"},
     "plotly": {"web"},
     "numba": {"uncertainty"},
     "pandas": {"store", "api"},

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from monitor import __version__
 from monitor.cli.database import PATIENCE_S, check_path, seconds_to_wait
-from monitor.exceptions import did_you_mean
+from monitor.exceptions import InputError, did_you_mean
 
 #: Verb: what it does in a few words. The file of the same name in ``monitor.cli.verbs`` has the rest.
 VERBS = {
@@ -63,6 +63,8 @@ WITHOUT_DATABASE = (
     "completion",
 )
 
+#: Verbs that work on files of this computer alone; they ask no server.
+AT_HOME = ("demo", "restore", "serve", "watch", "config", "completion")
 SUBVERBS_WITHOUT_DATABASE = ("template",)
 
 
@@ -99,6 +101,14 @@ def common(parser: argparse.ArgumentParser, *, database: bool = True) -> None:
             "--wait", metavar="SECONDS", default=argparse.SUPPRESS,
             help=f"how long to wait for another process that has the database (default {PATIENCE_S:g})",
         )  # fmt: skip
+        parser.add_argument(
+            "--server", metavar="URL", default=argparse.SUPPRESS,
+            help="ask the server at this address instead of a database file",
+        )  # fmt: skip
+        parser.add_argument(
+            "--server-token", metavar="FILE", default=argparse.SUPPRESS,
+            help="the file that holds your token of that server",
+        )  # fmt: skip
     parser.add_argument(
         "--json", action="store_true", help="one JSON document on standard output, nothing else"
     )
@@ -127,7 +137,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         description="Long-term health database for machine tools and coordinate measuring machines.",
         epilog=_help(),
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        usage="monitor [--db PATH] VERB ...",
+        usage="monitor [--db PATH | --server URL] VERB ...",
     )
     first.add_argument(
         "--db",
@@ -140,6 +150,14 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         default=os.environ.get("MONITOR_WAIT") or f"{PATIENCE_S:g}",
         help=f"how long to wait for another process that has the database (else $MONITOR_WAIT, else {PATIENCE_S:g})",
     )
+    first.add_argument(
+        "--server", metavar="URL", help="ask the server at this address instead (else $MONITOR_SERVER)"
+    )
+    first.add_argument(
+        "--server-token", metavar="FILE",
+        help="the file that holds your token of that server (else $MONITOR_SERVER_TOKEN_FILE, else the token itself in "
+        "$MONITOR_SERVER_TOKEN)",
+    )  # fmt: skip
     first.add_argument("--version", action="version", version=f"monitor {__version__}")
     first.add_argument("verb", nargs="?", metavar="VERB", help=argparse.SUPPRESS)
     first.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
@@ -152,7 +170,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         first.error(f"there is no verb '{head.verb}'; {hint}there are {', '.join(VERBS)}")
     parser, run = verb_parser(head.verb)
     database = argparse.Namespace(
-        db=_default_database(head.verb) if head.db is None else head.db, wait=head.wait
+        db=head.db, wait=head.wait, server=head.server, server_token=head.server_token
     )
     try:
         # People write options before, between and behind the other words.
@@ -163,9 +181,28 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     if not hasattr(options, "run"):
         options.run = run
     options.wait = seconds_to_wait(options.wait)
+    _choose_server(head.verb, options)
+    if options.server is not None:
+        options.db = options.server  # what messages name
+        return options
+    if options.db is None:
+        options.db = _default_database(head.verb)
     needs_none = head.verb in WITHOUT_DATABASE or getattr(options, "what", None) in SUBVERBS_WITHOUT_DATABASE
     check_path(options.db, may_be_new=needs_none)
     return options
+
+
+def _choose_server(verb: str, options: argparse.Namespace) -> None:
+    """Settle whether a server or a file is asked: what is typed stands above the environment.
+
+    Raises InputError where both are typed, and for a verb that works on files of this computer alone.
+    """
+    if options.server is not None and options.db is not None:
+        raise InputError("--db names a file and --server a server that has one: give one of the two")
+    if options.server is not None and verb in AT_HOME:
+        raise InputError(f"`monitor {verb}` works on files of this computer and is not asked of a server")
+    if options.server is None and options.db is None and verb not in AT_HOME:
+        options.server = os.environ.get("MONITOR_SERVER") or None
 
 
 def _default_database(verb: str) -> str:

@@ -55,6 +55,11 @@ def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
     return campaigns
 
 
+def unpack_zip(name: str, content: IO[bytes], folder: Path) -> None:
+    """Write what a zip holds below ``folder``. Raises InputError for one that cannot be trusted or read."""
+    _unpack_zip(UploadedFile(name, content), _Room(folder))
+
+
 class _Room:
     """A folder that takes so many files and bytes and no more."""
 

@@ -46,6 +46,7 @@ from monitor.store.history import MachineHistory, latest_tolerances, machine_his
 from monitor.store.identifications import (
     identification_by_number,
     identification_numbers,
+    last_identification,
     load_identification,
     save_identification,
 )
@@ -157,6 +158,7 @@ __all__ = [
     "is_curve",
     "last_anchor",
     "last_entries",
+    "last_identification",
     "last_used_campaign",
     "latest_documents",
     "latest_maps",

@@ -90,8 +90,11 @@ def _chosen(db: Database, tables: Sequence[str] | None, machine: str | None) -> 
     names = _names(db)
     if tables is None and machine is not None:
         return [name for name in names if name.startswith("v_") and _has_machine(db, name)]
-    relations = [name if name in names else f"v_{name}" for name in (names if tables is None else tables)]
-    for asked, name in zip(tables or names, relations, strict=True):
+    wanted = names if tables is None else tables
+    if not wanted:
+        raise InputError("no table was named; leave it out for all of them")
+    relations = [name if name in names else f"v_{name}" for name in wanted]
+    for asked, name in zip(wanted, relations, strict=True):
         if name not in names:
             raise NotFoundError(
                 f"there is no table {asked!r}; {did_you_mean(asked, names)}there are {', '.join(names)}"

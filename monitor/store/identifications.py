@@ -128,6 +128,12 @@ def identification_by_number(db: Database, number: int) -> StoredIdentification:
     )
 
 
+def last_identification(db: Database) -> int:
+    """Return the number of the last identification, 0 where there is none: a larger one says that values came."""
+    ((number,),) = db.rows("SELECT coalesce(max(identification_id), 0) FROM identification")
+    return int(number)
+
+
 def identification_numbers(db: Database, software_version: str) -> list[int]:
     """Return the numbers of the identifications that a version made of campaigns that count."""
     return [

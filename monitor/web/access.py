@@ -23,35 +23,73 @@ APPROVERS = frozenset(
 NOT_OFFERED: Mapping[str, str] = {
     "restore": "a backup is restored beside the server, by monitor restore: no second database is served",
     "simulate": "a rehearsal is written by monitor simulate; upload its folder",
+    "simulate like a folder": "a rehearsal is written by monitor simulate; upload its folder",
+    "watch": "a folder is watched by monitor watch on the computer that has it, while no server has the database",
 }
 
 
 @dataclass(frozen=True)
 class FileFields:
-    """How the files of a question travel: the field ``upload`` is filled from the body, ``download`` is sent back.
+    """How the files of a question travel: ``upload`` is filled from the body, ``download`` is sent back.
 
     ``file_name`` is that of the file to be made; None where a folder is filled, of which several files make a zip.
+    ``uploads`` and ``downloads`` are further fields, which travel in a parcel alone (``parcel``).
     """
 
     upload: str | None = None
     download: str | None = None
     file_name: str | None = None
+    uploads: tuple[str, ...] = ()
+    downloads: tuple[str, ...] = ()
+
+    @property
+    def incoming(self) -> tuple[str, ...]:
+        """Every field that names a file to be read."""
+        return (*(() if self.upload is None else (self.upload,)), *self.uploads)
+
+    @property
+    def outgoing(self) -> tuple[str, ...]:
+        """Every field that names a file or folder to be written."""
+        return (*(() if self.download is None else (self.download,)), *self.downloads)
 
 
+_FIGURES = FileFields(downloads=("figures",))
 #: Questions that read an upload or make a file, by name; every other field that names a path is not taken over HTTP.
 FILES: Mapping[str, FileFields] = {
-    "amend certificate": FileFields(upload="laboratory", download="out"),
+    "amend certificate": FileFields(upload="laboratory", download="out", uploads=("fonts",)),
     "backup": FileFields(download="target", file_name="backup.duckdb"),
+    "certificate template": FileFields(download="out", file_name="laboratory.toml"),
+    "compare": _FIGURES,
     "digital certificate": FileFields(download="path"),
+    "digital certificate page": FileFields(download="path"),
+    "explain": _FIGURES,
     "export": FileFields(download="folder"),
     "import": FileFields(upload="folders"),
-    "issue certificate": FileFields(upload="laboratory", download="out"),
+    "issue certificate": FileFields(upload="laboratory", download="out", uploads=("fonts",)),
     "issued certificate": FileFields(download="path"),
+    "map": FileFields(download="out", downloads=("figures",)),
+    "model history": _FIGURES,
+    "plan": _FIGURES,
+    "remake certificate": FileFields(download="path", uploads=("fonts",)),
     "report": FileFields(download="out"),
-    "verify certificate": FileFields(upload="file"),
+    "selections side by side": _FIGURES,
+    "simulate like a campaign": FileFields(download="out", file_name="rehearsal"),
+    "statistics": FileFields(downloads=("figures", "matrices")),
+    "trend": _FIGURES,
+    "verify certificate": FileFields(upload="file", uploads=("trusted",)),
 }
-#: Fields that would spend processes of the server, make it speak to another address, or write where it was started.
-NOT_TAKEN = frozenset({"cluster", "workers", "compensation"})
+#: Questions that make a file only where it is asked for, and else answer with a document.
+ANSWERING_WITHOUT_FILE = frozenset({"map"})
+#: Fields of files that travel nowhere, and why.
+STAYING: Mapping[str, str] = {
+    "key": "a key and what opens it stay where they are: sign beside the database, while no server has it",
+    "cluster": "the server computes on its own computer",
+    "folder": "a campaign folder that is not imported is looked at by the command line on its computer",
+}
+#: Fields that would spend processes of the server, or make it speak to another address.
+NOT_TAKEN = frozenset({"cluster", "workers"})
+#: Questions judged by the tolerances by machine type of the configuration of whoever asks.
+JUDGING = frozenset({"fleet", "report", "trend"})
 
 
 def role_needed(question: str) -> Role:

@@ -35,7 +35,7 @@ from monitor.web.rendering import refusal_page
 from monitor.web.sessions import Sessions
 from monitor.web.settings import ServerSettings
 from monitor.web.static import static_routes
-from monitor.web.users import Role, User, read_users
+from monitor.web.users import Role, User, UserFile
 
 _log = logging.getLogger("monitor.web")
 _PAGES = (
@@ -56,12 +56,11 @@ _PAGES = (
 
 def application(db: Database, settings: ServerSettings, working_folder: Path) -> Gate:
     """Return the server of an open database. Raises InputError for a file of users that is wrong."""
-    users = None if settings.users is None else read_users(settings.users)
-    role = Role.APPROVER
-    if settings.reading_only:
-        role, users = Role.VIEWER, None if users is None else users.looking_only()
+    role = Role.VIEWER if settings.reading_only else Role.APPROVER
+    users = None if settings.users is None else UserFile(settings.users, looking_only=settings.reading_only)
     # Documentation of FastAPI's own would load scripts from elsewhere; the interface describes itself.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    db.type_tolerances = settings.tolerances
     asker = Asker(db)
     app.state.settings = settings
     app.state.sessions = Sessions(users, User(host_user_name(), role))

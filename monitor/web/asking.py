@@ -12,8 +12,9 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from monitor.exceptions import InputError, MonitorError
-from monitor.store import Database
+from monitor.store import Database, last_identification, list_campaigns
 from monitor.web.access import FILES, NOT_OFFERED, offered, role_needed, taken_fields, writes
+from monitor.web.freshness import IDENTIFYING, REMEMBERED, Freshness
 from monitor.web.users import User
 from monitor.workflow.contract import QUESTIONS
 
@@ -23,32 +24,63 @@ class ForbiddenError(MonitorError):
 
 
 class Asker:
-    """Asks questions of the served database; ``generation`` grows with every question that changes other answers."""
+    """Asks questions of the served database; ``freshness`` says which answers still hold."""
 
     def __init__(self, db: Database) -> None:
         self._db = db
-        self.generation = 0
+        self.freshness = Freshness()
 
     def __call__(
         self, user: User, question: str, document: Mapping[str, Any] | None = None,
-        files: Mapping[str, Any] | None = None,
+        files: Mapping[str, Any] | None = None, tolerances: Mapping[str, Mapping[str, float]] | None = None,
     ) -> Any:  # fmt: skip
         """Return the typed answer; ``files`` are paths that the server itself fills in.
+
+        ``tolerances`` are limits by machine type of whoever asks (None: those of the server's configuration).
 
         Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
         """
         check_role(user, question)
-        request = request_of(question, document or {}, files or {})
+        if question not in REMEMBERED or files or tolerances is not None:
+            return self._asked(user, question, document or {}, files or {}, tolerances)
+        key, answer = self.freshness.recall(question, document or {})
+        if answer is None:
+            answer = self._asked(user, question, document or {}, {}, None)
+            self.freshness.remember(key, answer)
+        return answer
+
+    def _asked(
+        self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any],
+        tolerances: Mapping[str, Mapping[str, float]] | None,
+    ) -> Any:  # fmt: skip
+        request = request_of(question, document, files)
         asked = QUESTIONS[question]
         arguments = [] if request is None else [request]
         if not asked.needs_database:
             return asked.load()(*arguments)
-        try:
-            with closing(self._db.session(user.name)) as session:
-                return asked.load()(session, *arguments)
-        finally:
-            if writes(question):
-                self.generation += 1
+        with closing(self._db.session(user.name)) as session:
+            if tolerances is not None:
+                session.type_tolerances = tolerances
+            before = last_identification(session) if question in IDENTIFYING else None
+            machines: set[str] | None = None
+            try:
+                answer = asked.load()(session, *arguments)
+                machines = _touched_machines(session, question, request, answer)
+                return answer
+            finally:
+                if writes(question):
+                    self.freshness.wrote(machines)
+                elif before is not None and last_identification(session) != before:
+                    self.freshness.identified()
+
+
+def _touched_machines(db: Database, question: str, request: Any, answer: Any) -> set[str] | None:
+    """Return the machines whose answers a write changes; None: it may be any."""
+    if question == "event":
+        return {request.machine}
+    if question != "import":
+        return None
+    return {row.machine for folder in answer.imported for row in list_campaigns(db, campaign=folder.campaign)}
 
 
 def check_role(user: User, question: str) -> None:
@@ -60,7 +92,8 @@ def check_role(user: User, question: str) -> None:
     role = role_needed(question)
     if user.role < role:
         raise ForbiddenError(
-            f"{user.name} is a {user.role.word}; '{question}' needs the role {role.word}: ask whoever keeps the users"
+            f"{user.name} has the role {user.role.word}; '{question}' needs the role {role.word}: ask whoever keeps "
+            "the users"
         )
 
 

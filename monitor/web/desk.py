@@ -12,18 +12,17 @@ from collections.abc import Mapping
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as StillWorking
 from dataclasses import dataclass, field
-from threading import RLock
+from threading import Lock
 from typing import Any
 
 from monitor.web.asking import Asker, check_role
+from monitor.web.freshness import Stamp
 from monitor.web.users import User
 
 #: Two cores are the smallest machine that this runs on; answers of more at once only wait for each other.
 WORKERS = 2
-#: A page waits so long before it shows that something is being computed.
-PATIENCE_S = 1.5
-#: Questions that identify what nobody has identified yet.
-IDENTIFIES = frozenset({"trend", "identify"})
+#: A page waits so long before it shows that something is being computed; a trend page has to come within 0.3 s.
+PATIENCE_S = 0.1
 #: Answers that are held; the oldest is forgotten, and computed again when somebody asks.
 MOST = 200
 
@@ -60,9 +59,12 @@ class Ticket:
         return self.future.running()
 
     def answer(self, patience: float = PATIENCE_S) -> Any:
-        """Return the answer, None where it is not there yet or was cancelled. Raises what the question raised."""
+        """Return the answer, None where it is not there yet or was cancelled. Raises what the question raised.
+
+        The patience counts from when it was asked first, so that a page with four questions waits once.
+        """
         try:
-            return self.future.result(timeout=patience)
+            return self.future.result(timeout=max(patience - self.seconds, 0.0))
         except (StillWorking, CancelledError):
             return None
 
@@ -73,8 +75,8 @@ class Desk:
     def __init__(self, asker: Asker) -> None:
         self.asker = asker
         self._pool = ThreadPoolExecutor(WORKERS, thread_name_prefix="monitor-desk")
-        self._tickets: dict[tuple[str, str, int], Ticket] = {}
-        self._lock = RLock()  # a callback runs at once where the answer is there already
+        self._tickets: dict[tuple[str, str, Stamp], Ticket] = {}
+        self._lock = Lock()
         self._count = 0
 
     def ask(
@@ -85,7 +87,11 @@ class Desk:
         ``files`` are paths that the server itself fills in; they are no part of what is asked.
         """
         check_role(user, question)
-        key = (question, json.dumps(document, sort_keys=True, default=str), self.asker.generation)
+        key = (
+            question,
+            json.dumps(document, sort_keys=True, default=str),
+            self.asker.freshness.stamp(question, document),
+        )
         with self._lock:
             ticket = self._tickets.get(key)
             if ticket is not None and ticket.is_good:
@@ -93,19 +99,9 @@ class Desk:
             self._count += 1
             future = self._pool.submit(self.asker, user, question, document, files)
             self._tickets[key] = ticket = Ticket(self._count, question, document, user, future)
-            if question in IDENTIFIES:
-                future.add_done_callback(self._forget_sums)
-            for old in [old for old in self._tickets if old[2] != key[2] and self._tickets[old].is_done]:
-                del self._tickets[old]
             while len(self._tickets) > MOST:
                 del self._tickets[next(iter(self._tickets))]
             return ticket
-
-    def _forget_sums(self, _: Future[Any]) -> None:
-        """Forget the sums over the fleet: a machine may have been identified for the first time."""
-        with self._lock:
-            for key in [key for key in self._tickets if key[0] == "fleet"]:
-                del self._tickets[key]
 
     def under_way(self) -> list[Ticket]:
         """Return what is not answered yet, in the order of asking."""

@@ -4,29 +4,46 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from starlette.exceptions import HTTPException
+
 from monitor.exceptions import CampaignError, InputError, MonitorError, NotFoundError
 from monitor.web.asking import ForbiddenError
 
 OUR_FAULT = "this is a fault of the software, please report it; nothing was stored by this request"
 
 
+class TooLargeError(Exception):
+    """More came than was announced or is allowed; the message is a sentence."""
+
+
 @dataclass(frozen=True)
 class Refusal:
-    """A refusal: its ``status``, its sentence, and where a campaign was refused every fault with file and line."""
+    """A refusal: its ``status``, its sentence, and where a campaign was refused every fault with file and line.
+
+    ``in_full`` is what the command line prints of such a campaign.
+    """
 
     status: int
     error: str
     faults: tuple[str, ...] = ()
+    in_full: str = ""
 
 
 def refusal_of(error: Exception) -> Refusal:
     """Return the refusal for what a question raised; 500 for what it should not have raised."""
+    if isinstance(error, HTTPException):
+        # A form that cannot be read, such as one without its boundary.
+        return Refusal(error.status_code, f"the request cannot be read: {error.detail}")
+    if isinstance(error, TooLargeError):
+        return Refusal(413, str(error))
     if isinstance(error, ForbiddenError):
         return Refusal(403, str(error))
     if isinstance(error, NotFoundError):
         return Refusal(404, str(error))
     if isinstance(error, CampaignError):
-        return Refusal(422, str(error).splitlines()[0], tuple(str(fault) for fault in error.faults))
+        return Refusal(
+            422, str(error).splitlines()[0], tuple(str(fault) for fault in error.faults), str(error)
+        )
     if isinstance(error, InputError):
         return Refusal(400, str(error))
     if isinstance(error, MonitorError):

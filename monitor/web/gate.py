@@ -12,7 +12,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import quote, urlsplit
 
-from monitor.web.faults import OUR_FAULT
+from monitor.web.faults import OUR_FAULT, TooLargeError
 from monitor.web.sessions import COOKIE, Sessions
 from monitor.web.settings import UPLOAD_BYTES, ServerSettings
 from monitor.web.users import User
@@ -53,10 +53,6 @@ UPLOADS = ("/import", "/certificates/verify", "/api/v1/")
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
-class _TooLargeError(Exception):
-    """More came than was announced or is allowed."""
-
-
 class Gate:
     """Lets a request in with ``state.user`` and ``state.session``, or answers it with a refusal in plain words."""
 
@@ -66,7 +62,7 @@ class Gate:
         self.close = close
         self._app = app
         self._settings = settings
-        self._sessions = sessions
+        self.sessions = self._sessions = sessions
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request (ASGI 3)."""
@@ -95,8 +91,10 @@ class Gate:
             await send(message)
 
         try:
-            await self._app(scope, _counted(receive, _limit(scope["path"])), send_with_headers)
-        except _TooLargeError:
+            await self._app(
+                scope, _counted(receive, _limit(scope["path"]), _too_large(scope["path"])), send_with_headers
+            )
+        except TooLargeError:
             if not started:
                 await _plain(send, 413, _too_large(scope["path"]))
         except Exception:
@@ -132,8 +130,8 @@ class Gate:
     ) -> tuple[User | None, str | None, str | None]:
         """Return the user, the key of the session, and the cookie to set where a session begins."""
         scheme, _, token = headers.get("authorization", "").partition(" ")
-        if scheme.lower() == "bearer" and self._sessions.users is not None:
-            return self._sessions.users.of_token(token.strip()), None, None
+        if scheme.lower() == "bearer":
+            return self._sessions.of_bearer(token.strip()), None, None
         key = _cookie(headers.get("cookie", ""))
         user = self._sessions.user_of(key)
         if user is not None:
@@ -196,7 +194,7 @@ def _too_large(path: str) -> str:
     return f"this is too large: {_limit(path) // 2**20} MiB may be sent at a time; pack the folder, or send less of it"
 
 
-def _counted(receive: Receive, limit: int) -> Receive:
+def _counted(receive: Receive, limit: int, text: str) -> Receive:
     """Count what comes: a body in pieces announces no length."""
     total = 0
 
@@ -205,7 +203,7 @@ def _counted(receive: Receive, limit: int) -> Receive:
         message = await receive()
         total += len(message.get("body", b""))
         if total > limit:
-            raise _TooLargeError
+            raise TooLargeError(text)
         return message
 
     return counting

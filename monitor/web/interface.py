@@ -1,33 +1,35 @@
 """The HTTP interface: every question of the contract at ``POST /api/v1/QUESTION``, a document in, its answer out.
 
-The document has the request's fields, the answer is what the command line prints with ``--json``. A question that makes
-a file sends the file; one that reads a file takes it beside the document, as multipart/form-data.
+The document has the request's fields, the answer is what the command line prints with ``--json``. A question
+that makes a file sends the file; one that reads a file takes it beside the document, as multipart/form-data. Question
+and answer with all their files travel as a zip where the request is one (``parcel``): so asks the command line.
 ``GET /api/v1/openapi.json`` describes all of it, made from the same types.
 """
 
 from __future__ import annotations
 
-import io
 import json
 import logging
 import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from fastapi import APIRouter, Request
+from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
-from starlette.responses import JSONResponse, Response
+from starlette.responses import FileResponse, JSONResponse, Response
 
 from monitor import __version__
 from monitor.documents import to_document
 from monitor.exceptions import InputError, MonitorError
 from monitor.readers.archive import UploadedFile, unpack
-from monitor.web.access import FILES, offered, role_needed, taken_fields
+from monitor.web.access import ANSWERING_WITHOUT_FILE, FILES, offered, role_needed, taken_fields
 from monitor.web.asking import Asker, check_role, download_path
 from monitor.web.faults import refusal_of
+from monitor.web.parcel import MEDIA_TYPE, Placed, packed_answer, placed
 from monitor.web.schemas import Schemas
 from monitor.web.users import User
 from monitor.workflow.contract import QUESTIONS
@@ -73,6 +75,13 @@ def _answering(asker: Asker, question: str, working_folder: Path) -> Any:
         user: User = request.state.user
         try:
             check_role(user, question)
+            if _media_type(request) == MEDIA_TYPE:
+                with tempfile.TemporaryFile(dir=working_folder) as body:
+                    async for chunk in request.stream():
+                        body.write(chunk)
+                    return await run_in_threadpool(
+                        _answered_with_files, asker, user, question, body, working_folder
+                    )
             document, upload = await _body(request, question)
             return await run_in_threadpool(_answered, asker, user, question, document, upload, working_folder)
         except Exception as error:
@@ -83,7 +92,7 @@ def _answering(asker: Asker, question: str, working_folder: Path) -> Any:
     return answer
 
 
-def refused(error: Exception, folder: str = "") -> JSONResponse:
+def refused(error: Exception, folder: str | Placed = "") -> JSONResponse:
     """Return a refusal as a document: ``error``, and the ``faults`` of a folder; without the server's own."""
     refusal = refusal_of(error)
     if refusal.status == 500:
@@ -91,11 +100,19 @@ def refused(error: Exception, folder: str = "") -> JSONResponse:
     content: dict[str, Any] = {"error": refusal.error}
     if refusal.faults:
         content["faults"] = refusal.faults
+    if refusal.in_full:
+        content["in_full"] = refusal.in_full
+    if isinstance(folder, Placed):
+        return JSONResponse(folder.told(content), refusal.status)
     return JSONResponse(_without(content, folder) if folder else content, refusal.status)
 
 
+def _media_type(request: Request) -> str:
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
 async def _body(request: Request, question: str) -> tuple[dict[str, Any], list[UploadedFile]]:
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    kind = _media_type(request)
     travelling = FILES.get(question)
     if travelling is None or travelling.upload is None:
         if kind != "application/json":
@@ -148,8 +165,34 @@ def _answered(
             return refused(error, folder)
         written = sorted(path for path in outgoing.rglob("*") if path.is_file())
         if written:
-            return _file(question, written, outgoing)
+            return _file(question, written, outgoing, working_folder)
         return JSONResponse(_without(to_document(answer), folder))
+
+
+def _answered_with_files(
+    asker: Asker, user: User, question: str, body: IO[bytes], working_folder: Path
+) -> Response:
+    """Answer a question that came as a parcel with a parcel."""
+    body.seek(0)
+    with tempfile.TemporaryDirectory(dir=working_folder) as folder:
+        incoming, outgoing = Path(folder, "in"), Path(folder, "out")
+        incoming.mkdir()
+        outgoing.mkdir()
+        asked = None
+        try:
+            asked = placed(question, body, incoming, outgoing)
+            answer = asker(user, question, asked.document, asked.files, asked.tolerances)
+        except MonitorError as error:
+            return refused(error, "" if asked is None else asked)
+        with tempfile.NamedTemporaryFile(dir=working_folder, suffix=".zip", delete=False) as target:
+            packed_answer(asked.told(to_document(answer)), outgoing, target)
+    return _sent(Path(target.name), MEDIA_TYPE)
+
+
+def _sent(path: Path, media_type: str, name: str = "") -> FileResponse:
+    """Send a file piece by piece and remove it: a backup does not fit into the memory."""
+    headers = {"Content-Disposition": f'attachment; filename="{_plain_name(name)}"'} if name else {}
+    return FileResponse(path, media_type=media_type, headers=headers, background=BackgroundTask(path.unlink))
 
 
 def _uploaded(question: str, upload: list[UploadedFile], folder: Path) -> dict[str, Any]:
@@ -173,26 +216,32 @@ def _without(value: Any, folder: str) -> Any:
     return [_without(element, folder) for element in value] if isinstance(value, list | tuple) else value
 
 
-def _file(question: str, written: list[Path], folder: Path) -> Response:
+def _file(question: str, written: list[Path], folder: Path, working_folder: Path) -> Response:
     """Return the one file that was written, or a zip of all."""
+    with tempfile.NamedTemporaryFile(dir=working_folder, delete=False) as target:
+        if len(written) > 1:
+            with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+                for path in written:
+                    archive.write(path, path.relative_to(folder).as_posix())
+    name = f"{question.replace(' ', '-')}.zip"
     if len(written) == 1:
-        return attachment(written[0].name, written[0].read_bytes())
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in written:
-            archive.write(path, path.relative_to(folder).as_posix())
-    return attachment(f"{question.replace(' ', '-')}.zip", packed.getvalue())
+        name = written[0].name
+        written[0].replace(target.name)
+    return _sent(Path(target.name), "application/octet-stream", name)
 
 
 def attachment(name: str, content: bytes) -> Response:
     """Return a file that a browser saves under its name and never shows as a page."""
-    plain = "".join(
-        letter if letter.isascii() and (letter.isalnum() or letter in "-_.") else "_" for letter in name
-    )
     return Response(
         content,
         media_type="application/octet-stream",
-        headers={"Content-Disposition": f'attachment; filename="{plain}"'},
+        headers={"Content-Disposition": f'attachment; filename="{_plain_name(name)}"'},
+    )
+
+
+def _plain_name(name: str) -> str:
+    return "".join(
+        letter if letter.isascii() and (letter.isalnum() or letter in "-_.") else "_" for letter in name
     )
 
 
@@ -212,6 +261,7 @@ def openapi() -> dict[str, Any]:
                     "properties": {
                         "error": {"type": "string"},
                         "faults": {"type": "array", "items": {"type": "string"}},
+                        "in_full": {"type": "string"},
                     },
                     "required": ["error"],
                 },
@@ -239,12 +289,15 @@ def _operation(question: str, schemas: Schemas) -> dict[str, Any]:
         body = {
             "multipart/form-data": {"schema": {"type": "object", "properties": parts, "required": ["file"]}}
         }
-    sends_file = travelling is not None and travelling.download is not None
-    content = (
-        {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}
-        if sends_file
-        else {"application/json": {"schema": schemas.of(asked.answer)}}
-    )
+    content: dict[str, Any] = {"application/json": {"schema": schemas.of(asked.answer)}}
+    if travelling is not None and travelling.download is not None:
+        content["application/octet-stream"] = {"schema": {"type": "string", "format": "binary"}}
+        if question not in ANSWERING_WITHOUT_FILE:
+            del content["application/json"]
+    if travelling is not None:
+        parcel = {"type": "string", "format": "binary", "description": "request.json, and files by field"}
+        body[MEDIA_TYPE] = {"schema": parcel}
+        content[MEDIA_TYPE] = {"schema": parcel | {"description": "answer.json, and files by field"}}
     refusal = {"application/json": {"schema": {"$ref": "#/components/schemas/Refusal"}}}
     return {
         "operationId": question.replace(" ", "_"),

@@ -40,6 +40,12 @@ def refusal_page(request: Request, refusal: Refusal) -> HTMLResponse:
     return page(request, "refusal.html", status=refusal.status, refusal=refusal)
 
 
+def prepare() -> None:
+    """Compile the templates of the first page, which whoever opens it first would wait for."""
+    for name in ("fleet.html", "machine.html"):
+        _environment().get_template(name)
+
+
 @cache
 def _environment() -> Environment:
     environment = Environment(

@@ -27,7 +27,7 @@ _SCALARS: Mapping[Any, Schema] = {
     int: {"type": "integer"},
     float: {"type": ["number", "null"]},  # what is not finite is null: JSON has no such number
     bool: {"type": "boolean"},
-    datetime: {"type": "string", "format": "date-time"},
+    datetime: {"type": "string"},  # a local time has no offset, so that it is no date-time of RFC 3339
     date: {"type": "string", "format": "date"},
     Path: {"type": "string"},
     type(None): {"type": "null"},
@@ -52,7 +52,7 @@ class Schemas:
         if origin is np.ndarray:
             return {"type": "array", "items": {}}
         if origin is tuple and Ellipsis not in members:
-            return {"type": "array", "prefixItems": [self.of(member) for member in members]}
+            return self._of_fixed_length(members)
         if origin in (tuple, list, Sequence):
             return {"type": "array", "items": self.of(members[0])}
         if origin in (dict, Mapping):
@@ -62,6 +62,13 @@ class Schemas:
         if isinstance(hint, type) and issubclass(hint, Enum):
             return {"enum": [member.value for member in hint]}
         return dict(_SCALARS.get(hint, {}))
+
+    def _of_fixed_length(self, members: tuple[Any, ...]) -> Schema:
+        """The schema of a pair or triple; tools that know no prefixItems understand one of members of one type."""
+        if len(set(members)) == 1:
+            count = len(members)
+            return {"type": "array", "items": self.of(members[0]), "minItems": count, "maxItems": count}
+        return {"type": "array", "prefixItems": [self.of(member) for member in members]}
 
     def request(self, kind: Any, taken: Sequence[str]) -> Schema:
         """Return the schema of a request of which only some fields are taken."""

@@ -2,43 +2,51 @@
 
 from __future__ import annotations
 
+import hashlib
+import ipaddress
+import os
+import ssl
+import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from socket import socket
 
 import uvicorn
 
+from monitor.exceptions import InputError
 from monitor.web.app import application
+from monitor.web.note import Note, posted
 from monitor.web.opening import opened
+from monitor.web.rendering import prepare
 from monitor.web.settings import ServerSettings
+
+#: A page asks some ten short queries, and waits so long behind every computation to go on after each (Python's usual
+#: 5 ms make it twice as slow while two trends are computed).
+_SWITCH_S = 0.0005
 
 
 class _Server(uvicorn.Server):
-    """A server that says where it listens once it does."""
+    """A server that says where it listens once it does; ``listens`` is called with the port."""
 
-    def __init__(self, config: uvicorn.Config, settings: ServerSettings, say: Callable[[str], None]) -> None:
+    def __init__(self, config: uvicorn.Config, listens: Callable[[int], None]) -> None:
         super().__init__(config)
-        self._settings = settings
-        self._say = say
+        self._listens = listens
 
     async def startup(self, sockets: list[socket] | None = None) -> None:
         """Listen; the port is the one that the system gave where none was named."""
         await super().startup(sockets)
         for server in self.servers:
             for listening in server.sockets:
-                port = listening.getsockname()[1]
-                scheme = "https" if self._settings.certificate is not None else "http"
-                host = f"[{self._settings.host}]" if ":" in self._settings.host else self._settings.host
-                self._say(
-                    f"{self._settings.database} is served at {scheme}://{host}:{port}/ ; Ctrl-C ends it"
-                )
+                self._listens(int(listening.getsockname()[1]))
                 return
 
 
 def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
     """Serve a database; returns when it was stopped. Raises NotFoundError, StoreError, InputError before it listens."""
-    with tempfile.TemporaryDirectory(prefix="monitor-serve-") as folder:
+    fingerprint = _checked_certificate(settings)
+    with tempfile.TemporaryDirectory(prefix="monitor-serve-") as folder, ExitStack() as beside:
         working_folder = Path(folder).resolve()
         with opened(settings.database, working_folder, must_exist=settings.reading_only) as db:
             gate = application(db, settings, working_folder)
@@ -46,5 +54,59 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
                 gate, host=settings.host, port=settings.port, log_level="warning", server_header=False,
                 ssl_certfile=settings.certificate, ssl_keyfile=settings.key, proxy_headers=False,
             )  # fmt: skip
-            _Server(config, settings, say).run()
+            scheme = "http" if settings.certificate is None else "https"
+
+            def listens(port: int) -> None:
+                note = Note(
+                    _address(scheme, _reached_at(settings.host), port),
+                    gate.sessions.owner_secret,
+                    os.getpid(),
+                    fingerprint,
+                )
+                if not beside.enter_context(posted(settings.database, note)):
+                    say(
+                        "no note could be written beside the database: other commands have to name this address"
+                    )
+                say(
+                    f"{settings.database} is served at {_address(scheme, settings.host, port)}/ ; Ctrl-C ends it"
+                )
+
+            prepare()
+            sys.setswitchinterval(_SWITCH_S)
+            _Server(config, listens).run()
+            beside.close()
             gate.close()
+
+
+def _address(scheme: str, host: str, port: int) -> str:
+    return f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}"
+
+
+def _reached_at(host: str) -> str:
+    """Return the address at which this computer itself reaches a server that listens at ``host``."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host
+    if not address.is_unspecified:
+        return host
+    return "127.0.0.1" if address.version == 4 else "::1"
+
+
+def _checked_certificate(settings: ServerSettings) -> str | None:
+    """Return the SHA-256 of the certificate of TLS. Raises InputError where certificate and key cannot be used."""
+    if settings.certificate is None or settings.key is None:
+        return None
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(
+            settings.certificate, settings.key, password=""
+        )
+        text = settings.certificate.read_text(encoding="ascii", errors="replace")
+        begin = text.index("-----BEGIN CERTIFICATE")
+        first = text[begin : text.index("-----END CERTIFICATE-----", begin) + 25]
+        return hashlib.sha256(ssl.PEM_cert_to_DER_cert(first)).hexdigest()
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--certificate {settings.certificate} and --key {settings.key} do not belong together, or are not in PEM "
+            f"without a passphrase: {error}"
+        ) from error

@@ -7,7 +7,8 @@ import secrets
 import time
 from dataclasses import dataclass
 
-from monitor.web.users import User, Users
+from monitor.web.passwords import Attempts
+from monitor.web.users import User, UserFile, Users
 
 COOKIE = "monitor_session"
 #: A log-in ends after a working day without a request.
@@ -28,15 +29,30 @@ class Sessions:
     With ``users`` None (loopback alone) everybody is ``host_user``, with a key all the same: forms need a proof.
     """
 
-    def __init__(self, users: Users | None, host_user: User) -> None:
-        self.users = users
+    def __init__(self, users: UserFile | None, host_user: User) -> None:
+        self._file = users
         self.host_user = host_user
+        self.attempts = Attempts()
         self._secret = secrets.token_bytes(32)
+        #: What lets the account of the server in: only its note beside the database says it.
+        self.owner_secret = secrets.token_urlsafe(32)
         self._entries: dict[str, _Entry] = {}
 
-    def begin(self, token: str | None = None) -> str | None:
-        """Log in and return the key of the new session; None for a token that nobody has."""
-        user = self.host_user if self.users is None else self.users.of_token(token or "")
+    @property
+    def users(self) -> Users | None:
+        """The users as their file has them now; None where nobody logs in."""
+        return None if self._file is None else self._file.users
+
+    def begin(self, token: str | None = None, name: str = "") -> str | None:
+        """Log in and return the key of the new session; None for a token, or name and password, that nobody has."""
+        users = self.users
+        if users is None:
+            user: User | None = self.host_user
+        elif name:
+            user = users.of_password(name, token or "")
+            self.attempts.note(name, right=user is not None)
+        else:
+            user = users.of_token(token or "")
         if user is None:
             return None
         moment = time.monotonic()
@@ -51,8 +67,18 @@ class Sessions:
         moment = time.monotonic()
         if entry is None or moment - entry.last_seen > LIFETIME_S:
             return None
+        users = self.users
+        if users is not None and users.by_name.get(entry.user.name) != entry.user:
+            return None  # taken out of the file, or another role: log in again
         entry.last_seen = moment
         return entry.user
+
+    def of_bearer(self, token: str) -> User | None:
+        """Return whom a program's token belongs to: the account of the server, or a user."""
+        if hmac.compare_digest(self.owner_secret.encode(), token.encode("utf-8", "surrogatepass")):
+            return self.host_user
+        users = self.users
+        return None if users is None else users.of_token(token)
 
     def end(self, key: str | None) -> None:
         """Log out."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ipaddress
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from monitor.exceptions import InputError
@@ -19,6 +20,7 @@ class ServerSettings:
 
     ``users`` is the file of tokens (None: no log-in, loopback alone). ``certificate`` and ``key`` are PEM files of TLS;
     ``proxy`` is the name under which a proxy that does TLS is reached. ``reading_only`` makes everybody a viewer.
+    ``tolerances`` are the limits by machine type of the configuration.
     """
 
     database: Path
@@ -29,6 +31,7 @@ class ServerSettings:
     key: Path | None = None
     proxy: str | None = None
     reading_only: bool = False
+    tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not 0 <= self.port <= 65535:
@@ -52,7 +55,7 @@ class ServerSettings:
         if self.certificate is None and self.proxy is None:
             raise InputError(
                 f"{self.host} can be reached from other computers, and tokens must not be sent in the clear: name "
-                "--certificate FILE and --key FILE, or with --proxy NAME the host name of a proxy that does TLS"
+                "--certificate FILE and --key FILE, or with --behind-proxy NAME the host name of a proxy that does TLS"
             )
 
     @property

@@ -137,7 +137,7 @@ def test_an_answer_fits_the_schema_that_describes_it(
         ("model history", {"model": "samba@9"}, 404, "samba"),
         ("add effect", {"effect": "nonsense", "to": "samba"}, 400, "nonsense"),
         ("residuals", {"campaign": "load-cell"}, 400, "curve"),
-        ("map", {"campaign": "hidden-spindle-growth", "compensation": "x"}, 400, "takes no 'compensation'"),
+        ("map", {"campaign": "hidden-spindle-growth", "compensation": "x"}, 400, "there are positioning-csv"),
         ("uncertainty", {"campaign": "hidden-spindle-growth", "cluster": "10.0.0.1:1"}, 400, "takes no 'cluster'"),
         ("sql", {"query": "DROP TABLE run"}, 400, "may only read"),
         ("sql", {"query": "SELECT * FROM read_text('/etc/passwd')"}, 400, "cannot be answered"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import stat
 import zipfile
@@ -187,6 +188,7 @@ def test_every_write_is_in_the_audit_with_the_user(guarded: Any) -> None:
 
 def test_read_only_makes_everybody_a_viewer(tmp_path: Path) -> None:
     token = add_user(tmp_path / "users.toml", "ada", "approver")
+    assert token is not None
     assert read_users(tmp_path / "users.toml").looking_only().of_token(token) == User("ada", Role.VIEWER)
 
 
@@ -210,6 +212,55 @@ def test_too_much_is_refused_before_it_is_read(local: Any) -> None:
     assert announced.status_code == 413
     pieces = local.client.post("/model/add", content=iter([big]), headers={"Content-Type": "text/plain"})
     assert pieces.status_code in (403, 413)
+    for media_type in ("application/json", "application/zip", "multipart/form-data; boundary=x"):
+        pieces = local.client.post(
+            "/api/v1/import", content=iter([b"x" * 2**20] * 65), headers={"Content-Type": media_type}
+        )
+        assert pieces.status_code in (400, 413), media_type
+        assert pieces.json()["error"]
+
+
+def test_a_form_without_its_boundary_is_refused(local: Any) -> None:
+    for path in ("/api/v1/import", "/api/v1/verify-certificate"):
+        answer = local.client.post(path, content=b"x", headers={"Content-Type": "multipart/form-data"})
+        assert answer.status_code == 400
+        assert "boundary" in answer.json()["error"]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"", b"PK", b"[]", b"null", b'{"document": []}',
+        b'{"document": {"folders": [5]}}', b'{"document": {"folders": "\\u0000"}}',
+        b'{"document": {}, "tolerances": {"x": {"EXX": -1}}}', b'{"document": {"folders": ["/etc"]}}',
+    ],
+)  # fmt: skip
+def test_a_parcel_that_is_none_is_refused(local: Any, content: bytes) -> None:
+    body = content if content in (b"", b"PK") else _zip(("request.json", content)).getvalue()
+    answer = local.client.post("/api/v1/import", content=body, headers={"Content-Type": "application/zip"})
+    assert 400 <= answer.status_code < 500
+    assert "/served" not in answer.text
+
+
+@pytest.mark.parametrize("label", ["../../evil", "/etc/passwd", "..", "C:\\evil", "a/../../evil"])
+def test_a_label_of_a_parcel_names_no_file_of_the_server(local: Any, label: str) -> None:
+    """It reads what came with the parcel under the last part of the label, and writes below its own folder."""
+    for question, field in (
+        ("verify-certificate", "file"),
+        ("export", "folder"),
+        ("certificate-template", "out"),
+    ):
+        document = json.dumps({"document": {field: label}}).encode()
+        body = _zip(("request.json", document)).getvalue()
+        answer = local.client.post(
+            f"/api/v1/{question}", content=body, headers={"Content-Type": "application/zip"}
+        )
+        assert answer.status_code in (200, 400, 404, 422), answer.text
+        if answer.status_code == 200:
+            names = zipfile.ZipFile(io.BytesIO(answer.content)).namelist()
+            assert all(name == "answer.json" or name.startswith(f"{field}/") for name in names)
+        assert b"root:" not in answer.content
+    assert not Path("/etc/passwd.part").exists()
 
 
 def _zip(*members: tuple[str, bytes], link: str = "") -> io.BytesIO:

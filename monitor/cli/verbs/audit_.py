@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow import keeping
 
@@ -22,7 +22,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        answer = keeping.audit(db, keeping.AuditRequest(options.last, options.check))
+        answer = ask(db, keeping.audit, keeping.AuditRequest(options.last, options.check))
     if options.json:
         output.document(answer)
     else:

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow import keeping
 
@@ -20,7 +20,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("copying"):
-        answer = keeping.backup(db, keeping.BackupRequest(options.target))
+        answer = ask(db, keeping.backup, keeping.BackupRequest(options.target))
     if options.json:
         output.document(answer)
     else:

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from datetime import datetime
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.intake import campaigns
 
@@ -19,7 +19,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        answer = campaigns.campaigns(db)
+        answer = ask(db, campaigns.campaigns)
     if options.json:
         output.document(answer)
         return 0

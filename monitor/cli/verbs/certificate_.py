@@ -8,7 +8,7 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.configuration import configuration
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
 from monitor.exceptions import InputError
@@ -162,7 +162,7 @@ def _issue(options: Namespace) -> int:
     from monitor.workflow.certificate.issue import issue
 
     with opened(options, threads=1) as db, output.working("issuing"):
-        answer = issue(db, request)
+        answer = ask(db, issue, request)
     return _issued(answer, options.json)
 
 
@@ -173,7 +173,7 @@ def _amend(options: Namespace) -> int:
     from monitor.workflow.certificate.issue import amend
 
     with opened(options, threads=1) as db, output.working("issuing"):
-        answer = amend(db, request)
+        answer = ask(db, amend, request)
     return _issued(answer, options.json)
 
 
@@ -202,14 +202,14 @@ def _show(options: Namespace) -> int:
     for _, path, write in files:
         if path is not None:
             with opened(options) as db:
-                written = write(db, CertificateFileRequest(options.number, path))
+                written = ask(db, write, CertificateFileRequest(options.number, path))
             output.document(written) if options.json else output.say(written.file)
             return 0
     with opened(options) as db:
         answer: CertificateShowAnswer | CertificatesAnswer = (
-            list_certificates(db, CertificatesRequest())
+            ask(db, list_certificates, CertificatesRequest())
             if options.number is None
-            else show_certificate(db, CertificateShowRequest(options.number))
+            else ask(db, show_certificate, CertificateShowRequest(options.number))
         )
     if options.json:
         output.document(answer)
@@ -224,7 +224,7 @@ def _remake(options: Namespace) -> int:
     from monitor.workflow.certificate.remaking import remake
 
     with opened(options) as db, output.working("making it again"):
-        answer = remake(db, request)
+        answer = ask(db, remake, request)
     if options.json:
         output.document(answer)
     else:
@@ -239,7 +239,7 @@ def _verify(options: Namespace) -> int:
     from monitor.workflow.certificate.verification import verify_file
 
     with opened(options) as db, output.working("verifying"):
-        answer = verify_file(db, VerificationRequest(options.file, options.trust, options.expect))
+        answer = ask(db, verify_file, VerificationRequest(options.file, options.trust, options.expect))
     if options.json:
         output.document(answer)
         return 0 if answer.ok else 1
@@ -283,7 +283,7 @@ def _withdraw(options: Namespace) -> int:
     from monitor.workflow.certificate.issue import withdraw
 
     with opened(options) as db:
-        answer = withdraw(db, WithdrawalRequest(options.number, options.reason))
+        answer = ask(db, withdraw, WithdrawalRequest(options.number, options.reason))
     if options.json:
         output.document(answer)
     else:

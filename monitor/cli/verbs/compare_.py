@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from monitor.cli import output, residual_output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.explain.compare import compare
 from monitor.workflow.explain.compare_answer import CompareAnswer, CurveComparison, MachinePart
@@ -37,7 +37,7 @@ def run(options: Namespace) -> int:
     request = CompareRequest(options.campaign, options.model, options.figures)
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options) as db, output.working("comparing"):
-        answer = compare(db, request)
+        answer = ask(db, compare, request)
     if options.json:
         output.document(answer)
         return 0

@@ -111,7 +111,9 @@ def _call(verb: ModuleType, name: str, database: str, arguments: list[str], sile
     """Run a verb as a user would type it."""
     parser = Parser(prog=f"monitor {name}")
     verb.options(parser)
-    options = parser.parse_args(arguments, Namespace(db=database, wait=PATIENCE_S))
+    options = parser.parse_args(
+        arguments, Namespace(db=database, wait=PATIENCE_S, server=None, server_token=None)
+    )
     function = getattr(options, "run", None) or verb.run
     with contextlib.redirect_stdout(io.StringIO()) if silent else contextlib.nullcontext():
         return int(function(options))

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
-from monitor.cli.database import check_path, opened
+from monitor.cli.database import ask, check_path, opened
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
 from monitor.workflow.effects import (
@@ -40,9 +40,9 @@ def options(parser: ArgumentParser) -> None:
 
 def _answer(options: Namespace) -> EffectsAnswer:
     if options.campaign is not None:
-        check_path(options.db, may_be_new=False)
+        check_path(options.db, may_be_new=options.server is not None)
         with opened(options) as db:
-            return campaign_effects(db, CampaignEffectsRequest(options.campaign, options.text))
+            return ask(db, campaign_effects, CampaignEffectsRequest(options.campaign, options.text))
     if options.folder is not None:
         return effects(EffectsRequest(folder=Path(options.folder), text=options.text))
     return effects(EffectsRequest(topology=options.topology, text=options.text))

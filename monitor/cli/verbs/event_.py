@@ -9,7 +9,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.moments import moment
 from monitor.cli.parser import common
 from monitor.workflow.events import EventRequest, event
@@ -43,7 +43,7 @@ def run(options: Namespace) -> int:
         options.kind,
     )
     with opened(options) as db:
-        answer = event(db, request)
+        answer = ask(db, event, request)
     if options.json:
         output.document(answer)
     else:

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import explain_output, output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
 from monitor.workflow.explain.explain import explain
@@ -34,7 +34,9 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options) as db, output.working("searching"):
-        answer = explain(db, ExplainRequest(options.campaign, options.model, options.rate, options.figures))
+        answer = ask(
+            db, explain, ExplainRequest(options.campaign, options.model, options.rate, options.figures)
+        )
     if options.json:
         output.document(answer)
     else:

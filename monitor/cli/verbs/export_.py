@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow import keeping
 
@@ -38,7 +38,7 @@ def run(options: Namespace) -> int:
     tables = None if options.tables is None else tuple(name.strip() for name in options.tables.split(","))
     request = keeping.ExportRequest(options.folder, options.format_ or named, tables, options.machine)
     with opened(options) as db, output.working("writing"):
-        answer = keeping.export(db, request)
+        answer = ask(db, keeping.export, request)
     if options.json:
         output.document(answer)
     else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
 from monitor.cli.trend_output import weekly_lines
@@ -43,7 +43,7 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     request = FleetRequest(options.model, options.top, options.weekly_looks)
     with opened(options, judging=True) as db, output.working("summing"):
-        answer = fleet(db, request)
+        answer = ask(db, fleet, request)
     if options.json:
         output.document(answer)
         return 0

@@ -6,7 +6,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import identify_output, output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
@@ -41,7 +41,7 @@ def run(options: Namespace) -> int:
     if options.campaign is None:
         return _all(options)
     with opened(options) as db, output.working("identifying"):
-        answer = identify(db, IdentifyRequest(options.campaign, options.model, options.number))
+        answer = ask(db, identify, IdentifyRequest(options.campaign, options.model, options.number))
     if options.json:
         output.document(answer)
     else:
@@ -54,9 +54,9 @@ def _all(options: Namespace) -> int:
     if options.number is not None:
         raise InputError(f"--run {options.number} is a run of one campaign: name it")
     with opened(options) as db:
-        total = len(campaigns(db).campaigns)
+        total = len(ask(db, campaigns).campaigns)
         with output.stepping("identifying", total) as progress:
-            answer = identify_all(db, IdentifyAllRequest(options.model), progress=progress)
+            answer = ask(db, identify_all, IdentifyAllRequest(options.model), progress=progress)
     if options.json:
         output.document(answer)
     else:
@@ -71,7 +71,7 @@ def _stepwise(options: Namespace) -> int:
     if options.campaign is None:
         raise InputError("--stepwise shows one run: name its campaign")
     with opened(options) as db, output.working("identifying step by step"):
-        answer = identify_stepwise(db, StepwiseRequest(options.campaign, options.model, options.number))
+        answer = ask(db, identify_stepwise, StepwiseRequest(options.campaign, options.model, options.number))
     if options.json:
         output.document(answer)
     else:

@@ -10,7 +10,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.intake.importing import ImportRequest, import_folders
 
@@ -25,7 +25,7 @@ def options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     request = ImportRequest(options.folder)
     with opened(options) as db, output.stepping("importing", len(request.folders)) as progress:
-        answer = import_folders(db, request, progress=progress)
+        answer = ask(db, import_folders, request, progress=progress)
     if options.json:
         output.document(answer)
     else:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.volumetric.answer import VolumetricAnswer
 from monitor.workflow.volumetric.request import COMPENSATION_FORMATS, POINTS, VolumetricRequest
@@ -59,7 +59,7 @@ def run(options: Namespace) -> int:
     )
     # One transaction: files that cannot be written leave no result behind.
     with opened(options) as db, output.working("mapping"):
-        answer = volumetric_map(db, request)
+        answer = ask(db, volumetric_map, request)
     if options.json:
         output.document(answer)
     else:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common, described
 from monitor.cli.residual_output import files, four_digits
 from monitor.workflow.explain.request import HistoryRequest
@@ -81,7 +81,7 @@ def options(parser: ArgumentParser) -> None:
 
 def _list(options: Namespace) -> int:
     with opened(options) as db:
-        answer = list_all_models(db)
+        answer = ask(db, list_all_models)
     if options.json:
         output.document(answer)
         return 0
@@ -100,7 +100,7 @@ def _list(options: Namespace) -> int:
 
 def _show(options: Namespace) -> int:
     with opened(options) as db:
-        answer = show_model(db, ShowModelRequest(options.name))
+        answer = ask(db, show_model, ShowModelRequest(options.name))
     if options.json:
         output.document(answer)
         return 0
@@ -120,7 +120,7 @@ def _add(options: Namespace) -> int:
 
     request = AddEffectRequest(options.effect, options.to, options.as_, options.note, options.campaign)
     with opened(options) as db:
-        changed = affected(db, request)
+        changed = ask(db, affected, request)
         if not options.json and (changed.in_use or options.dry_run):
             _will_change(changed)
         if options.dry_run:
@@ -128,7 +128,7 @@ def _add(options: Namespace) -> int:
                 output.document(changed)
             return 0
         with output.working("fitting"):
-            answer = add_effect(db, request)
+            answer = ask(db, add_effect, request)
     return _changed(answer, options.json)
 
 
@@ -154,7 +154,7 @@ def _will_change(changed: AffectedAnswer) -> None:
 def _use(options: Namespace) -> int:
     request = UseModelRequest(options.name, options.machine, options.reason)
     with opened(options) as db, output.working("identifying"):
-        answer = use_model(db, request)
+        answer = ask(db, use_model, request)
     if options.json:
         output.document(answer)
         return 0
@@ -172,7 +172,7 @@ def _remove(options: Namespace) -> int:
     from monitor.workflow.model.change import remove_effect
 
     with opened(options) as db:
-        answer = remove_effect(db, RemoveEffectRequest(options.effect, options.from_, options.as_))
+        answer = ask(db, remove_effect, RemoveEffectRequest(options.effect, options.from_, options.as_))
     return _changed(answer, options.json)
 
 
@@ -195,7 +195,7 @@ def _history(options: Namespace) -> int:
     from monitor.workflow.explain.versions import history
 
     with opened(options) as db, output.working("fitting every version"):
-        answer = history(db, HistoryRequest(options.name, options.campaign, options.figures))
+        answer = ask(db, history, HistoryRequest(options.name, options.campaign, options.figures))
     if options.json:
         output.document(answer.steps)
         return 0

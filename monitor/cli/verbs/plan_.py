@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.residual_output import files
 from monitor.cli.screen import on_screen
@@ -80,7 +80,7 @@ def run(options: Namespace) -> int:
     )  # fmt: skip
     # One transaction: files that cannot be written leave no result behind.
     with opened(options) as db, output.working("planning"):
-        answer = plan(db, request)
+        answer = ask(db, plan, request)
     if options.json:
         output.document(answer)
     elif isinstance(answer, AnglePlanAnswer):

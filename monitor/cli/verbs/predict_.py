@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.predict.predict import predict
 from monitor.workflow.predict.request import PredictRequest
@@ -30,7 +30,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("predicting"):
-        answer = predict(db, PredictRequest(options.campaign, options.model, options.of))
+        answer = ask(db, predict, PredictRequest(options.campaign, options.model, options.of))
     if options.json:
         output.document(answer)
         return 0

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from monitor.cli import output
 from monitor.cli.configuration import configuration
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
 from monitor.workflow.health.mail import mail_report, read_mail_settings
@@ -76,9 +76,9 @@ def run(options: Namespace) -> int:
         options.workers,
     )
     with opened(options, threads=1, judging=True) as db:
-        total = 1 if options.machine else len(machines(db).rows)
+        total = 1 if options.machine else len(ask(db, machines).rows)
         with output.stepping("reporting", total) as progress:
-            answer = replace(report(db, request, progress=progress), mailed_to=())
+            answer = replace(ask(db, report, request, progress=progress), mailed_to=())
     unsent = None
     try:
         if options.mail is not None:

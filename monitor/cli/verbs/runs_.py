@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.intake import campaigns
 
@@ -21,7 +21,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        answer = campaigns.runs(db, campaigns.RunsRequest(options.campaign))
+        answer = ask(db, campaigns.runs, campaigns.RunsRequest(options.campaign))
     if options.json:
         output.document(answer)
     else:

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
-from monitor.store import Database
 from monitor.workflow.selections.request import (
     SelectionAnswer,
     SelectionRequest,
@@ -26,6 +26,10 @@ from monitor.workflow.selections.request import (
     SideBySideRequest,
 )
 from monitor.workflow.selections.select import select, selections
+
+if TYPE_CHECKING:
+    from monitor.store import Database
+    from monitor.web.client import Server
 
 EXAMPLE = (
     'monitor select hot-cold --name hot-cold-star --where "hours >= 6"\n'
@@ -66,16 +70,18 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def _answer(db: Database, options: Namespace) -> SelectionAnswer | SideBySideAnswer | SelectionsAnswer:
+def _answer(
+    db: Database | Server, options: Namespace
+) -> SelectionAnswer | SideBySideAnswer | SelectionsAnswer:
     if options.name is not None:
-        return select(db, SelectionRequest(options.campaign, options.name, options.where))
+        return ask(db, select, SelectionRequest(options.campaign, options.name, options.where))
     if options.compare is not None:
         names = tuple(name.strip() for name in options.compare.split(",") if name.strip())
         # Loaded here: what compares waits for the solver, what selects or lists does not.
         from monitor.workflow.selections.side_by_side import side_by_side
 
-        return side_by_side(db, SideBySideRequest(names, options.model, figures=options.figures))
-    return selections(db, SelectionsRequest(options.campaign))
+        return ask(db, side_by_side, SideBySideRequest(names, options.model, figures=options.figures))
+    return ask(db, selections, SelectionsRequest(options.campaign))
 
 
 def _comparison(answer: SideBySideAnswer) -> None:

@@ -12,7 +12,7 @@ from datetime import date
 from pathlib import Path
 
 from monitor.cli import output
-from monitor.cli.database import check_path, opened
+from monitor.cli.database import ask, check_path, opened
 from monitor.cli.moments import moment
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
@@ -101,9 +101,9 @@ def _like(options: Namespace) -> int:
         if Path(options.like).exists():
             answer = simulate_like(request, progress=progress)
         else:
-            check_path(options.db, may_be_new=False)
+            check_path(options.db, may_be_new=options.server is not None)
             with opened(options) as db:
-                answer = simulate_like_stored(db, request, progress=progress)
+                answer = ask(db, simulate_like_stored, request, progress=progress)
     if options.json:
         output.document(answer)
     else:

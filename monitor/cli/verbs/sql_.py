@@ -11,7 +11,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.query import SqlRequest, TableAnswer, sql
 
@@ -37,7 +37,7 @@ def run(options: Namespace) -> int:
     as_table = not (options.csv or options.json)
     limit = SHOWN if options.limit is None and as_table else options.limit
     with opened(options) as db:
-        answer = sql(db, SqlRequest(query, limit))
+        answer = ask(db, sql, SqlRequest(query, limit))
     if options.json:
         output.document(answer)
     elif options.csv:

@@ -11,7 +11,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
 from monitor.workflow.run_statistics.answer import DIFFERENT, NoVectorTest, StatisticsAnswer, VectorTestAnswer
@@ -52,7 +52,7 @@ def run(options: Namespace) -> int:
     )
     # One transaction: figures that cannot be drawn leave no result behind.
     with opened(options, threads=1) as db, output.working("computing"):
-        answer = stats(db, request)
+        answer = ask(db, stats, request)
     if options.json:
         output.document(answer)
         return 0

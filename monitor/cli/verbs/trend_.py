@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from monitor.cli import output, trend_output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.moments import moment
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
@@ -78,7 +78,7 @@ def run(options: Namespace) -> int:
         weekly_looks=options.weekly_looks,
     )
     with opened(options, judging=True) as db, output.working("following"):
-        answer = trend(db, request)
+        answer = ask(db, trend, request)
     if options.json:
         output.document(answer)
     else:

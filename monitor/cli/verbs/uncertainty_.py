@@ -9,7 +9,7 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.behind import add_behind, further_sources
 from monitor.cli.budget_output import behind
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.cli.screen import on_screen
 from monitor.readers import read_linear_axes
@@ -82,7 +82,7 @@ def run(options: Namespace) -> int:
         holds_for=options.holds_for,
     )
     with opened(options) as db, output.working("propagating"):
-        answer = uncertainty(db, request)
+        answer = ask(db, uncertainty, request)
     if options.json:
         output.document(answer)
         return 0

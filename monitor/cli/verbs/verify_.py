@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow import keeping
 
@@ -27,7 +27,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("verifying"):
-        answer = keeping.verify(db, keeping.VerifyRequest(options.anchor, options.recompute))
+        answer = ask(db, keeping.verify, keeping.VerifyRequest(options.anchor, options.recompute))
     if options.json:
         output.document(answer)
     else:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from monitor.cli import output
 from monitor.cli.configuration import configuration
-from monitor.cli.database import opened
+from monitor.cli.database import opened_file, refuse_server
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
 
@@ -88,10 +88,12 @@ def run(options: Namespace) -> int:
 
 def _look(options: Namespace, request: WatchRequest) -> int:
     """Look once and say what came; exit status 2 where something was refused."""
+    from monitor.web.access import NOT_OFFERED
     from monitor.workflow.watching.letter import lines_of
     from monitor.workflow.watching.watch import watch
 
-    with opened(options, threads=1, judging=True) as db, output.working("taking in"):
+    refuse_server(options, NOT_OFFERED["watch"])
+    with opened_file(options, threads=1, judging=True) as db, output.working("taking in"):
         answer = watch(db, request)
     if options.json:
         output.document(answer)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from monitor.cli import output
-from monitor.cli.database import opened
+from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.intake.withdrawals import WithdrawRequest, withdraw
 
@@ -20,7 +20,7 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     with opened(options) as db:
-        answer = withdraw(db, WithdrawRequest(options.campaign, options.reason))
+        answer = ask(db, withdraw, WithdrawRequest(options.campaign, options.reason))
     if options.json:
         output.document(answer)
         return 0

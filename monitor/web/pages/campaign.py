@@ -18,6 +18,9 @@ from monitor.workflow.run_statistics.answer import StatisticsAnswer
 from monitor.workflow.uncertainty.answer import UncertaintyAnswer
 from monitor.workflow.uncertainty.cloud import CloudAnswer
 
+#: Campaigns of the list: the latest; a machine's own stand on its page.
+MOST_LISTED = 1000
+
 
 def routes() -> APIRouter:
     """Return the routes of the list of campaigns and of the page of one."""
@@ -27,7 +30,10 @@ def routes() -> APIRouter:
     def campaigns(request: Request) -> Response:
         """List the campaigns."""
         return page(
-            request, "campaigns.html", answer=request.app.state.asker(request.state.user, "campaigns")
+            request,
+            "campaigns.html",
+            most=MOST_LISTED,
+            answer=request.app.state.asker(request.state.user, "campaigns", {"latest": MOST_LISTED}),
         )
 
     @router.get("/campaign")
@@ -36,7 +42,7 @@ def routes() -> APIRouter:
     ) -> Response:
         """Show a campaign; two of its parameters with the regions that hold all of them."""
         ask, user, desk = request.app.state.asker, request.state.user, request.app.state.desk
-        row = next((row for row in ask(user, "campaigns").campaigns if row.campaign == name), None)
+        row = next(iter(ask(user, "campaigns", {"campaign": name}).campaigns), None)
         if row is None:
             raise NotFoundError(f"there is no campaign '{name}'; the page Campaigns lists them")
         if row.rows is not None:

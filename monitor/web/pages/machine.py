@@ -51,7 +51,7 @@ def routes() -> APIRouter:
         names = list(values.parameters)
         _check_names(values, parameter, campaign, may_lack=not ticket.is_done)
         shown = (parameter or _most_urgent(request, name, names)) if names else ""
-        campaigns = [row for row in ask(user, "campaigns").campaigns if row.machine == name]
+        campaigns = ask(user, "campaigns", {"machine": name}).campaigns
         return page(
             request, "machine.html",
             name=name, parameter=shown, parameters=names, values=values, trend=trend,

@@ -41,7 +41,7 @@ def routes() -> APIRouter:
     ) -> Response:
         """Compare a model with a campaign; with an effect tried beside it."""
         ask, user = request.app.state.asker, request.state.user
-        row = next((row for row in ask(user, "campaigns").campaigns if row.campaign == campaign), None)
+        row = next(iter(ask(user, "campaigns", {"campaign": campaign}).campaigns), None)
         if row is None:
             raise NotFoundError(f"there is no campaign '{campaign}'; the page Campaigns lists them")
         answers = _Answers(request, campaign, model, effect, driver, in_machine=row.rows is None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from monitor.exceptions import InputError
 from monitor.store import (
     CampaignRow,
     Database,
@@ -18,11 +19,27 @@ from monitor.store import (
 
 
 @dataclass(frozen=True)
+class CampaignsRequest:
+    """All campaigns, or those of a ``machine``, or the one of a name, or only the ``latest`` so many of import."""
+
+    machine: str | None = None
+    campaign: str | None = None
+    latest: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.latest is not None and not 1 <= self.latest <= 1_000_000:
+            raise InputError(f"latest {self.latest}: the number of campaigns, from 1 to 1000000")
+
+
+@dataclass(frozen=True)
 class CampaignsAnswer:
     """The campaigns that count, in the order of import, and those that were withdrawn."""
 
     campaigns: tuple[CampaignRow, ...]
     withdrawn: tuple[WithdrawnCampaign, ...]
+
+
+_ALL = CampaignsRequest()
 
 
 @dataclass(frozen=True)
@@ -41,9 +58,15 @@ class RunsAnswer:
     notes: tuple[str, ...]
 
 
-def campaigns(db: Database) -> CampaignsAnswer:
+def campaigns(db: Database, request: CampaignsRequest = _ALL) -> CampaignsAnswer:
     """List the campaigns in the database, and those that were withdrawn."""
-    return CampaignsAnswer(list_campaigns(db), list_withdrawn(db))
+    rows = list_campaigns(db, request.machine, request.campaign, request.latest)
+    withdrawn = [
+        row
+        for row in list_withdrawn(db)
+        if request.machine in (None, row.machine) and request.campaign in (None, row.campaign)
+    ]
+    return CampaignsAnswer(rows, tuple(withdrawn))
 
 
 def runs(db: Database, request: RunsRequest) -> RunsAnswer:

@@ -1,0 +1,77 @@
+"""How fresh an answer is: what was asked before is answered again until something is written that may change it.
+
+An import changes the answers about its machines and about the fleet, and none about other machines or campaigns; so a
+page stays quick while somebody imports. Every other write changes everything.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping
+from typing import Any
+
+#: Questions that read only, take milliseconds, and stand on pages that many people open.
+REMEMBERED = frozenset({"campaigns", "machines", "runs", "values"})
+#: Questions that may identify what nobody has identified yet.
+IDENTIFYING = frozenset(
+    {"compare", "explain", "identify", "report", "residuals", "statistics", "trend", "uncertainty"}
+)
+#: Their answers are made of identified values.
+_OF_VALUES = frozenset({"fleet", "values"})
+#: Answers that are held; the one that was not asked for longest is forgotten.
+_MOST = 256
+
+Stamp = tuple[int, ...]
+
+
+class Freshness:
+    """Counts what was written, and holds answers as long as they are true."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._all = self._imports = self._identified = 0
+        self._of_machine: dict[str, int] = {}
+        self._answers: OrderedDict[tuple[str, str, Stamp], Any] = OrderedDict()
+
+    def stamp(self, question: str, document: Mapping[str, Any]) -> Stamp:
+        """Return what changes when the answer to a question may be another."""
+        with self._lock:
+            identified = self._identified if question in _OF_VALUES else 0
+            if isinstance(document.get("campaign"), str):
+                return (self._all, 0, identified, 0)
+            machine = document.get("machine")
+            if isinstance(machine, str):
+                return (self._all, 0, identified, self._of_machine.get(machine, 0))
+            return (self._all, self._imports, identified, 0)
+
+    def wrote(self, machines: set[str] | None) -> None:
+        """Note a write that concerns these machines, or everything (None)."""
+        with self._lock:
+            self._imports += 1
+            if machines is None:
+                self._all += 1
+            for machine in machines or ():
+                self._of_machine[machine] = self._of_machine.get(machine, 0) + 1
+
+    def identified(self) -> None:
+        """Note that values may have come that were not there."""
+        with self._lock:
+            self._identified += 1
+
+    def recall(self, question: str, document: Mapping[str, Any]) -> tuple[tuple[str, str, Stamp], Any]:
+        """Return the key of a question now, and its answer where it was asked before (else None)."""
+        key = (question, json.dumps(document, sort_keys=True, default=str), self.stamp(question, document))
+        with self._lock:
+            answer = self._answers.get(key)
+            if answer is not None:
+                self._answers.move_to_end(key)
+            return key, answer
+
+    def remember(self, key: tuple[str, str, Stamp], answer: Any) -> None:
+        """Hold an answer under the key that its question had before it was asked."""
+        with self._lock:
+            self._answers[key] = answer
+            while len(self._answers) > _MOST:
+                self._answers.popitem(last=False)
