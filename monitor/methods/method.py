@@ -132,6 +132,47 @@ class AngleCandidates(Protocol):
 
 
 @dataclass(frozen=True)
+class AxisTest:
+    """A test of positioning in one setup and run: ``position`` (n,) and ``deviation`` (n,) in mm, or in rad where
+    ``angular``, in the order of measuring. ``axes`` are those that move: one, or several along a diagonal.
+
+    ``u_reading`` is the standard uncertainty of a reading, ``u_gain`` that of the instrument's unit.
+    """
+
+    setup: str
+    run: int
+    axes: tuple[str, ...]
+    position: Array
+    deviation: Array
+    u_reading: float
+    u_gain: float
+    angular: bool
+
+
+@dataclass(frozen=True)
+class CircleTest:
+    """A circular test in one setup and run: ``angle`` (n,) rad from the first axis of the ``plane`` to the second,
+    ``deviation`` (n,) mm of the length from ``radius`` mm, in the order of measuring; ``u_radius`` is NaN where the bar
+    was not calibrated."""
+
+    setup: str
+    run: int
+    plane: tuple[str, str]
+    angle: Array
+    deviation: Array
+    radius: float
+    u_reading: float
+    u_radius: float
+
+
+@dataclass(frozen=True)
+class StandardTests(Able):
+    """Rows are tests that standards evaluate; ``tests`` are those of a problem."""
+
+    tests: Callable[[ChainProblem], tuple[AxisTest | CircleTest, ...]]
+
+
+@dataclass(frozen=True)
 class Nouns:
     """What a ``target`` and a ``row`` of a campaign are called, in the singular."""
 
@@ -160,6 +201,7 @@ class Method:
     trend: Able | Unable
     certificate: Able | Unable
     rehearsal: Rehearsal | Unable
+    standards: StandardTests | Unable
 
     @property
     def own_model(self) -> Model:
@@ -202,6 +244,9 @@ def nothing_taken_up(problem: ChainProblem) -> tuple[TakenUp, ...]:
 
 
 NO_REHEARSAL = Unable("there is no virtual machine for it")
+NO_STANDARDS = Unable(
+    "its rows are no test of ISO 230-2, -4 or -6; set up a laser or a ball bar (method instruments) for that"
+)
 NO_STEPWISE = Unable("all unknowns are identified at once, so type identify without --stepwise")
 NO_TOUCH_PLAN = Unable(
     "plan works for touches of balls and for angles of a workpiece's table only; identify lists what the present "
@@ -236,6 +281,7 @@ class ChainMethod(Method):
     trend: Able | Unable = Able()
     certificate: Able | Unable = Able()
     rehearsal: Rehearsal | Unable = NO_REHEARSAL
+    standards: StandardTests | Unable = NO_STANDARDS
 
     def identify(
         self, campaign: Campaign, model: Model | None = None, solve: Solver = solve_problem
@@ -282,3 +328,4 @@ class CurveMethod(Method):
     trend: Able | Unable = NO_MACHINE
     certificate: Able | Unable = NO_MACHINE
     rehearsal: Rehearsal | Unable = NO_REHEARSAL
+    standards: StandardTests | Unable = NO_STANDARDS

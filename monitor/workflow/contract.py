@@ -93,6 +93,7 @@ QUESTIONS = {
         "simulate like a folder": "likeness:simulate_like",
         "simulate like a campaign": "likeness:simulate_like_stored",
         "sql": "query:sql",
+        "standards": "standards.standards:standards",
         "statistics": "run_statistics.statistics:stats",
         "trend": "trend.trends:trend",
         "uncertainty": "uncertainty.evaluation:uncertainty",

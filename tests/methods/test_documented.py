@@ -30,6 +30,7 @@ VERBS: tuple[tuple[str, Callable[[Method], Ability] | None], ...] = (
     ("`trend`", lambda method: method.trend),
     ("`certificate`", lambda method: method.certificate),
     ("`simulate`", lambda method: method.rehearsal),
+    ("`standards`", lambda method: method.standards),
 )
 
 
