@@ -166,6 +166,40 @@ class CircleTest:
 
 
 @dataclass(frozen=True)
+class InstrumentShare:
+    """What one instrument says of the k base parameters of a run, in internal units.
+
+    ``name`` as people call it, its ``setups``, ``numbers`` read and ``chi_square`` of their weighted residuals.
+    ``variance`` (k,) is its part of the variance in the joint fit; ``alone`` (k,) and ``alone_variance`` (k,) are the
+    estimate of its readings by themselves, NaN where they do not determine a parameter.
+    """
+
+    name: str
+    setups: tuple[str, ...]
+    numbers: int
+    chi_square: float
+    variance: Array
+    alone: Array
+    alone_variance: Array
+
+
+class SharesOf(Protocol):
+    """Gives what each instrument says of the parameters of a ``run``, and their variance (k,) by what is known
+    beforehand of the setups."""
+
+    def __call__(
+        self, problem: ChainProblem, solution: Solution, run: int
+    ) -> tuple[tuple[InstrumentShare, ...], Array]: ...
+
+
+@dataclass(frozen=True)
+class Instruments(Able):
+    """Several instruments measure one machine; ``shares`` says what each of them does for a run."""
+
+    shares: SharesOf
+
+
+@dataclass(frozen=True)
 class StandardTests(Able):
     """Rows are tests that standards evaluate; ``tests`` are those of a problem."""
 
@@ -202,6 +236,7 @@ class Method:
     certificate: Able | Unable
     rehearsal: Rehearsal | Unable
     standards: StandardTests | Unable
+    instruments: Instruments | Unable
 
     @property
     def own_model(self) -> Model:
@@ -247,6 +282,7 @@ NO_REHEARSAL = Unable("there is no virtual machine for it")
 NO_STANDARDS = Unable(
     "its rows are no test of ISO 230-2, -4 or -6; set up a laser or a ball bar (method instruments) for that"
 )
+ONE_INSTRUMENT = Unable("one instrument measured all of it; uncertainty has the budget of its sources")
 NO_STEPWISE = Unable("all unknowns are identified at once, so type identify without --stepwise")
 NO_TOUCH_PLAN = Unable(
     "plan works for touches of balls and for angles of a workpiece's table only; identify lists what the present "
@@ -282,6 +318,7 @@ class ChainMethod(Method):
     certificate: Able | Unable = Able()
     rehearsal: Rehearsal | Unable = NO_REHEARSAL
     standards: StandardTests | Unable = NO_STANDARDS
+    instruments: Instruments | Unable = ONE_INSTRUMENT
 
     def identify(
         self, campaign: Campaign, model: Model | None = None, solve: Solver = solve_problem
@@ -329,3 +366,4 @@ class CurveMethod(Method):
     certificate: Able | Unable = NO_MACHINE
     rehearsal: Rehearsal | Unable = NO_REHEARSAL
     standards: StandardTests | Unable = NO_STANDARDS
+    instruments: Instruments | Unable = ONE_INSTRUMENT

@@ -118,11 +118,14 @@ def _axis_answer(test: AxisTest, evaluated: Positioning) -> StandardTest:
     )
     targets = tuple(
         TargetFigures(
-            place(float(position)),
-            *(show(float(value)) for value in evaluated.mean[:, index]),
-            *(show(float(value)) for value in evaluated.deviation[:, index]),
-            show(float(evaluated.mean[0, index] - evaluated.mean[1, index])),
-            *(int(count) for count in evaluated.runs[:, index]),
+            position=place(float(position)),
+            mean_forward=show(float(evaluated.mean[0, index])),
+            mean_backward=show(float(evaluated.mean[1, index])),
+            s_forward=show(float(evaluated.deviation[0, index])),
+            s_backward=show(float(evaluated.deviation[1, index])),
+            reversal=show(float(evaluated.mean[0, index] - evaluated.mean[1, index])),
+            runs_forward=int(evaluated.runs[0, index]),
+            runs_backward=int(evaluated.runs[1, index]),
         )
         for index, position in enumerate(evaluated.targets)
     )

@@ -1,0 +1,102 @@
+"""What each instrument does for each parameter: its part of the variance in the joint fit, and what it says alone.
+
+The joint estimate is C J' r, linear in the whitened readings r, each of variance 1: so the variance of a parameter is
+the sum of the squares of its row of C J', and the readings of one instrument have their part of that sum (GUM, 5.1.3).
+What an instrument says alone is one Gauss-Newton step from the joint point on its own rows, exact to products of the
+differences (1 µrad times 100 µrad). Setups whose ``instrument`` is written the same are one instrument.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.methods.chain.least_squares import MEMBER_SHARE, RANK_TOLERANCE, Solution
+from monitor.methods.chain.problem import ChainProblem
+from monitor.methods.instruments.problem import InstrumentProblem
+from monitor.methods.method import InstrumentShare
+from monitor.records import Array
+
+#: Of an unknown that an instrument does not show, its rows have this part of the derivatives, or less, by rounding.
+ROUNDING = 1e-7
+
+
+def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[InstrumentShare, ...], Array]:
+    """The share of every instrument in a run, and the part (k,) of the variance from what is known beforehand."""
+    assert isinstance(problem, InstrumentProblem)
+    index = int(np.searchsorted(problem.runs, run))
+    jacobian = np.hstack([solution.last.local[index], solution.last.common[index]])
+    residual = solution.last.residual[index]
+    count = len(problem.base_names)
+    inverse, _ = _inverse(jacobian)
+    joint = solution.local[index, :count]
+    free = solution.local_free[index, :count]
+    squares = np.where(free[:, None], inverse[:count] ** 2, np.nan)
+    extras = len(residual) - len(problem.extra_names)
+    several = len(problem.parts) > 1
+    instruments = []
+    for name, setups in _instruments(problem).items():
+        rows = _whitened_rows(problem, run, setups)
+        own = [
+            extras + number
+            for number, extra in enumerate(problem.extra_names)
+            if not several or any(extra.startswith(f"{setup} ") for setup in setups)
+        ]
+        mine = np.concatenate([rows, np.array(own, dtype=np.int64)])
+        of_mine = jacobian[mine]
+        is_rounding = np.linalg.norm(of_mine, axis=0) < ROUNDING * np.linalg.norm(jacobian, axis=0)
+        by_mine, determined = _inverse(np.where(is_rounding, 0.0, of_mine))
+        determined = determined[:count] & free
+        step = -by_mine[:count] @ residual[mine]
+        instruments.append(
+            InstrumentShare(
+                name=name,
+                setups=setups,
+                numbers=int(np.count_nonzero(np.any(jacobian[rows] != 0.0, axis=1))),
+                chi_square=float(residual[rows] @ residual[rows]),
+                variance=squares[:, rows].sum(axis=1),
+                alone=np.where(determined, joint + step, np.nan),
+                alone_variance=np.where(determined, np.sum(by_mine[:count] ** 2, axis=1), np.nan),
+            )
+        )
+    return tuple(instruments), np.asarray(squares[:, extras:].sum(axis=1))
+
+
+def _instruments(problem: InstrumentProblem) -> dict[str, tuple[str, ...]]:
+    """The setups of each instrument, by its words; by its id where a setup says none."""
+    groups: dict[str, tuple[str, ...]] = {}
+    for setup in problem.setups:
+        name = setup.instrument or setup.id
+        groups[name] = (*groups.get(name, ()), setup.id)
+    return groups
+
+
+def _whitened_rows(problem: InstrumentProblem, run: int, setups: tuple[str, ...]) -> npt.NDArray[np.int64]:
+    """Where the numbers of setups stand among the whitened residuals of a run."""
+    at = np.concatenate([part.at for part in problem.parts if part.id in setups])
+    of_run = np.flatnonzero(problem.context.run == run)
+    within = np.flatnonzero(np.isin(of_run, at))
+    numbers = problem.sigma.shape[1]
+    return np.asarray((within[:, None] * numbers + np.arange(numbers)).ravel(), dtype=np.int64)
+
+
+def _inverse(jacobian: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """The pseudo-inverse (p, m) of derivatives (m, p), and which unknowns (p,) they determine."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale[scale == 0.0] = 1.0
+    u, size, vectors = _decomposed(jacobian / scale)
+    largest = size.max(initial=0.0)
+    rank = int(np.count_nonzero(size > RANK_TOLERANCE * largest)) if largest > 0.0 else 0
+    open_share = np.abs(vectors[rank:]).max(axis=0, initial=0.0)
+    inverse = (vectors[:rank].T / size[:rank]) @ u[:, :rank].T / scale[:, None]
+    return inverse, open_share < MEMBER_SHARE
+
+
+def _decomposed(matrix: Array) -> tuple[Array, Array, Array]:
+    """The singular value decomposition with all p right vectors, through the triangle of a QR where rows are many."""
+    if matrix.shape[0] < matrix.shape[1]:
+        u, size, vectors = np.linalg.svd(matrix, full_matrices=True)
+        return u, size, vectors
+    q, triangle = np.linalg.qr(matrix)
+    u, size, vectors = np.linalg.svd(triangle)
+    return np.asarray(q @ u), size, vectors
