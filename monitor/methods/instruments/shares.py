@@ -2,11 +2,15 @@
 
 The joint estimate is C J' r, linear in the whitened readings r, each of variance 1: so the variance of a parameter is
 the sum of the squares of its row of C J', and the readings of one instrument have their part of that sum (GUM, 5.1.3).
-What an instrument says alone is one Gauss-Newton step from the joint point on its own rows, exact to products of the
-differences (1 µrad times 100 µrad). Setups whose ``instrument`` is written the same are one instrument.
+What an instrument says alone is one Gauss-Newton step from the joint point on its own rows: where instruments disagree
+by five times U, a tenth of u beside the fit of its own campaign. What its rows do not separate on the nominal machine
+is left out of that step, as in ``InstrumentProblem.linearise``. Setups whose ``instrument`` is written the same are
+one instrument.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +32,9 @@ def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[I
     jacobian = np.hstack([solution.last.local[index], solution.last.common[index]])
     residual = solution.last.residual[index]
     count = len(problem.base_names)
-    inverse, _ = _inverse(jacobian)
+    whole = replace(problem, is_whole=True).linearise(problem.start, problem.common_start)
+    nominal = np.hstack([whole.local[index], whole.common[index]])
+    inverse = _inverse(jacobian, RANK_TOLERANCE)
     joint = solution.local[index, :count]
     free = solution.local_free[index, :count]
     squares = np.where(free[:, None], inverse[:count] ** 2, np.nan)
@@ -43,9 +49,8 @@ def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[I
             if not several or any(extra.startswith(f"{setup} ") for setup in setups)
         ]
         mine = np.concatenate([rows, np.array(own, dtype=np.int64)])
-        of_mine = jacobian[mine]
-        is_rounding = np.linalg.norm(of_mine, axis=0) < ROUNDING * np.linalg.norm(jacobian, axis=0)
-        by_mine, determined = _inverse(np.where(is_rounding, 0.0, of_mine))
+        separated, determined = _separated(nominal[mine], np.linalg.norm(nominal, axis=0))
+        by_mine = _inverse(jacobian[mine] @ separated, RANK_TOLERANCE)
         determined = determined[:count] & free
         step = -by_mine[:count] @ residual[mine]
         instruments.append(
@@ -80,23 +85,23 @@ def _whitened_rows(problem: InstrumentProblem, run: int, setups: tuple[str, ...]
     return np.asarray((within[:, None] * numbers + np.arange(numbers)).ravel(), dtype=np.int64)
 
 
-def _inverse(jacobian: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """The pseudo-inverse (p, m) of derivatives (m, p), and which unknowns (p,) they determine."""
+def _separated(nominal: Array, size: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """The projector (p, p) on the unknowns that rows (m, p) separate, and which unknowns (p,) these are; ``size`` (p,)
+    is that of the derivatives by all rows, beside which the small ones are rounding."""
+    matrix = np.where(np.linalg.norm(nominal, axis=0) < ROUNDING * size, 0.0, nominal)
+    scale = np.linalg.norm(matrix, axis=0)
+    scale[scale == 0.0] = 1.0
+    _, strength, vectors = np.linalg.svd(np.linalg.qr(matrix / scale, mode="r"))
+    rank = int(np.count_nonzero(strength > RANK_TOLERANCE * strength.max(initial=0.0)))
+    left_open = vectors[rank:]
+    projector = np.eye(len(scale)) - left_open.T @ left_open
+    projector *= np.linalg.norm(projector, axis=0) > ROUNDING
+    determined = np.abs(left_open).max(axis=0, initial=0.0) < MEMBER_SHARE
+    return projector * scale[None, :] / scale[:, None], determined
+
+
+def _inverse(jacobian: Array, tolerance: float) -> Array:
+    """The pseudo-inverse (p, m) of derivatives (m, p), columns scaled to unit length first."""
     scale = np.linalg.norm(jacobian, axis=0)
     scale[scale == 0.0] = 1.0
-    u, size, vectors = _decomposed(jacobian / scale)
-    largest = size.max(initial=0.0)
-    rank = int(np.count_nonzero(size > RANK_TOLERANCE * largest)) if largest > 0.0 else 0
-    open_share = np.abs(vectors[rank:]).max(axis=0, initial=0.0)
-    inverse = (vectors[:rank].T / size[:rank]) @ u[:, :rank].T / scale[:, None]
-    return inverse, open_share < MEMBER_SHARE
-
-
-def _decomposed(matrix: Array) -> tuple[Array, Array, Array]:
-    """The singular value decomposition with all p right vectors, through the triangle of a QR where rows are many."""
-    if matrix.shape[0] < matrix.shape[1]:
-        u, size, vectors = np.linalg.svd(matrix, full_matrices=True)
-        return u, size, vectors
-    q, triangle = np.linalg.qr(matrix)
-    u, size, vectors = np.linalg.svd(triangle)
-    return np.asarray(q @ u), size, vectors
+    return np.asarray(np.linalg.pinv(jacobian / scale, rcond=tolerance) / scale[:, None])
