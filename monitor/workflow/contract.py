@@ -68,7 +68,7 @@ QUESTIONS = {
         "identify all": "identify.every:identify_all",
         "identify stepwise": "identify.stepwise:identify_stepwise",
         "import": "intake.importing:import_folders",
-        "instruments": "instruments.instruments:instruments",
+        "contributions": "instruments.instruments:instruments",
         "issue certificate": "certificate.issue:issue",
         "issued certificate": "certificate.states:write_issued",
         "machines": "query:machines",

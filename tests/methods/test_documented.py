@@ -30,7 +30,7 @@ VERBS: tuple[tuple[str, Callable[[Method], Ability] | None], ...] = (
     ("`trend`", lambda method: method.trend),
     ("`certificate`", lambda method: method.certificate),
     ("`simulate`", lambda method: method.rehearsal),
-    ("`instruments`", lambda method: method.instruments),
+    ("`contributions`", lambda method: method.instruments),
     ("`standards`", lambda method: method.standards),
 )
 

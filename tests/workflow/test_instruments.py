@@ -1,4 +1,4 @@
-"""`instruments` and the example of four instruments: what only the combination shows."""
+"""`contributions` and the example of four instruments: what only the combination shows."""
 
 from __future__ import annotations
 

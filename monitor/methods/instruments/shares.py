@@ -43,12 +43,12 @@ def shares(problem: ChainProblem, solution: Solution, run: int) -> tuple[tuple[I
     instruments = []
     for name, setups in _instruments(problem).items():
         rows = _whitened_rows(problem, run, setups)
-        own = [
+        priors = [
             extras + number
             for number, extra in enumerate(problem.extra_names)
             if not several or any(extra.startswith(f"{setup} ") for setup in setups)
         ]
-        mine = np.concatenate([rows, np.array(own, dtype=np.int64)])
+        mine = np.concatenate([rows, np.array(priors, dtype=np.int64)])
         separated, determined = _separated(nominal[mine], np.linalg.norm(nominal, axis=0))
         by_mine = _inverse(jacobian[mine] @ separated, RANK_TOLERANCE)
         determined = determined[:count] & free

@@ -8,10 +8,12 @@ linear axes about a centre is a circular test (ISO 230-4). All other setups have
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from monitor.machine import evaluate
+from monitor.machine import Joint, evaluate
 from monitor.methods.chain.problem import ChainProblem
 from monitor.methods.instruments.problem import InstrumentProblem, Part
 from monitor.methods.instruments.reading import LEVER, direction_of
@@ -34,54 +36,96 @@ def standard_tests(problem: ChainProblem) -> tuple[AxisTest | CircleTest, ...]:
 
 
 def _tests_of(problem: InstrumentProblem, part: Part) -> Iterator[AxisTest | CircleTest]:
-    rows, reading = part.rows, part.reading
-    sigma = problem.sigma[part.at, 0]
-    for index in np.unique(rows.run):
-        mine = rows.run == index
-        run = int(problem.runs[index])
-        moving = _moving(part, mine)
-        kinds = {rows.chain.joints[joint].kind for joint in moving}
-        names = tuple(rows.chain.joints[joint].name for joint in moving)
-        positions, measured = rows.positions[mine], rows.measured[mine, 0]
-        u = float(np.sqrt(np.mean(sigma[mine] ** 2)))
-        if isinstance(reading, Displacement) and kinds == {"linear"}:
-            nominal = _nominal(part, mine) @ direction_of(reading.setup)
-            travel = nominal - nominal[0]
-            place, sense = travel, 1.0
-            if len(moving) == 1:
-                place = rows.chain.joints[moving[0]].sign * positions[:, moving[0]]
-                if abs(np.ptp(travel) / np.ptp(place) - 1.0) > ALONG:
-                    continue
-                # A deviation counts in the sense in which the reading of the axis grows.
-                sense = float(np.sign((travel - travel.mean()) @ (place - place.mean())))
-            beam = 0.0 if reading.holds("direction") else reading.beam**2
-            yield AxisTest(part.id, run, names, place, sense * (measured - travel), u, beam, False)
-        elif isinstance(reading, Angle) and kinds == {"rotary"} and len(moving) == 1:
-            joint = rows.chain.joints[moving[0]]
-            share = float(direction_of(reading.setup) @ np.array(joint.direction))
-            if 1.0 - abs(share) > ALONG:
-                continue
-            # The work side turns the other way; the deviation is that of the axis in the sense of its own readings.
-            on_work = moving[0] < len(rows.chain.work)
-            sense = joint.sign * np.sign(share) * (-1.0 if on_work else 1.0)
-            deviation = sense * measured / LEVER
-            place = joint.sign * positions[:, moving[0]]
-            yield AxisTest(part.id, run, names, place, deviation, u / LEVER, 0.0, True)
-        elif isinstance(reading, DistanceReading) and kinds == {"linear"} and len(moving) == 2:
-            arm = _nominal(part, mine) - np.array(reading.centre)
-            along = [np.array(rows.chain.joints[joint].direction) for joint in moving]
-            if any(1.0 - np.abs(way).max() > ALONG for way in along):
-                continue
-            first, second = _plane(along)
-            angle = np.arctan2(arm[:, second], arm[:, first])
-            bar = 0.0 if reading.holds("length") else (reading.setup.length_uncertainty or np.nan)
-            assert reading.setup.length is not None
-            yield CircleTest(
-                part.id, run, ("XYZ"[first], "XYZ"[second]), angle, measured, reading.setup.length, u, bar
-            )
+    """The tests of one setup, one a run in which it is such a test."""
+    for index in np.unique(part.rows.run):
+        mine = part.rows.run == index
+        u = float(np.sqrt(np.mean(problem.sigma[part.at, 0][mine] ** 2)))
+        measured = _Measured(part, mine, int(problem.runs[index]), _moving(part, mine), u)
+        kinds = {part.rows.chain.joints[joint].kind for joint in measured.moving}
+        test: AxisTest | CircleTest | None = None
+        if isinstance(part.reading, Displacement) and kinds == {"linear"}:
+            test = _travel(measured, part.reading)
+        elif isinstance(part.reading, Angle) and kinds == {"rotary"} and len(measured.moving) == 1:
+            test = _turn(measured, part.reading)
+        elif isinstance(part.reading, DistanceReading) and kinds == {"linear"} and len(measured.moving) == 2:
+            test = _circle(measured, part.reading)
+        if test is not None:
+            yield test
 
 
-def _moving(part: Part, mine: Array) -> list[int]:
+@dataclass(frozen=True)
+class _Measured:
+    """The rows ``mine`` (m,) of a setup in one run, the joints that move in them, and u of a reading in mm."""
+
+    part: Part
+    mine: npt.NDArray[np.bool_]
+    run: int
+    moving: list[int]
+    u: float
+
+    @property
+    def joints(self) -> list[Joint]:
+        """The joints that move."""
+        return [self.part.rows.chain.joints[joint] for joint in self.moving]
+
+    @property
+    def values(self) -> Array:
+        """The readings (k,) in mm."""
+        return self.part.rows.measured[self.mine, 0]
+
+    @property
+    def axis_reading(self) -> Array:
+        """Where the first joint that moves stands (k,), by its own reading."""
+        return self.joints[0].sign * self.part.rows.positions[self.mine, self.moving[0]]
+
+
+def _travel(measured: _Measured, reading: Displacement) -> AxisTest | None:
+    nominal = _nominal(measured.part, measured.mine) @ direction_of(reading.setup)
+    travel = nominal - nominal[0]
+    position, sense = travel, 1.0
+    if len(measured.moving) == 1:
+        position = measured.axis_reading
+        if abs(np.ptp(travel) / np.ptp(position) - 1.0) > ALONG:
+            return None
+        # A deviation counts in the sense in which the reading of the axis grows.
+        sense = float(np.sign((travel - travel.mean()) @ (position - position.mean())))
+    beam = 0.0 if reading.holds("direction") else reading.beam**2
+    names = tuple(joint.name for joint in measured.joints)
+    deviation = sense * (measured.values - travel)
+    return AxisTest(measured.part.id, measured.run, names, position, deviation, measured.u, beam, False)
+
+
+def _turn(measured: _Measured, reading: Angle) -> AxisTest | None:
+    (joint,) = measured.joints
+    share = float(direction_of(reading.setup) @ np.array(joint.direction))
+    if 1.0 - abs(share) > ALONG:
+        return None
+    # The work side turns the other way; the deviation is that of the axis in the sense of its own readings.
+    on_work = measured.moving[0] < len(measured.part.rows.chain.work)
+    sense = joint.sign * np.sign(share) * (-1.0 if on_work else 1.0)
+    deviation = sense * measured.values / LEVER
+    u = measured.u / LEVER
+    return AxisTest(
+        measured.part.id, measured.run, (joint.name,), measured.axis_reading, deviation, u, 0.0, True
+    )
+
+
+def _circle(measured: _Measured, reading: DistanceReading) -> CircleTest | None:
+    assert reading.setup.length is not None  # the reader asks for it
+    along = [np.array(joint.direction) for joint in measured.joints]
+    if any(1.0 - np.abs(way).max() > ALONG for way in along):
+        return None
+    arm = _nominal(measured.part, measured.mine) - np.array(reading.centre)
+    first, second = _plane(along)
+    angle = np.arctan2(arm[:, second], arm[:, first])
+    bar = 0.0 if reading.holds("length") else (reading.setup.length_uncertainty or np.nan)
+    plane = ("XYZ"[first], "XYZ"[second])
+    return CircleTest(
+        measured.part.id, measured.run, plane, angle, measured.values, reading.setup.length, measured.u, bar
+    )
+
+
+def _moving(part: Part, mine: npt.NDArray[np.bool_]) -> list[int]:
     """The joints that move in these rows, in the order of the chain; those that move by rounding stand still."""
     size = np.ptp(part.rows.positions[mine], axis=0)
     linear = np.array([not joint.turns for joint in part.rows.chain.joints])
@@ -90,7 +134,7 @@ def _moving(part: Part, mine: Array) -> list[int]:
     return [int(joint) for joint in np.flatnonzero((size > limits) & (size > 1e-9))]
 
 
-def _nominal(part: Part, mine: Array) -> Array:
+def _nominal(part: Part, mine: npt.NDArray[np.bool_]) -> Array:
     """Where the tool point of a machine without errors stands (m, 3) mm, seen from the work side."""
     rows, count = part.rows, int(np.count_nonzero(mine))
     none = np.zeros((count, len(rows.chain.joints), 2, 6))

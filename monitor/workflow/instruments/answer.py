@@ -1,4 +1,4 @@
-"""The answer of `instruments`: parts of each u, what each instrument says alone, and E_n between them."""
+"""The answer of `contributions`: parts of each u, what each instrument says alone, and E_n between them."""
 
 from __future__ import annotations
 

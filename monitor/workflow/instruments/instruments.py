@@ -33,7 +33,7 @@ def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
 
     Raises NotFoundError for a campaign or run that is not there, DataError where the readings do not suffice.
     """
-    campaign = machine_campaign(db, request.campaign, "instruments", lambda method: method.instruments)
+    campaign = machine_campaign(db, request.campaign, "contributions", lambda method: method.instruments)
     ability = campaign_method(campaign).instruments
     assert isinstance(ability, Instruments)
     model = resolve_for(db, request.model, campaign.method, subject_of(campaign))

@@ -1,4 +1,4 @@
-"""The request of `instruments`."""
+"""The request of `contributions`."""
 
 from __future__ import annotations
 

@@ -58,35 +58,40 @@ def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:
     method = campaign_method(campaign)
     problem = method.problem_of(campaign, method.own_model)
     wanted = [name for name in names if request.setup in (None, name)]
-    chosen = [test for test in ability.tests(problem) if test.setup in wanted]
-    if not chosen:
+    of_wanted = [test for test in ability.tests(problem) if test.setup in wanted]
+    if not of_wanted:
         raise DataError(
             f"no setup of {', '.join(wanted)} is a test of ISO 230-2, -4 or -6: a displacement along a travel, an "
             "angle about the one axis that turns, or a distance swung by two linear axes"
         )
+    folder = None if request.figures is None else make_folder(request.figures)
     tests: list[StandardTest] = []
     files: list[str] = []
-    folder = None if request.figures is None else make_folder(request.figures)
-    for number, test in enumerate(chosen):
-        rng = np.random.default_rng([request.seed, number])
+    for number, test in enumerate(of_wanted):
         try:
-            if isinstance(test, AxisTest):
-                evaluated = _positioning(test, rng)
-                tests.append(_axis_answer(test, evaluated))
-                files += [] if folder is None else _axis_figure(test, evaluated, tests[-1], folder)
-            else:
-                circle = circles(
-                    test.angle, test.deviation, u_reading=test.u_reading, u_radius=test.u_radius, rng=rng
-                )
-                tests.append(_circle_answer(test, circle))
-                files += [] if folder is None else _circle_figure(test, circle, tests[-1], folder)
+            answer, drawn = _evaluated(test, np.random.default_rng([request.seed, number]), folder)
         except InputError as error:
             raise DataError(f"setup {test.setup}, run {test.run}: {error}") from error
+        tests.append(answer)
+        files += drawn
     if request.csv is not None:
         files.append(_written(request.csv, tests))
     evaluated_setups = {test.setup for test in tests}
     left_out = tuple(name for name in wanted if name not in evaluated_setups)
     return StandardsAnswer(campaign.name, request.seed, tuple(tests), left_out, tuple(files))
+
+
+def _evaluated(
+    test: AxisTest | CircleTest, rng: np.random.Generator, folder: Path | None
+) -> tuple[StandardTest, list[str]]:
+    """The figures of a test, and the files of its plot."""
+    if isinstance(test, AxisTest):
+        axis = _positioning(test, rng)
+        answer = _axis_answer(test, axis)
+        return answer, [] if folder is None else _axis_figure(test, axis, answer, folder)
+    circle = circles(test.angle, test.deviation, u_reading=test.u_reading, u_radius=test.u_radius, rng=rng)
+    answer = _circle_answer(test, circle)
+    return answer, [] if folder is None else _circle_figure(test, circle, answer, folder)
 
 
 def _positioning(test: AxisTest, rng: np.random.Generator) -> Positioning:
@@ -103,7 +108,7 @@ def _positioning(test: AxisTest, rng: np.random.Generator) -> Positioning:
 def _axis_answer(test: AxisTest, evaluated: Positioning) -> StandardTest:
     unit = MICRORADIAN if test.angular else MICROMETRE
     show = unit.to_display
-    place = DEGREE.to_display if test.angular else float
+    show_position = DEGREE.to_display if test.angular else float
     diagonal = len(test.axes) > 1
     standard = "ISO 230-6:2002, clause 3" if diagonal else "ISO 230-2:2014, clause 3"
     figures = tuple(
@@ -118,7 +123,7 @@ def _axis_answer(test: AxisTest, evaluated: Positioning) -> StandardTest:
     )
     targets = tuple(
         TargetFigures(
-            position=place(float(position)),
+            position=show_position(float(position)),
             mean_forward=show(float(evaluated.mean[0, index])),
             mean_backward=show(float(evaluated.mean[1, index])),
             s_forward=show(float(evaluated.deviation[0, index])),
@@ -200,15 +205,15 @@ def _axis_figure(test: AxisTest, evaluated: Positioning, answer: StandardTest, f
     from monitor.reporting.figures.standards import positioning_figure
 
     unit = MICRORADIAN if test.angular else MICROMETRE
-    place = DEGREE if test.angular else None
+    position_factor = DEGREE.factor if test.angular else 1.0
     accuracy = next(figure for figure in answer.figures if figure.symbol == "A")
     reversal = next(figure for figure in answer.figures if figure.symbol == "B")
     figure = positioning_figure(
-        evaluated.targets if place is None else evaluated.targets / place.factor,
+        evaluated.targets / position_factor,
         evaluated.mean / unit.factor,
         evaluated.deviation / unit.factor,
         axis=answer.of,
-        units=("mm" if place is None else "°", unit.name),
+        units=("°" if test.angular else "mm", unit.name),
         title=f"{test.setup}, run {test.run}: A = {accuracy.value:.1f} {unit.name}, "
         f"B = {reversal.value:.1f} {unit.name}",
     )

@@ -109,17 +109,17 @@ def _centre(tips: Array, lengths: Array, stated: Array) -> Array:
     middle = tips.mean(axis=0)
     about, from_middle = tips - middle, stated - middle
     _, size, axes = np.linalg.svd(about, full_matrices=False)
-    seen = size > FLAT * size[0]
+    is_spanned = size > FLAT * size[0]
     right = 0.5 * (np.sum(about**2, axis=1) - lengths**2)
-    inside = about @ axes[seen].T
+    inside = about @ axes[is_spanned].T
     solved = np.linalg.lstsq(inside - inside.mean(axis=0), right - right.mean(), rcond=None)[0]
-    left_open = from_middle - axes[seen].T @ (axes[seen] @ from_middle)
-    if np.count_nonzero(~seen) == 1:
+    left_open = from_middle - axes[is_spanned].T @ (axes[is_spanned] @ from_middle)
+    if np.count_nonzero(~is_spanned) == 1:
         square = float(np.mean(lengths**2 - np.sum((inside - solved) ** 2, axis=1)))
         height = np.sqrt(square) if square > (FLAT * size[0]) ** 2 else 0.0
-        normal = axes[~seen][0]
+        normal = axes[~is_spanned][0]
         left_open = height * normal * (np.sign(normal @ from_middle) or 1.0)
-    return np.asarray(middle + axes[seen].T @ solved + left_open)
+    return np.asarray(middle + axes[is_spanned].T @ solved + left_open)
 
 
 READING = DistanceReading

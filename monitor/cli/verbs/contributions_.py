@@ -12,7 +12,7 @@ from monitor.workflow.instruments.instruments import instruments
 from monitor.workflow.instruments.request import InstrumentsRequest
 
 SMALLEST_PART = 0.01
-EXAMPLE = "monitor instruments four-instruments"
+EXAMPLE = "monitor contributions four-instruments"
 
 
 def options(parser: ArgumentParser) -> None:
@@ -78,17 +78,23 @@ def _say(answer: InstrumentsAnswer) -> None:
     ]
     if alone:
         output.table("", ["alone", "unit", "by", "value", "u"], alone)
+    _say_agreement(answer)
+    if answer.not_determined:
+        output.say(f"all together do not separate {', '.join(answer.not_determined)}; identify says why")
+
+
+def _say_agreement(answer: InstrumentsAnswer) -> None:
+    """Say which instruments disagree, or by how much the worst of them agree."""
     pairs = [(shares.parameter, pair) for shares in answer.parameters for pair in shares.agreement]
-    for parameter, pair in pairs:
-        if pair.e_n > 1.0:
-            output.say(f"{parameter}: {pair.first} and {pair.second} disagree, E_n = {pair.e_n:.2f}")
-    if pairs and all(pair.e_n <= 1.0 for _, pair in pairs):
+    if not pairs:
+        output.say("no parameter is determined by two instruments, each alone: nothing to compare")
+        return
+    apart = [(parameter, pair) for parameter, pair in pairs if pair.e_n > 1.0]
+    for parameter, pair in apart:
+        output.say(f"{parameter}: {pair.first} and {pair.second} disagree, E_n = {pair.e_n:.2f}")
+    if not apart:
         worst, pair = max(pairs, key=lambda compared: compared[1].e_n)
         output.say(
             f"the instruments agree: largest E_n = {pair.e_n:.2f} ({worst}, {pair.first} and {pair.second}; "
             f"of {len(pairs)})"
         )
-    if not pairs:
-        output.say("no parameter is determined by two instruments, each alone: nothing to compare")
-    if answer.not_determined:
-        output.say(f"all together do not separate {', '.join(answer.not_determined)}; identify says why")
