@@ -71,12 +71,12 @@ class _Measured:
     @property
     def values(self) -> Array:
         """The readings (k,) in mm."""
-        return self.part.rows.measured[self.mine, 0]
+        return np.asarray(self.part.rows.measured[self.mine, 0])
 
     @property
     def axis_reading(self) -> Array:
         """Where the first joint that moves stands (k,), by its own reading."""
-        return self.joints[0].sign * self.part.rows.positions[self.mine, self.moving[0]]
+        return np.asarray(self.joints[0].sign * self.part.rows.positions[self.mine, self.moving[0]])
 
 
 def _travel(measured: _Measured, reading: Displacement) -> AxisTest | None:
