@@ -257,11 +257,11 @@ class Setup:
 
     ``reading`` names the kind; ``standard_uncertainty`` is that of one reading, in mm or rad, None where
     every row states its own; ``turn_uncertainty`` (rad) is that of the orientation of a kind that reads a place
-    besides. ``tool_point`` and
-    ``work_point`` (mm) are in the frames of the last tool and work axis; the unit vectors ``direction`` and
-    ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar is free where
-    ``length_uncertainty`` is None. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame`` that
-    in which a vector is read; ``known`` names the unknowns that are held at what is stated.
+    besides. ``tool_point`` and ``work_point`` (mm) are in the frames of the last tool and work axis; the unit vectors
+    ``direction`` and ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar
+    is free where ``length_uncertainty`` is None; ``direction_uncertainty`` (rad) is that of a beam across its
+    direction, None where nobody states it. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame``
+    that in which a vector is read; ``known`` names the unknowns that are held at what is stated.
     """
 
     id: str
@@ -274,6 +274,7 @@ class Setup:
     tool_direction: Vector | None = None
     length: float | None = None
     length_uncertainty: float | None = None
+    direction_uncertainty: float | None = None
     along: str | None = None
     side: Branch = "tool"
     frame: Branch = "work"

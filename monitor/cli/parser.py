@@ -33,6 +33,8 @@ VERBS = {
     "model": "models and their versions: list, show, add, remove, history",
     "effects": "the catalogue of effects, searchable",
     "map": "volumetric error over the stroke with its uncertainty; compensation tables",
+    "contributions": "what each instrument does for each parameter, and whether they agree",
+    "standards": "what ISO 230-2, 230-4 and 230-6 report of laser and ball-bar tests",
     "plan": "expected uncertainties, blind spots, best next poses",
     "simulate": "a virtual campaign folder, to rehearse",
     "report": "weekly health report of the fleet, HTML and PDF",

@@ -133,6 +133,81 @@ class AngleCandidates(Protocol):
 
 
 @dataclass(frozen=True)
+class AxisTest:
+    """A test of positioning in one setup and run: ``position`` (n,) and ``deviation`` (n,) in mm, or in rad where
+    ``angular``, in the order of measuring. ``axes`` are those that move: one, or several along a diagonal.
+
+    ``u_reading`` is the standard uncertainty of a reading, ``u_gain`` that of the instrument's unit.
+    """
+
+    setup: str
+    run: int
+    axes: tuple[str, ...]
+    position: Array
+    deviation: Array
+    u_reading: float
+    u_gain: float
+    angular: bool
+
+
+@dataclass(frozen=True)
+class CircleTest:
+    """A circular test in one setup and run: ``angle`` (n,) rad from the first axis of the ``plane`` to the second,
+    ``deviation`` (n,) mm of the length from ``radius`` mm, in the order of measuring; ``u_radius`` is NaN where the bar
+    was not calibrated."""
+
+    setup: str
+    run: int
+    plane: tuple[str, str]
+    angle: Array
+    deviation: Array
+    radius: float
+    u_reading: float
+    u_radius: float
+
+
+@dataclass(frozen=True)
+class InstrumentShare:
+    """What one instrument says of the k base parameters of a run, in internal units.
+
+    ``name`` as people call it, its ``setups``, ``numbers`` read and ``chi_square`` of their weighted residuals.
+    ``variance`` (k,) is its part of the variance in the joint fit; ``alone`` (k,) and ``alone_variance`` (k,) are the
+    estimate of its readings by themselves, NaN where they do not determine a parameter.
+    """
+
+    name: str
+    setups: tuple[str, ...]
+    numbers: int
+    chi_square: float
+    variance: Array
+    alone: Array
+    alone_variance: Array
+
+
+class SharesOf(Protocol):
+    """Gives what each instrument says of the parameters of a ``run``, and their variance (k,) by what is known
+    beforehand of the setups."""
+
+    def __call__(
+        self, problem: ChainProblem, solution: Solution, run: int
+    ) -> tuple[tuple[InstrumentShare, ...], Array]: ...
+
+
+@dataclass(frozen=True)
+class Instruments(Able):
+    """Several instruments measure one machine; ``shares`` says what each of them does for a run."""
+
+    shares: SharesOf
+
+
+@dataclass(frozen=True)
+class StandardTests(Able):
+    """Rows are tests that standards evaluate; ``tests`` are those of a problem."""
+
+    tests: Callable[[ChainProblem], tuple[AxisTest | CircleTest, ...]]
+
+
+@dataclass(frozen=True)
 class Nouns:
     """What a ``target`` and a ``row`` of a campaign are called, in the singular."""
 
@@ -161,6 +236,8 @@ class Method:
     trend: Able | Unable
     certificate: Able | Unable
     rehearsal: Rehearsal | Unable
+    standards: StandardTests | Unable
+    instruments: Instruments | Unable
 
     @property
     def own_model(self) -> Model:
@@ -207,6 +284,10 @@ def nothing_taken_up(problem: ChainProblem) -> tuple[TakenUp, ...]:
 
 
 NO_REHEARSAL = Unable("there is no virtual machine for it")
+NO_STANDARDS = Unable(
+    "its rows are no test of ISO 230-2, -4 or -6; set up a laser or a ball bar (method instruments) for that"
+)
+ONE_INSTRUMENT = Unable("one instrument measured all of it; uncertainty has the budget of its sources")
 NO_STEPWISE = Unable("all unknowns are identified at once, so type identify without --stepwise")
 NO_TOUCH_PLAN = Unable(
     "plan works for touches of balls and for angles of a workpiece's table only; identify lists what the present "
@@ -243,6 +324,8 @@ class ChainMethod(Method):
     trend: Able | Unable = Able()
     certificate: Able | Unable = Able()
     rehearsal: Rehearsal | Unable = NO_REHEARSAL
+    standards: StandardTests | Unable = NO_STANDARDS
+    instruments: Instruments | Unable = ONE_INSTRUMENT
 
     def identify(
         self, campaign: Campaign, model: Model | None = None, solve: Solver = solve_problem
@@ -289,3 +372,5 @@ class CurveMethod(Method):
     trend: Able | Unable = NO_MACHINE
     certificate: Able | Unable = NO_MACHINE
     rehearsal: Rehearsal | Unable = NO_REHEARSAL
+    standards: StandardTests | Unable = NO_STANDARDS
+    instruments: Instruments | Unable = ONE_INSTRUMENT

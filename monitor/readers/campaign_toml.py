@@ -132,6 +132,8 @@ def _setup(setup: Setup) -> Iterator[str]:
         yield f"length_mm = {float(setup.length)!r}"
     if setup.length_uncertainty is not None:
         yield f"length_standard_uncertainty_um = {decimal_in(MICROMETRE)(setup.length_uncertainty)}"
+    if setup.direction_uncertainty is not None:
+        yield f"direction_standard_uncertainty_urad = {decimal_in(MICRORADIAN)(setup.direction_uncertainty)}"
     if setup.along is not None:
         yield f"along = {_text(setup.along)}"
     yield from (f"{key} = {_text(getattr(setup, key))}" for key in ("side", "frame") if key in form.allows)

@@ -22,6 +22,7 @@ IDENTITY = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,40}")
 #: A standard uncertainty of an angle beyond this is a slip of unit: 0.1 rad.
 LARGEST_URAD = 1e5
 _LENGTH_UNCERTAINTY = "length_standard_uncertainty_um"
+_DIRECTION_UNCERTAINTY = "direction_standard_uncertainty_urad"
 POINT = "[0.0, 0.0, -120.0]"
 BRANCHES: tuple[Branch, ...] = ("tool", "work")
 
@@ -50,7 +51,9 @@ FORMATS: Mapping[str, ReadingFormat] = MappingProxyType({
     "distance": ReadingFormat(
         ONE_LENGTH, needs=("length_mm",), allows=(_LENGTH_UNCERTAINTY,), known=("work_point", "length")
     ),
-    "displacement": ReadingFormat(ONE_LENGTH, needs=("direction",), known=("direction",)),
+    "displacement": ReadingFormat(
+        ONE_LENGTH, needs=("direction",), allows=(_DIRECTION_UNCERTAINTY,), known=("direction",)
+    ),
     "offset": ReadingFormat(ONE_LENGTH, needs=("direction", "along"), known=("zero", "slope")),
     "angle": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), known=("zero",)),
     "level": ReadingFormat(ONE_ANGLE, angular=True, needs=("direction",), allows=("side",), known=("zero",)),
@@ -107,6 +110,9 @@ def _setup(table: Table) -> Setup | None:
         else None,
         length=_length(table) if "length_mm" in form.needs else None,
         length_uncertainty=_length_uncertainty(table) if _LENGTH_UNCERTAINTY in form.allows else None,
+        direction_uncertainty=_direction_uncertainty(table)
+        if _DIRECTION_UNCERTAINTY in form.allows
+        else None,
         along=table.text("along", required=True, example='"X"') if "along" in form.needs else None,
         side=_branch(table, "side", "tool") if "side" in form.allows else "tool",
         frame=_branch(table, "frame", "work") if "frame" in form.allows else "work",
@@ -168,6 +174,14 @@ def _length_uncertainty(table: Table) -> float | None:
         _LENGTH_UNCERTAINTY, positive=True, largest=1e3 * FARTHEST_MM, unit="um", example="0.3"
     )
     return None if value is None else MICROMETRE.to_internal(value)
+
+
+def _direction_uncertainty(table: Table) -> float | None:
+    """Return the standard uncertainty of a beam's direction in rad; None where it is not stated."""
+    value = table.number(
+        _DIRECTION_UNCERTAINTY, positive=True, largest=LARGEST_URAD, unit="urad", example="200.0"
+    )
+    return None if value is None else MICRORADIAN.to_internal(value)
 
 
 def _unit(table: Table, key: str, *, required: bool = True) -> Vector | None:

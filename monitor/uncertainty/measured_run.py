@@ -84,8 +84,19 @@ class MeasuredRun(ABC):
 
     def gradient(self, unknowns: Array, inputs: Array) -> Array:
         """J^T r (p, B), whitened, at ``unknowns`` (p, B) and ``inputs`` (N, B): plain, exact, slow."""
-        at = self.repeated(inputs).linearise(np.ascontiguousarray(unknowns.T), self.common)
-        return np.asarray(np.einsum("rnp,rn->pr", at.local, at.residual))
+        gradients = np.empty(unknowns.shape)
+        for first in range(0, inputs.shape[1], self.at_once):
+            chunk = slice(first, first + self.at_once)
+            at = self.repeated(inputs[:, chunk]).linearise(
+                np.ascontiguousarray(unknowns[:, chunk].T), self.common
+            )
+            gradients[:, chunk] = np.einsum("rnp,rn->pr", at.local, at.residual)
+        return gradients
+
+    @property
+    def at_once(self) -> int:
+        """So many trials are computed together that their Jacobians fit into memory."""
+        return max(1, min(CHUNK, LARGEST_JACOBIAN // max(1, self.probings * 3 * self.unknowns)))
 
     def solve(self, inputs: Array, start: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
         """Gauss-Newton with a fresh Jacobian in every step for trials ``inputs`` (N, B).
@@ -94,9 +105,8 @@ class MeasuredRun(ABC):
         """
         trials = inputs.shape[1]
         solved = np.full((self.unknowns, trials), np.nan)
-        at_once = max(1, min(CHUNK, LARGEST_JACOBIAN // max(1, self.probings * 3 * self.unknowns)))
-        for first in range(0, trials, at_once):
-            chunk = slice(first, min(first + at_once, trials))
+        for first in range(0, trials, self.at_once):
+            chunk = slice(first, min(first + self.at_once, trials))
             try:
                 solved[:, chunk] = self._solve(inputs[:, chunk], start)
             except (DataError, np.linalg.LinAlgError):

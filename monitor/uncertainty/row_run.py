@@ -64,8 +64,17 @@ class RowRun(MeasuredRun):
 
     def whitened(self, inputs: Array) -> Array:
         """What inputs (N, B) add to the whitened residuals (N, B)."""
-        extra = np.ones(len(self.problem.extra_names))
-        return np.asarray(inputs / np.concatenate([self.problem.sigma.ravel(), extra])[:, None])
+        return np.asarray(inputs / self.weighed_by[:, None])
+
+    @property
+    def weighed_by(self) -> Array:
+        """The standard uncertainty (N,) by which each input is whitened: infinite where it has no weight."""
+        return np.concatenate([self.problem.sigma.ravel(), np.ones(len(self.problem.extra_names))])
+
+    def by_input(self, unknowns: Array) -> Array:
+        """Derivatives (p, N) of J^T r at ``unknowns`` (p,) by the inputs, exact: they only add to the residuals."""
+        at = self.repeated(self.inputs[:, None]).linearise(unknowns[None], self.common)
+        return np.asarray(at.local[0].T / self.weighed_by)
 
     def repeated(self, inputs: Array) -> _Shifted:
         """The problem whose runs are the trials ``inputs`` (N, B)."""

@@ -94,7 +94,10 @@ def sensitivity_of(run: MeasuredRun, inputs: Array | None = None, start: Array |
         theta = theta - step
         if float(np.max(np.abs(step / steps))) < 1e-9:
             break
-    by_input = _differences(gradient, theta, x, STEP * np.eye(len(x)), of_inputs=True) / (2.0 * STEP)
+    if isinstance(run, RowRun):
+        by_input = run.by_input(theta)
+    else:
+        by_input = _differences(gradient, theta, x, STEP * np.eye(len(x)), of_inputs=True) / (2.0 * STEP)
     return Sensitivity(
         names=run.problem.local_names,
         input_names=run.input_names,

@@ -30,6 +30,8 @@ VERBS: tuple[tuple[str, Callable[[Method], Ability] | None], ...] = (
     ("`trend`", lambda method: method.trend),
     ("`certificate`", lambda method: method.certificate),
     ("`simulate`", lambda method: method.rehearsal),
+    ("`contributions`", lambda method: method.instruments),
+    ("`standards`", lambda method: method.standards),
 )
 
 

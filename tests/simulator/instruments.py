@@ -26,7 +26,8 @@ gravity = {gravity}
 
 @dataclass(frozen=True)
 class SimulatedAxis:
-    """An axis: ``errors`` are six numbers (mm, rad) before its motion, ``motion`` gives six after it for a pose."""
+    """An axis: ``errors`` are six numbers (mm, rad) before its motion, ``motion`` gives six after it for a travel in mm
+    or degrees."""
 
     name: str
     kind: str
@@ -34,6 +35,7 @@ class SimulatedAxis:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sign: int = 1
     errors: tuple[float, ...] = (0.0,) * 6
+    motion: Callable[[float], Sequence[float]] | None = None
 
     @property
     def column(self) -> str:
@@ -91,6 +93,8 @@ class SimulatedChain:
                 motion = frame(q * np.array(axis.about), Rotation.identity())
             errors = small((0.0,) * 6 if perfect else axis.errors)
             whole = whole @ frame(axis.offset, Rotation.identity()) @ errors @ motion
+            if axis.motion is not None and not perfect:
+                whole = whole @ small(axis.motion(q))
         return whole
 
     @property

@@ -95,13 +95,14 @@ def _deviations(fit: Fit) -> _Deviations:
     bases = eliminate(fit.solution.last.local).basis
     # A few bad points must not hide themselves: the scale is taken from the median. A run that is noisier than
     # the others as a whole has no bad points for that.
-    squares = np.sum(vectors**2, axis=1) / inflation
-    share = fit.degrees_of_freedom / (fit.readings + 1e-300)
-    usual = scipy.stats.chi2.median(white.shape[1]) * max(share, 1e-6)
-    scale = np.full(len(weighted), np.median(squares[weighted]) / usual)
+    # Rows of several instruments differ in how many numbers they have.
+    usual = scipy.stats.chi2.median(np.maximum(np.isfinite(problem.sigma).sum(axis=1), 1))
+    squares = np.sum(vectors**2, axis=1) / inflation / usual
+    share = max(fit.degrees_of_freedom / (fit.readings + 1e-300), 1e-6)
+    scale = np.full(len(weighted), np.median(squares[weighted]) / share)
     for members in rows:
         if weighted[members].any():
-            of_run = np.median(squares[members][weighted[members]]) / usual
+            of_run = np.median(squares[members][weighted[members]]) / share
             scale[members] = np.maximum(scale[members], of_run)
     scale = np.sqrt(scale)
     return _Deviations(vectors, inflation, rows, bases, scale)
@@ -130,6 +131,8 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
     for run, rows in enumerate(deviations.rows):
         basis = deviations.of_run(run)
         gram = np.eye(basis.shape[1]) - basis @ np.swapaxes(basis, 1, 2)
+        is_read = np.isfinite(fit.problem.sigma[rows])
+        gram = gram * is_read[:, :, None] * is_read[:, None, :]
         square, rank, sizes = _statistic(deviations.vectors[rows], gram)
         checked = (rank > 0) & ~fit.left_out[rows]
         if not checked.any():
@@ -142,7 +145,11 @@ def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
         p = float(scipy.special.chdtrc(rank[worst], chi_square[worst]))
         row, size = int(rows[worst]), sizes[worst]
         if p * tests <= alpha:
-            axis, off = off_reading(fit.problem, fit.by_error, row, size * fit.problem.sigma[row])
+            # A number that was not read has no weight, and its size is rounding.
+            sigma = fit.problem.sigma[row]
+            axis, off = off_reading(
+                fit.problem, fit.by_error, row, size * np.where(np.isfinite(sigma), sigma, 0.0)
+            )
             points.append(
                 BadPoint(
                     row=row,

@@ -20,7 +20,7 @@ from monitor.methods.chain.base_effects import location_candidates
 from monitor.methods.chain.identification import TakenUp
 from monitor.methods.chain.least_squares import RANK_TOLERANCE
 from monitor.methods.instruments.problem import InstrumentProblem, Part
-from monitor.methods.instruments.reading import Rows
+from monitor.methods.instruments.reading import COSINE, Rows
 from monitor.methods.instruments.readings import readings
 from monitor.methods.instruments.readings.direction import Direction
 from monitor.methods.instruments.readings.pose import Pose
@@ -171,7 +171,10 @@ def _generic(chain: Chain, setups: tuple[Setup, ...]) -> tuple[Array, Array]:
     pose = problem.evaluated(problem.start, np.zeros(0), jacobian=True)
     assert pose.by_error is not None
     rows = pose.residual.size
-    return pose.by_error.reshape(rows, len(chain.joints), 2, 6), pose.by_own.reshape(rows, -1)
+    free = [not name.endswith(COSINE) for name in problem.own_names]
+    return pose.by_error.reshape(rows, len(chain.joints), 2, 6), pose.by_own[..., free].reshape(
+        rows, sum(free)
+    )
 
 
 def _generic_problem(

@@ -12,7 +12,9 @@ from monitor.methods.chain.sufficiency import still_joints
 from monitor.methods.instruments.assembly import NAME, problem_of
 from monitor.methods.instruments.base import instrument_base, taken_up, usual_setups
 from monitor.methods.instruments.problem import InstrumentProblem
-from monitor.methods.method import ChainMethod, Nouns, Unable
+from monitor.methods.instruments.shares import shares
+from monitor.methods.instruments.standard_tests import standard_tests
+from monitor.methods.method import ChainMethod, Instruments, Nouns, StandardTests, Unable
 from monitor.records import Campaign
 from monitor.refusal import Advice, AdviceKind
 
@@ -60,6 +62,8 @@ METHOD = ChainMethod(
     base_effects=usual_base,
     trial_rows=150,
     taken_up=without_numbers,
+    instruments=Instruments(shares),
+    standards=StandardTests(standard_tests),
     coordinates=Unable("readings of instruments are no coordinates that could stand side by side"),
     certificate=Unable(
         "a certificate states a probe and an artefact, and does not know several instruments yet; identify, "

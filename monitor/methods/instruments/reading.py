@@ -22,6 +22,9 @@ LEVER = 1000.0
 #: An unknown turn of a frame, about X, Y and Z, and its shift.
 TURN, SHIFT = ("frame a", "frame b", "frame c"), ("frame x", "frame y", "frame z")
 
+#: The unknown of a beam that acts as a gain: known beforehand, or no gain of an axis had a number.
+COSINE = "cosine error"
+
 
 @dataclass(frozen=True)
 class Rows:

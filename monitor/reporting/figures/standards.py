@@ -1,0 +1,70 @@
+"""Draws the two plots that people on the shop floor know: deviations of positioning, and the polar plot of a circle."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from monitor.records import Array
+from monitor.reporting.figures.style import new_figure, style, zero_line
+from monitor.reporting.palette import BLUE, MID, ORANGE, PAGE_WIDTH_MM
+
+HEIGHT_MM, CIRCLE_MM = 80.0, 110.0
+#: The largest deviation takes this part of the polar plot's radius.
+SHOWN_PART = 0.35
+
+
+def positioning_figure(
+    targets: Array, mean: Array, deviation: Array, *, axis: str, units: tuple[str, str], title: str
+) -> Figure:
+    """Draw means (2, m) with bands of two standard deviations (2, m) over targets (m,), as ISO 230-2:2014 does."""
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, HEIGHT_MM, title)
+        axes = figure.subplots()
+        zero_line(axes)
+        looks = ((BLUE, "-", "forward"), (ORANGE, "--", "backward"))
+        for (colour, line, name), means, spread in zip(looks, mean, deviation, strict=True):
+            axes.plot(
+                targets, means, line, color=colour, linewidth=1.2, marker="o", markersize=2.5, label=name
+            )
+            band = 2.0 * np.nan_to_num(spread)
+            axes.fill_between(targets, means - band, means + band, color=colour, alpha=0.15, linewidth=0.0)
+        axes.set_xlabel(f"{axis} / {units[0]}")
+        axes.set_ylabel(f"deviation / {units[1]}")
+        axes.legend(loc="best", title="mean, and 2 s as a band")
+    return figure
+
+
+def circle_figure(angle: Array, radial: Array, sense: Array, *, plane: tuple[str, str], title: str) -> Figure:
+    """Draw radial deviations (n,) µm at angles (n,) rad about a circle, magnified, each sense by itself."""
+    largest = float(np.max(np.abs(radial))) or 1.0
+    with style():
+        figure = new_figure(PAGE_WIDTH_MM, CIRCLE_MM, title)
+        axes = figure.subplots(subplot_kw={"projection": "polar"})
+        around = np.linspace(0.0, 2.0 * np.pi, 361)
+        unit = SHOWN_PART / largest
+        axes.plot(around, np.ones_like(around), color=MID, linewidth=0.7)
+        for way, colour, line, name in ((1, BLUE, "-", "counter-clockwise"), (-1, ORANGE, "--", "clockwise")):
+            mine = sense == way
+            if mine.any():
+                axes.plot(
+                    angle[mine], 1.0 + unit * radial[mine], line, color=colour, linewidth=1.1, label=name
+                )
+        axes.set_ylim(0.0, 1.0 + 1.25 * SHOWN_PART)
+        step = _step(largest)
+        marks = np.array([-step, 0.0, step])
+        axes.set_yticks(1.0 + unit * marks, [f"{mark:+.3g} µm" if mark else "" for mark in marks])
+        axes.set_xticks(
+            np.arange(4) * np.pi / 2.0, [f"+{plane[0]}", f"+{plane[1]}", f"-{plane[0]}", f"-{plane[1]}"]
+        )
+        axes.grid(color=MID, linewidth=0.3)
+        axes.legend(loc="center")
+    return figure
+
+
+def _step(largest: float) -> float:
+    """A round number of µm (1, 2 or 5 times a power of ten) that is at most the largest deviation."""
+    power = 10.0 ** np.floor(np.log10(largest))
+    return float(
+        max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= largest * (1.0 + 1e-9)) * power
+    )

@@ -1,0 +1,63 @@
+"""The answer of `contributions`: parts of each u, what each instrument says alone, and E_n between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class InstrumentFit:
+    """An instrument with its setups: numbers read, and what the joint fit leaves of them, root mean square in standard
+    uncertainties (1 is expected, less where the instrument has unknowns of its own)."""
+
+    instrument: str
+    setups: tuple[str, ...]
+    numbers: int
+    rms_in_u: float
+
+
+@dataclass(frozen=True)
+class AloneValue:
+    """What the readings of one instrument say of a parameter by themselves."""
+
+    instrument: str
+    value: float
+    u: float
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Two instruments that both determine a parameter: E_n (ISO 13528:2022, 9.7) with U = 2 u; above 1 they
+    disagree."""
+
+    first: str
+    second: str
+    e_n: float
+
+
+@dataclass(frozen=True)
+class ParameterShares:
+    """A parameter of the joint fit: ``parts`` are what each instrument adds to u as a standard uncertainty (u² is the
+    sum of their squares); ``known_beforehand`` is the part of lengths and beams that the setups state."""
+
+    parameter: str
+    unit: str
+    value: float
+    u: float
+    parts: Mapping[str, float]
+    known_beforehand: float
+    alone: tuple[AloneValue, ...]
+    agreement: tuple[Agreement, ...]
+
+
+@dataclass(frozen=True)
+class InstrumentsAnswer:
+    """The instruments of one run; ``not_determined`` are parameters that all of them together do not separate."""
+
+    campaign: str
+    run: int
+    model: str
+    instruments: tuple[InstrumentFit, ...]
+    parameters: tuple[ParameterShares, ...]
+    not_determined: tuple[str, ...]

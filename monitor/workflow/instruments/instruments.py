@@ -1,0 +1,105 @@
+"""What each instrument does for each parameter of a machine, and whether the instruments agree."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from monitor.exceptions import NotFoundError
+from monitor.methods import campaign_method
+from monitor.methods.chain.problem import solve_problem
+from monitor.methods.method import Instruments, InstrumentShare
+from monitor.store import Database
+from monitor.units import Unit
+from monitor.workflow.identify.fitting import machine_problem
+from monitor.workflow.instruments.answer import (
+    Agreement,
+    AloneValue,
+    InstrumentFit,
+    InstrumentsAnswer,
+    ParameterShares,
+)
+from monitor.workflow.instruments.request import InstrumentsRequest
+from monitor.workflow.measured import machine_campaign
+from monitor.workflow.models import label, resolve_for, subject_of
+
+#: Coverage factor of E_n.
+K = 2.0
+
+
+def instruments(db: Database, request: InstrumentsRequest) -> InstrumentsAnswer:
+    """Fit a model to a campaign and share out one run among its instruments; nothing is stored.
+
+    Raises NotFoundError for a campaign or run that is not there, DataError where the readings do not suffice.
+    """
+    campaign = machine_campaign(db, request.campaign, "contributions", lambda method: method.instruments)
+    ability = campaign_method(campaign).instruments
+    assert isinstance(ability, Instruments)
+    model = resolve_for(db, request.model, campaign.method, subject_of(campaign))
+    problem = machine_problem(campaign, model)
+    run = int(problem.runs[-1]) if request.run is None else request.run
+    if run not in problem.runs:
+        raise NotFoundError(
+            f"campaign {campaign.name} has no run {run}; it has runs {', '.join(map(str, problem.runs))}"
+        )
+    solution = solve_problem(problem)
+    index = int(np.searchsorted(problem.runs, run))
+    of_all, beforehand = ability.shares(problem, solution, run)
+    parameters, open_ones = [], []
+    for number, name in enumerate(problem.base_names):
+        if not solution.local_free[index, number]:
+            open_ones.append(name)
+            continue
+        value = float(solution.local[index, number])
+        unit = problem.base_units[name]
+        parameters.append(_parameter(name, unit, value, number, of_all, float(beforehand[number])))
+    return InstrumentsAnswer(
+        campaign=campaign.name,
+        run=run,
+        model=label(model),
+        instruments=tuple(
+            InstrumentFit(
+                share.name,
+                share.setups,
+                share.numbers,
+                float(np.sqrt(share.chi_square / max(share.numbers, 1))),
+            )
+            for share in of_all
+        ),
+        parameters=tuple(parameters),
+        not_determined=tuple(open_ones),
+    )
+
+
+def _parameter(
+    name: str, unit: Unit, value: float, number: int, of_all: tuple[InstrumentShare, ...], beforehand: float
+) -> ParameterShares:
+    show = unit.to_display
+    parts = {share.name: float(np.sqrt(share.variance[number])) for share in of_all}
+    u = float(np.sqrt(sum(part**2 for part in parts.values()) + beforehand))
+    alone = tuple(
+        AloneValue(
+            share.name, show(float(share.alone[number])), show(float(np.sqrt(share.alone_variance[number])))
+        )
+        for share in of_all
+        if np.isfinite(share.alone[number])
+    )
+    agreement = tuple(
+        Agreement(
+            first.instrument,
+            second.instrument,
+            abs(first.value - second.value) / (K * float(np.hypot(first.u, second.u))),
+        )
+        for first, second in combinations(alone, 2)
+    )
+    return ParameterShares(
+        name,
+        unit.name,
+        show(value),
+        show(u),
+        {instrument: show(part) for instrument, part in parts.items()},
+        show(float(np.sqrt(beforehand))),
+        alone,
+        agreement,
+    )

@@ -1,0 +1,265 @@
+"""What ISO 230-2, ISO 230-4 and ISO 230-6 report of the rows of a campaign, with uncertainties."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
+from monitor.methods import campaign_method
+from monitor.methods.method import AxisTest, CircleTest, StandardTests
+from monitor.statistics.circles import Circles, circles
+from monitor.statistics.positioning import USUAL_RUNS, AxisFigures, Positioning, positioning
+from monitor.store import Database
+from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
+from monitor.workflow.figure_files import make_folder, save_figure
+from monitor.workflow.measured import machine_campaign
+from monitor.workflow.standards.answer import StandardFigure, StandardsAnswer, StandardTest, TargetFigures
+from monitor.workflow.standards.request import StandardsRequest
+
+#: Positions within so much are one target, in mm and rad: readings of one programmed position.
+ONE_TARGET, ONE_TARGET_RAD = 0.05, 1e-4
+#: Field of the figures of an axis: symbol and name of ISO 230-2:2014, clause 3. The arrows are + and - here.
+NAMES = {
+    "reversal": ("B", "reversal error of the axis"),
+    "mean_reversal": ("B mean", "mean reversal error of the axis"),
+    "repeatability_forward": ("R+", "unidirectional positioning repeatability, forward"),
+    "repeatability_backward": ("R-", "unidirectional positioning repeatability, backward"),
+    "repeatability": ("R", "bi-directional positioning repeatability"),
+    "systematic_forward": ("E+", "unidirectional systematic positioning error, forward"),
+    "systematic_backward": ("E-", "unidirectional systematic positioning error, backward"),
+    "systematic": ("E", "bi-directional systematic positioning error"),
+    "mean_deviation": ("M", "mean bi-directional positioning error"),
+    "accuracy_forward": ("A+", "unidirectional positioning accuracy, forward"),
+    "accuracy_backward": ("A-", "unidirectional positioning accuracy, backward"),
+    "accuracy": ("A", "bi-directional positioning accuracy"),
+}
+SENSES = {1: "counter-clockwise", -1: "clockwise"}
+
+
+def standards(db: Database, request: StandardsRequest) -> StandardsAnswer:
+    """Evaluate every setup of a campaign that a standard evaluates; nothing is stored.
+
+    Raises NotFoundError for a campaign or setup that is not there, DataError where no setup is such a test.
+    """
+    campaign = machine_campaign(db, request.campaign, "standards", lambda method: method.standards)
+    ability = campaign_method(campaign).standards
+    assert isinstance(ability, StandardTests)
+    names = [setup.id for setup in campaign.artefact.setups]
+    if request.setup is not None and request.setup not in names:
+        raise NotFoundError(
+            f"campaign {campaign.name} has no setup '{request.setup}'; {did_you_mean(request.setup, names)}"
+            f"there are {', '.join(names)}"
+        )
+    method = campaign_method(campaign)
+    problem = method.problem_of(campaign, method.own_model)
+    wanted = [name for name in names if request.setup in (None, name)]
+    of_wanted = [test for test in ability.tests(problem) if test.setup in wanted]
+    if not of_wanted:
+        raise DataError(
+            f"no setup of {', '.join(wanted)} is a test of ISO 230-2, -4 or -6: a displacement along a travel, an "
+            "angle about the one axis that turns, or a distance swung by two linear axes"
+        )
+    folder = None if request.figures is None else make_folder(request.figures)
+    tests: list[StandardTest] = []
+    files: list[str] = []
+    for number, test in enumerate(of_wanted):
+        try:
+            answer, drawn = _evaluated(test, np.random.default_rng([request.seed, number]), folder)
+        except InputError as error:
+            raise DataError(f"setup {test.setup}, run {test.run}: {error}") from error
+        tests.append(answer)
+        files += drawn
+    if request.csv is not None:
+        files.append(_written(request.csv, tests))
+    evaluated_setups = {test.setup for test in tests}
+    left_out = tuple(name for name in wanted if name not in evaluated_setups)
+    return StandardsAnswer(campaign.name, request.seed, tuple(tests), left_out, tuple(files))
+
+
+def _evaluated(
+    test: AxisTest | CircleTest, rng: np.random.Generator, folder: Path | None
+) -> tuple[StandardTest, list[str]]:
+    """The figures of a test, and the files of its plot."""
+    if isinstance(test, AxisTest):
+        axis = _positioning(test, rng)
+        answer = _axis_answer(test, axis)
+        return answer, [] if folder is None else _axis_figure(test, axis, answer, folder)
+    circle = circles(test.angle, test.deviation, u_reading=test.u_reading, u_radius=test.u_radius, rng=rng)
+    answer = _circle_answer(test, circle)
+    return answer, [] if folder is None else _circle_figure(test, circle, answer, folder)
+
+
+def _positioning(test: AxisTest, rng: np.random.Generator) -> Positioning:
+    return positioning(
+        test.position,
+        test.deviation,
+        tolerance=ONE_TARGET_RAD if test.angular else ONE_TARGET,
+        u_reading=test.u_reading,
+        u_gain=test.u_gain,
+        rng=rng,
+    )
+
+
+def _axis_answer(test: AxisTest, evaluated: Positioning) -> StandardTest:
+    unit = MICRORADIAN if test.angular else MICROMETRE
+    show = unit.to_display
+    show_position = DEGREE.to_display if test.angular else float
+    diagonal = len(test.axes) > 1
+    standard = "ISO 230-6:2002, clause 3" if diagonal else "ISO 230-2:2014, clause 3"
+    figures = tuple(
+        StandardFigure(
+            *NAMES[field.name],
+            standard,
+            show(getattr(evaluated.figures, field.name)),
+            show(evaluated.u[field.name]),
+            unit.name,
+        )
+        for field in fields(AxisFigures)
+    )
+    targets = tuple(
+        TargetFigures(
+            position=show_position(float(position)),
+            mean_forward=show(float(evaluated.mean[0, index])),
+            mean_backward=show(float(evaluated.mean[1, index])),
+            s_forward=show(float(evaluated.deviation[0, index])),
+            s_backward=show(float(evaluated.deviation[1, index])),
+            reversal=show(float(evaluated.mean[0, index] - evaluated.mean[1, index])),
+            runs_forward=int(evaluated.runs[0, index]),
+            runs_backward=int(evaluated.runs[1, index]),
+        )
+        for index, position in enumerate(evaluated.targets)
+    )
+    return StandardTest(
+        test.setup,
+        test.run,
+        "diagonal" if diagonal else "positioning",
+        " ".join(test.axes),
+        unit.name,
+        figures,
+        targets,
+        tuple(_lacks(evaluated)),
+    )
+
+
+def _lacks(evaluated: Positioning) -> Iterator[str]:
+    """What the standard asks for and the plan does not have."""
+    fewest = int(evaluated.runs.min())
+    if fewest == 0:
+        yield "some targets were approached from one side only: no reversal, no bi-directional figure"
+    if fewest < USUAL_RUNS:
+        yield f"ISO 230-2, 5.3.2 asks for {USUAL_RUNS} runs in each direction; the fewest here are {fewest}"
+
+
+def _circle_answer(test: CircleTest, circle: Circles) -> StandardTest:
+    um, plane = MICROMETRE.to_display, "".join(test.plane)
+    back = plane[::-1]
+    names = {1: plane, -1: back}
+
+    def figure(symbol: str, name: str, value: float, u: float) -> StandardFigure:
+        return StandardFigure(symbol, name, "ISO 230-4:2005, clause 3", um(value), um(u), MICROMETRE.name)
+
+    figures = []
+    for way, value in circle.circular.items():
+        figures += [
+            figure(f"G_{names[way]}", f"circular deviation, {SENSES[way]}", value, circle.u[f"G{way}"]),
+            figure(
+                f"G_{names[way]} zone",
+                f"circular deviation between minimum-zone circles, {SENSES[way]}",
+                circle.minimum_zone[way],
+                circle.u[f"G{way}"],
+            ),
+            figure(
+                f"F_{names[way]} max",
+                f"largest radial deviation, {SENSES[way]}",
+                circle.largest[way],
+                circle.u[f"Fmax{way}"],
+            ),
+            figure(
+                f"F_{names[way]} min",
+                f"smallest radial deviation, {SENSES[way]}",
+                circle.smallest[way],
+                circle.u[f"Fmin{way}"],
+            ),
+        ]
+    notes = []
+    if len(circle.circular) == 2:
+        figures += [
+            figure("G(b)", "bi-directional circular deviation", circle.both, circle.u["G"]),
+            figure("H", "circular hysteresis", circle.hysteresis, circle.u["H"]),
+        ]
+    else:
+        notes.append("one sense of rotation: no hysteresis, no bi-directional deviation")
+    if np.isnan(test.u_radius):
+        notes.append("the bar's length has no stated uncertainty: radial deviations F have none either")
+    return StandardTest(
+        test.setup, test.run, "circle", plane, MICROMETRE.name, tuple(figures), (), tuple(notes)
+    )
+
+
+def _axis_figure(test: AxisTest, evaluated: Positioning, answer: StandardTest, folder: Path) -> list[str]:
+    from monitor.reporting.figures.standards import positioning_figure
+
+    unit = MICRORADIAN if test.angular else MICROMETRE
+    position_factor = DEGREE.factor if test.angular else 1.0
+    accuracy = next(figure for figure in answer.figures if figure.symbol == "A")
+    reversal = next(figure for figure in answer.figures if figure.symbol == "B")
+    figure = positioning_figure(
+        evaluated.targets / position_factor,
+        evaluated.mean / unit.factor,
+        evaluated.deviation / unit.factor,
+        axis=answer.of,
+        units=("°" if test.angular else "mm", unit.name),
+        title=f"{test.setup}, run {test.run}: A = {accuracy.value:.1f} {unit.name}, "
+        f"B = {reversal.value:.1f} {unit.name}",
+    )
+    return save_figure(figure, folder, f"{test.setup}-{test.run}")
+
+
+def _circle_figure(test: CircleTest, circle: Circles, answer: StandardTest, folder: Path) -> list[str]:
+    from monitor.reporting.figures.standards import circle_figure
+
+    um = 1.0 / MICROMETRE.factor
+    text = ", ".join(
+        f"{figure.symbol} = {figure.value:.1f} µm"
+        for figure in answer.figures
+        if figure.symbol.startswith(("G(", "H", "G_")) and "zone" not in figure.symbol
+    )
+    figure = circle_figure(
+        circle.angle,
+        circle.radial * um,
+        circle.sense,
+        plane=test.plane,
+        title=f"{test.setup}, run {test.run}: {text}",
+    )
+    return save_figure(figure, folder, f"{test.setup}-{test.run}")
+
+
+def _written(path: Path, tests: list[StandardTest]) -> str:
+    """Write one line a figure. Raises InputError where the file cannot be written."""
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(
+                ["setup", "run", "test", "of", "symbol", "name", "standard", "value", "u", "unit"]
+            )
+            for test in tests:
+                for figure in test.figures:
+                    cells = ["" if np.isnan(number) else repr(number) for number in (figure.value, figure.u)]
+                    head = [
+                        test.setup,
+                        test.run,
+                        test.test,
+                        test.of,
+                        figure.symbol,
+                        figure.name,
+                        figure.standard,
+                    ]
+                    writer.writerow([*head, *cells, figure.unit])
+    except OSError as error:
+        raise InputError(f"the file {path} cannot be written: {error.strerror or error}") from error
+    return str(path)

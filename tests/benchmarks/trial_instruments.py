@@ -1,0 +1,114 @@
+"""How often the joint region of laser, ball bar and R-test holds the truth; how long 3 000 rows take.
+
+``python tests/benchmarks/trial_instruments.py --seeds 300``: every seed has a machine of its own (errors of some 20 µm,
+40 µrad, 10 µm/m), readings of ``tests/simulator/four_instruments.py``, which shares no code with the package. A region
+is the ellipsoid of the stated covariance at 95 % (chi-square, JCGM 102, 6.5.2). ``--heavy``: noise of Student's t with
+three degrees of freedom and the same standard deviation; ``--drift``: the machine grows by 2 µm in X in the R-test's
+hour; ``--pitch``: the effect of the example, which the model lacks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import scipy
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from monitor.methods import campaign_method
+from monitor.methods.chain.problem import solve_problem
+from monitor.readers import read_campaign
+from tests.simulator import four_instruments as shop
+
+#: The parameters that these three instruments separate, from the errors that were put in.
+PARAMETERS = ("EX0C", "EY0C", "EA0C", "EB0C", "EC0X", "EA0Z", "EB0Z", "EXX", "EYY", "EZZ")
+
+
+class Heavy(np.random.Generator):
+    """Student's t with three degrees of freedom in place of normal numbers, of the same standard deviation."""
+
+    def normal(self, loc: float = 0.0, scale: float = 1.0, size: object = None) -> object:  # type: ignore[override]
+        """Draw."""
+        return loc + scale * self.standard_t(3.0, size) / np.sqrt(3.0)  # type: ignore[call-overload]
+
+
+def truth_of(rng: np.random.Generator) -> dict[str, float]:
+    """Errors of one machine in mm and rad."""
+    size = {"X0": 0.02, "Y0": 0.02, "A0": 4e-5, "B0": 4e-5, "C0": 4e-5}
+    return {name: float(rng.normal(0.0, size.get(name[1:3], 1e-5))) for name in shop.TRUTH}
+
+
+def expected(truth: dict[str, float]) -> np.ndarray:
+    """The parameters' true values: a turn of Y about Z shows as one of X the other way."""
+    return np.array([-truth["EC0Y"] if name == "EC0X" else truth[name] for name in PARAMETERS])
+
+
+def campaign_of(folder: Path, seed: int, options: argparse.Namespace, cycles: int, step: float) -> object:
+    """A campaign of three instruments, and its truth."""
+    rng = np.random.default_rng(seed)
+    truth = truth_of(rng)
+    chain = shop.machine(shop.PITCH if options.pitch else 0.0, truth)
+    noise = Heavy(np.random.PCG64([seed, 1])) if options.heavy else rng
+    parts = [shop.laser(chain, noise, cycles), shop.ball_bar(chain, noise, step), shop.r_test(chain, noise)]
+    rows = [row for _, of in parts for row in of]
+    if options.drift:
+        hour = [row for row in rows if row["setup"] == "r-test"]
+        for number, row in enumerate(hour):
+            row["dx_um"] = float(row["dx_um"]) + 2.0 * number / len(hour)  # type: ignore[arg-type]
+    chain.write(folder, "".join(text for text, _ in parts), rows)
+    return read_campaign(folder), expected(truth)
+
+
+def main() -> None:
+    """Print the rates."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seeds", type=int, default=300)
+    for name in ("--heavy", "--drift", "--pitch"):
+        parser.add_argument(name, action="store_true")
+    options = parser.parse_args()
+    inside, singly, distance, iterations = 0, np.zeros(len(PARAMETERS)), [], []
+    limit = scipy.stats.chi2.ppf(0.95, len(PARAMETERS))
+    for seed in range(options.seeds):
+        with tempfile.TemporaryDirectory() as folder:
+            campaign, true = campaign_of(Path(folder) / "shop", seed, options, 1, 10.0)
+        result = campaign_method(campaign).identify(campaign)
+        assert result.parameters == PARAMETERS, result.parameters
+        run = result.runs[0]
+        off = run.estimate - true
+        square = float(off @ np.linalg.solve(run.covariance, off))
+        inside += square <= limit
+        distance.append(square)
+        iterations.append(result.iterations)
+        singly += np.abs(off) <= 1.96 * np.sqrt(np.diag(run.covariance))
+    low, high = scipy.stats.binomtest(inside, options.seeds).proportion_ci(method="exact")
+    print(
+        f"truth inside the joint region of {len(PARAMETERS)} parameters: {inside} of {options.seeds}, "
+        f"{100 * inside / options.seeds:.1f} % (95 % interval {100 * low:.1f} to {100 * high:.1f} %)"
+    )
+    print(
+        f"mean square distance {np.mean(distance):.2f} (expected {len(PARAMETERS)}), at most {max(iterations)} steps"
+    )
+    print(
+        "each by itself at 95 %: "
+        + ", ".join(
+            f"{name} {100 * count / options.seeds:.1f}"
+            for name, count in zip(PARAMETERS, singly, strict=True)
+        )
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        campaign, _ = campaign_of(Path(folder) / "shop", 1, options, 20, 1.29)
+    begin = time.process_time()
+    problem = campaign_method(campaign).problem_of(campaign)
+    solve_problem(problem)
+    print(
+        f"{len(campaign.probings)} rows: {time.process_time() - begin:.2f} s of processor time to set up and solve"
+    )
+
+
+if __name__ == "__main__":
+    main()
