@@ -29,6 +29,7 @@ TEMPLATE = """# The configuration of monitor. Take the # away from what you need
 # language = "en"                  # of `certificate template`: en or de
 # mail = "mail.toml"               # what `report --mail` without a file sends by
 # time_zone = "Europe/Berlin"      # of moments that are typed without an offset from UTC; else that of this computer
+# trusted_signers = "signers.pem"  # who may sign: certificates (PEM, DER), or a SHA-256 fingerprint a line
 # timestamp_url = "https://tsa.example.org"  # authority whose time stamp (RFC 3161) signed certificates get
 
 # Tolerances by machine type ([machine] model of campaign.toml; "*" for all others): limits of absolute values in µm,
@@ -51,6 +52,7 @@ class Configuration:
     mail: Path | None = None
     time_zone: str | None = None
     timestamp_url: str | None = None
+    trusted_signers: Path | None = None
     tolerances: Mapping[str, Mapping[str, float]] | None = None
 
 
@@ -85,7 +87,9 @@ def read(file: Path) -> Configuration:
     if faults:
         raise InputError("\n  ".join([f"{file} was refused:", *faults]))
     paths = {
-        key: file.parent / document[key] for key in ("database", "laboratory", "mail") if key in document
+        key: file.parent / document[key]
+        for key in ("database", "laboratory", "mail", "trusted_signers")
+        if key in document
     }
     texts = {key: document[key] for key in ("language", "time_zone", "timestamp_url") if key in document}
     return Configuration(file, **paths, **texts, tolerances=document.get("tolerances"))
@@ -156,4 +160,5 @@ _CHECKS: dict[str, Callable[[str, Path], str]] = {
     "mail": _file,
     "time_zone": _zone,
     "timestamp_url": _address,
+    "trusted_signers": _file,
 }

@@ -17,16 +17,23 @@ from monitor.web.access import FILES, NOT_OFFERED, offered, role_needed, taken_f
 from monitor.web.users import User
 from monitor.workflow.contract import QUESTIONS
 
+#: Questions that take a file of trusted signers.
+_OF_SIGNERS = ("verify", "verify certificate")
+
 
 class ForbiddenError(MonitorError):
     """A question that the user's role may not ask."""
 
 
 class Asker:
-    """Asks questions of the served database; ``generation`` grows with every question that changes other answers."""
+    """Asks questions of the served database; ``generation`` grows with every question that changes other answers.
 
-    def __init__(self, db: Database) -> None:
+    ``trusted_signers`` is the server's own file of them: nobody names another over HTTP.
+    """
+
+    def __init__(self, db: Database, trusted_signers: Path | None = None) -> None:
         self._db = db
+        self._own_files = {question: {"trusted": trusted_signers} for question in _OF_SIGNERS}
         self.generation = 0
 
     def __call__(
@@ -38,7 +45,8 @@ class Asker:
         Raises ForbiddenError, InputError for what the request does not take, and whatever the question raises.
         """
         check_role(user, question)
-        request = request_of(question, document or {}, files or {})
+        own_files: Mapping[str, Any] = self._own_files.get(question, {})
+        request = request_of(question, document or {}, {**own_files, **(files or {})})
         asked = QUESTIONS[question]
         arguments = [] if request is None else [request]
         if not asked.needs_database:

@@ -19,6 +19,7 @@ class ServerSettings:
 
     ``users`` is the file of tokens (None: no log-in, loopback alone). ``certificate`` and ``key`` are PEM files of TLS;
     ``proxy`` is the name under which a proxy that does TLS is reached. ``reading_only`` makes everybody a viewer.
+    ``trusted_signers`` is the file of those whose certificates are called genuine.
     """
 
     database: Path
@@ -29,6 +30,7 @@ class ServerSettings:
     key: Path | None = None
     proxy: str | None = None
     reading_only: bool = False
+    trusted_signers: Path | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.port <= 65535:

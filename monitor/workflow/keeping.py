@@ -29,7 +29,8 @@ class VerifyAnswer:
     """Whether the database is as it was written, with the hash of the last audit entry to be noted elsewhere.
 
     ``anchored_entry`` is the entry that the hash kept elsewhere is of, ``recomputed`` how many identifications were
-    computed anew.
+    computed anew. ``signed_certificates`` is how many of the stored documents bear a signature,
+    ``trusted_signatures`` how many of these are of a trusted signer; None where nobody was named as such.
     """
 
     ok: bool
@@ -38,6 +39,8 @@ class VerifyAnswer:
     faults: tuple[str, ...]
     anchored_entry: int | None = None
     recomputed: int = 0
+    signed_certificates: int | None = None
+    trusted_signatures: int | None = None
 
 
 @dataclass(frozen=True)
@@ -45,12 +48,15 @@ class VerifyRequest:
     """What is verified besides the database itself.
 
     ``anchor`` is a hash of the chain that was kept elsewhere: on paper, on a certificate or in a report. ``recompute``
-    is how many identifications, drawn by the last hash, are computed anew. Raises InputError for what is no hash or
-    number.
+    is how many identifications, drawn by the last hash, are computed anew. ``trusted`` is a file of trusted signers
+    (certificates in PEM or DER, or fingerprints): every signed certificate has to be of one of them.
+
+    Raises InputError for what is no hash or number.
     """
 
     anchor: str | None = None
     recompute: int = 3
+    trusted: Path | None = None
 
     def __post_init__(self) -> None:
         if self.anchor is not None and not re.fullmatch(r"\s*[0-9a-fA-F]{64}\s*", self.anchor):
@@ -76,8 +82,27 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
     # Computed outside: nobody waits for a fit.
     recomputed, different = recompute(db, verification.last_sha256, request.recompute)
     faults += different
+    signed = trusted = None
+    if request.trusted is not None:
+        # What looks at certificates takes longer to load than most databases to verify.
+        from monitor.workflow.certificate.signatures import stored_signatures
+
+        findings = dict(stored_signatures(db, request.trusted))
+        signed, trusted = len(findings), sum(finding.signer_trusted for finding in findings.values())
+        faults += [
+            f"certificate {number}: {fault}"
+            for number, finding in findings.items()
+            for fault in finding.faults
+        ]
     return VerifyAnswer(
-        not faults, verification.entries, verification.last_sha256, tuple(faults), entry, recomputed
+        not faults,
+        verification.entries,
+        verification.last_sha256,
+        tuple(faults),
+        entry,
+        recomputed,
+        signed,
+        trusted,
     )
 
 

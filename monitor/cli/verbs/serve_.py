@@ -10,6 +10,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from monitor.cli import output
+from monitor.cli.configuration import configuration
 from monitor.cli.parser import common
 from monitor.exceptions import InputError
 
@@ -54,6 +55,7 @@ def run(options: Namespace) -> int:
     settings = ServerSettings(
         database=Path(options.db), host=options.host, port=options.port, users=options.users,
         certificate=options.certificate, key=options.key, proxy=options.proxy, reading_only=options.read_only,
+        trusted_signers=configuration().trusted_signers,
     )  # fmt: skip
     serve(settings, lambda text: print(text, flush=True))
     return 0

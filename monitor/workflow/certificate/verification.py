@@ -1,4 +1,4 @@
-"""Verifies that a file is a genuine and valid certificate of this database."""
+"""Verifies that a file is a valid certificate of this database, and that a trusted signer signed it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.signature.signature import SignatureFinding, check_signature, is_signed
 from monitor.store import Database, StoredCertificate, find_certificate, load_certificate, verify_audit
-from monitor.workflow.certificate.answer import CertificateChecks, VerificationAnswer
+from monitor.workflow.certificate.answer import CertificateChecks, Verdict, VerificationAnswer
 from monitor.workflow.certificate.request import VerificationRequest
 
 #: The identifier that a certificate's file bears, its number (ISO 32000-2:2020, 14.4).
@@ -51,16 +51,30 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
     faults = [_unknown(db, file.name, content) if stored is None else _no_longer(stored)]
     if checks.expected is False:
         faults.append(f"the file has the hash {sha256}, not the one noted elsewhere")
+    unsigned = signature.good is None
+    if unsigned and request.trusted is not None:
+        faults.append(
+            "the file is not signed, and who names trusted signers asks for a signature of one of them"
+        )
+    ok = checks.passed and not (unsigned and request.trusted is not None)
     return VerificationAnswer(
         number=number,
-        ok=checks.passed,
+        ok=ok,
         state=None if stored is None else stored.state,
         checks=checks,
         signer=None if signer is None else signer.name,
         signer_sha256=None if signer is None else signer.sha256,
         faults=(*filter(None, faults), *signature.faults, *chain.faults),
         stamped_at=signature.stamped_at,
+        verdict=_verdict(signature) if ok else Verdict.NOT_CONFIRMED,
     )
+
+
+def _verdict(signature: SignatureFinding) -> Verdict:
+    """Return what may be said of a file that no check speaks against."""
+    if signature.good is None:
+        return Verdict.NOT_SIGNED
+    return Verdict.GENUINE if signature.signer_trusted else Verdict.SIGNER_NOT_TRUSTED
 
 
 def _content(file: Path) -> bytes:
