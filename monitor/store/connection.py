@@ -62,7 +62,8 @@ class Database:
         self._lock = threading.RLock()
         self._one_writes = threading.RLock()  # of the sessions
         self._in_transaction = False
-        check_database_name(self.path)
+        self._remembered: list[str] = []
+        self._check_name()
         self._available = migrations.available()
         self._connection: duckdb.DuckDBPyConnection | None = None
         if not self.read_only and self.path != ":memory:" and is_missing(self.path):
@@ -83,6 +84,10 @@ class Database:
             if self._connection is not None:
                 with _as_private_as(self.path):
                     self._connection.close()
+
+    def _check_name(self) -> None:
+        """Refuse a name that is none of a database."""
+        check_database_name(self.path)
 
     def patience(self) -> Patience:
         """How long another process is waited for."""
@@ -256,6 +261,18 @@ class Database:
                 f"{self.path}: the database is older than this software and was opened for reading only; "
                 "open it once for writing, which brings it to the present schema"
             )
+
+    #: Whether computed answers are stored; of a lake they are remembered until it is closed.
+    keeps_answers = True
+
+    def remember(self, document: str) -> int:
+        """Remember an answer that is not stored; its number, below zero."""
+        self._remembered.append(document)
+        return -len(self._remembered)
+
+    def remembered(self, number: int) -> str:
+        """Return an answer that was remembered under a number."""
+        return self._remembered[-number - 1]
 
     def is_same_campaign(self, name: str, number: int) -> bool:
         """Whether a name still is that of the campaign that it was before; always, where nobody else writes."""

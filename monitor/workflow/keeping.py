@@ -66,7 +66,11 @@ class VerifyRequest:
 
 
 def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
-    """Hash everything that is stored anew, compare it with the audit, and compute some identifications again."""
+    """Hash everything that is stored anew, compare it with the audit, and compute some identifications again.
+
+    Raises InputError for a lake.
+    """
+    _refuse_lake(db, "verified")
     with db.reading():
         verification = verify_audit(db)
         faults = list(verification.faults)
@@ -106,6 +110,14 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
     )
 
 
+def _refuse_lake(db: Database, done: str) -> None:
+    if not db.keeps_answers:
+        raise InputError(
+            f"{db.path} is a lake of many plants, which is not {done}: the chain is that of each plant's own database, "
+            "and the lake can be made again from these"
+        )
+
+
 @dataclass(frozen=True)
 class AuditRequest:
     """How many of the last entries to list, and whether to ``check`` the chain of all.
@@ -130,7 +142,11 @@ class AuditAnswer:
 
 
 def audit(db: Database, request: AuditRequest) -> AuditAnswer:
-    """List the last entries of the audit, the newest first, and what is wrong with the chain where that is asked."""
+    """List the last entries of the audit, the newest first, and what is wrong with the chain where that is asked.
+
+    Raises InputError for a lake, which has the chains of its plants beside each other.
+    """
+    _refuse_lake(db, "audited")
     return AuditAnswer(last_entries(db, request.last), chain_faults(db) if request.check else None)
 
 
@@ -152,7 +168,11 @@ class BackupAnswer:
 
 
 def backup(db: Database, request: BackupRequest) -> BackupAnswer:
-    """Copy everything into a second file. Raises StoreError where it exists or cannot be written."""
+    """Copy everything into a second file. Raises StoreError where it exists or cannot be written.
+
+    Raises InputError for a lake, too.
+    """
+    _refuse_lake(db, "copied")
     with db.reading():
         copy = take_backup(db, request.target)
     rows = sum(count for count, _ in copy.tables.values())
