@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: supply browser challenge concurrency kills manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
+.PHONY: supply browser challenge concurrency kills lake manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -76,8 +76,11 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 concurrency: setup  ## eight importers and twenty readers at one database for ten minutes (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/concurrency.py $(ARGS)
 
-kills: setup  ## twelve verbs killed 500 times at random moments (docs/reliability.md)
+kills: setup  ## thirteen verbs killed 500 times at random moments (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/kills.py $(ARGS)
+
+lake: setup  ## plants that publish to one lake at once, some killed in the middle (docs/scale.md); needs PostgreSQL
+	@OMP_NUM_THREADS=1 $(RUN) tests/soak/lake.py $(ARGS)
 
 # CAMPAIGNS=40 writes and answers fewer of them, DIR=... elsewhere.
 CAMPAIGNS ?= 1000
