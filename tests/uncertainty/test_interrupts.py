@@ -18,9 +18,14 @@ asked_in_a_callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.
 def test_ctrl_c_in_a_callback_of_c_ends_the_program_after_the_block() -> None:
     behind = []
     handler = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), interrupts_kept():
-        asked_in_a_callback()
-        behind.append("the block goes on")
+
+    def block() -> None:
+        with interrupts_kept():
+            asked_in_a_callback()
+            behind.append("the block goes on")
+
+    with pytest.raises(KeyboardInterrupt):
+        block()
     assert behind == ["the block goes on"]
     assert signal.getsignal(signal.SIGINT) is handler
     # A fault of the block is told first.
