@@ -24,25 +24,17 @@ class _Source:
     column: str
 
 
-_OF_CAMPAIGN = _Source("campaign", "campaign_id")
-_OF_IDENTIFICATION = _Source("identification", "identification_id")
+#: Tables of which an import, and an identification, adds the rows.
+_WITH_CAMPAIGN = "imported_campaign source_file run campaign_runs probing curve curve_row"
+_WITH_IDENTIFICATION = (
+    "identification identified_run identified_values parameter_value parameter_frame residual"
+)
 #: Every table of a plant and what its rows belong to. Those that belong to nothing are published otherwise, below.
 SOURCES: dict[str, _Source] = {
-    "imported_campaign": _OF_CAMPAIGN,
-    "source_file": _OF_CAMPAIGN,
-    "run": _OF_CAMPAIGN,
-    "campaign_runs": _OF_CAMPAIGN,
-    "probing": _OF_CAMPAIGN,
-    "curve": _OF_CAMPAIGN,
-    "curve_row": _OF_CAMPAIGN,
+    **dict.fromkeys(_WITH_CAMPAIGN.split(), _Source("campaign", "campaign_id")),
+    **dict.fromkeys(_WITH_IDENTIFICATION.split(), _Source("identification", "identification_id")),
     "import_note": _Source("import notes", "campaign_id"),
     "withdrawn_campaign": _Source("withdrawn campaign", "campaign_id"),
-    "identification": _OF_IDENTIFICATION,
-    "identified_run": _OF_IDENTIFICATION,
-    "identified_values": _OF_IDENTIFICATION,
-    "parameter_value": _OF_IDENTIFICATION,
-    "parameter_frame": _OF_IDENTIFICATION,
-    "residual": _OF_IDENTIFICATION,
     "analysis": _Source("analysis", "analysis_id"),
     "event": _Source("event", "event_id"),
     "selection": _Source("selection", "selection_id"),
