@@ -76,9 +76,9 @@ def _extension(name: str, module: str) -> Path:
 def attach(connection: duckdb.DuckDBPyConnection, address: str, *options: str) -> None:
     """Attach a lake under its name. Raises StoreError for one that cannot be opened or is not there."""
     check_lake_address(address)
-    chosen = f" ({', '.join(options)})" if options else ""
+    bracketed = f" ({', '.join(options)})" if options else ""
     try:
-        connection.execute(f"ATTACH {literal(address)} AS {LAKE}{chosen}")
+        connection.execute(f"ATTACH {literal(address)} AS {LAKE}{bracketed}")
     except duckdb.Error as fault:
         raise StoreError(_in_words(address, str(fault))) from fault
 

@@ -113,7 +113,7 @@ class _Publisher:
     def _again(self, attempt: Callable[[], Result]) -> Result:
         """Return what an attempt returns, made anew with growing pauses where the lake refused or was away."""
         pause = _FIRST_PAUSE_S
-        for left in reversed(range(_TRIES)):
+        for remaining in reversed(range(_TRIES)):
             self._tries += 1
             try:
                 if not self._attached:
@@ -121,7 +121,7 @@ class _Publisher:
                 return attempt()
             except (duckdb.Error, StoreError) as fault:
                 self._roll_back()
-                if not left or not _may_pass(str(fault)):
+                if not remaining or not _may_pass(str(fault)):
                     if isinstance(fault, StoreError):
                         raise
                     raise StoreError(
@@ -253,7 +253,7 @@ class _Publisher:
 def _may_pass(message: str) -> bool:
     """Whether a fault may be gone with the next try: a conflict with another writer, or a lake that was away."""
     return any(
-        words in message.lower()
+        phrase in message.lower()
         for words in (
             "conflict",
             "connection",
