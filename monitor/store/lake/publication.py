@@ -254,7 +254,7 @@ def _may_pass(message: str) -> bool:
     """Whether a fault may be gone with the next try: a conflict with another writer, or a lake that was away."""
     return any(
         phrase in message.lower()
-        for words in (
+        for phrase in (
             "conflict",
             "connection",
             "connect to",
