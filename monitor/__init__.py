@@ -23,3 +23,8 @@ def __getattr__(name: str) -> Any:
 
         return getattr(importlib.import_module("monitor.api"), name)
     raise AttributeError(f"module 'monitor' has no attribute '{name}'; it has {', '.join(__all__)}")
+
+
+def __dir__() -> list[str]:
+    """Return the names that a notebook completes, those that are not loaded yet too."""
+    return sorted({*globals(), *__all__})

@@ -22,12 +22,13 @@ class Ask:
         """Return the typed answer. Raises InputError for an option that the question does not have."""
         asked = QUESTIONS[question]
         request = asked.request
-        arguments = [] if request is None else [_request(request, values)]
+        arguments = [] if request is None else [request_of(request, values)]
         self.db.forget_campaigns()
         return asked.load()(*([self.db] if asked.needs_database else []), *arguments)
 
 
-def _request(kind: Any, values: dict[str, Any]) -> Any:
+def request_of(kind: Any, values: dict[str, Any]) -> Any:
+    """Return a request of a type. Raises InputError for an option that it does not have."""
     names = [field.name for field in fields(kind) if field.init]
     for name in values:
         if name not in names:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from monitor import store
 from monitor.api.answer import Answer
-from monitor.api.asking import Ask, drawn
+from monitor.api.asking import Ask, drawn, request_of
 from monitor.api.campaign import Campaign
 from monitor.api.tables import main_table, table_of
 from monitor.exceptions import InputError, NotFoundError, did_you_mean
@@ -142,7 +142,11 @@ def open(path: str | Path, *, new: bool = False, read_only: bool = False, wait_s
 
 
 def simulate(out: str | Path, **options: Any) -> Answer[SimulateAnswer]:
-    """Write a virtual campaign folder with or without a hidden effect (``SimulateRequest``)."""
+    """Write a virtual campaign folder with or without a hidden effect.
+
+    ``options`` are ``effect``, ``peak_um``, ``noise_um``, ``seed`` and ``robot``. Raises InputError for another option
+    or a value that cannot be.
+    """
     from monitor.workflow.simulation import SimulateRequest, simulate
 
-    return Answer(simulate(SimulateRequest(Path(out), **options)))
+    return Answer(simulate(request_of(SimulateRequest, {**options, "out": Path(out)})))

@@ -18,6 +18,9 @@ from pathlib import Path
 from monitor.exceptions import InputError, did_you_mean
 
 NAME = "monitor.toml"
+#: The units of angle that a screen may have.
+ANGLE_UNITS = ("µrad", "arcsec", "µm/m")
+_TEXTS = ("language", "time_zone", "angle_unit", "timestamp_url")
 #: Terms as ISO 230-1:2012, 3.4.16 spells them, of axes of any name.
 _TERM = re.compile(r"E[XYZABC]0?[A-Za-z][A-Za-z0-9]*")
 TEMPLATE = """# The configuration of monitor. Take the # away from what you need; `monitor config check` says
@@ -29,6 +32,7 @@ TEMPLATE = """# The configuration of monitor. Take the # away from what you need
 # language = "en"                  # of `certificate template`: en or de
 # mail = "mail.toml"               # what `report --mail` without a file sends by
 # time_zone = "Europe/Berlin"      # of moments that are typed without an offset from UTC; else that of this computer
+# angle_unit = "arcsec"            # of angles on the screen: µrad, arcsec or µm/m
 # trusted_signers = "signers.pem"  # who may sign: certificates (PEM, DER), or a SHA-256 fingerprint a line
 # timestamp_url = "https://tsa.example.org"  # authority whose time stamp (RFC 3161) signed certificates get
 
@@ -51,6 +55,7 @@ class Configuration:
     language: str | None = None
     mail: Path | None = None
     time_zone: str | None = None
+    angle_unit: str | None = None
     timestamp_url: str | None = None
     trusted_signers: Path | None = None
     tolerances: Mapping[str, Mapping[str, float]] | None = None
@@ -91,7 +96,7 @@ def read(file: Path) -> Configuration:
         for key in ("database", "laboratory", "mail", "trusted_signers")
         if key in document
     }
-    texts = {key: document[key] for key in ("language", "time_zone", "timestamp_url") if key in document}
+    texts = {key: document[key] for key in _TEXTS if key in document}
     return Configuration(file, **paths, **texts, tolerances=document.get("tolerances"))
 
 
@@ -141,6 +146,10 @@ def _language(value: str, file: Path) -> str:
     return "" if value in ("de", "en") else "write de or en"
 
 
+def _angle(value: str, file: Path) -> str:
+    return "" if value in ANGLE_UNITS else f"write {', '.join(ANGLE_UNITS[:-1])} or {ANGLE_UNITS[-1]}"
+
+
 def _zone(value: str, file: Path) -> str:
     try:
         zoneinfo.ZoneInfo(value)
@@ -159,6 +168,7 @@ _CHECKS: dict[str, Callable[[str, Path], str]] = {
     "language": _language,
     "mail": _file,
     "time_zone": _zone,
+    "angle_unit": _angle,
     "timestamp_url": _address,
     "trusted_signers": _file,
 }

@@ -146,6 +146,9 @@ def test_wrong_names_are_answered_with_the_right_ones(db: mm.Database, tmp_path:
         _ = db.campaign(HIDDEN).explain().effects
     with pytest.raises(AttributeError, match=r"module 'monitor' has no attribute 'opem'; it has Answer, "):
         _ = mm.opem  # type: ignore[attr-defined]
+    with pytest.raises(InputError, match=r"^there is no option 'peak'; did you mean 'peak_um'\? there are "):
+        mm.simulate(tmp_path / "rehearsal", effect="EXX:reversal", peak=8.0)
+    assert set(mm.__all__) <= set(dir(mm))
     with pytest.raises(CampaignError, match=r"campaign.toml: the file is missing"):
         mm.read(tmp_path)
     assert mm.read(EXAMPLES / "five-days").name == "five-days"

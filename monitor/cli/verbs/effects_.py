@@ -8,6 +8,7 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import check_path, opened
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.workflow.effects import (
     DEFAULT_TOPOLOGY,
     CampaignEffectsRequest,
@@ -52,6 +53,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0
+    answer = on_screen(answer)
     if not answer.effects:
         output.say(
             f"no effect says '{options.text}'; try another word, such as backlash, thermal, worm or guideway"

@@ -8,6 +8,7 @@ from pathlib import Path
 from monitor.cli import explain_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.workflow.explain.explain import explain
 from monitor.workflow.explain.request import RATE, ExplainRequest
 
@@ -37,5 +38,5 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
     else:
-        explain_output.show(answer)
+        explain_output.show(on_screen(answer))
     return 0

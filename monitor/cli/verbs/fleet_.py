@@ -11,6 +11,7 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.cli.trend_output import weekly_lines
 from monitor.workflow.fleet import FleetRequest, FleetTableRow, fleet
 
@@ -44,6 +45,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0
+    answer = on_screen(answer)
     output.table(
         f"{answer.machines} machine{'' if answer.machines == 1 else 's'}, {answer.values} values; "
         "q: false discovery rate over all rows",

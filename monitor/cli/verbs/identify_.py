@@ -8,6 +8,7 @@ from argparse import ArgumentParser, Namespace
 from monitor.cli import identify_output, output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
 from monitor.workflow.identify.every import IdentifyAllRequest, identify_all
 from monitor.workflow.identify.identify import identify
@@ -44,7 +45,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
     else:
-        identify_output.show(answer)
+        identify_output.show(on_screen(answer))
     return 0
 
 
@@ -60,7 +61,7 @@ def _all(options: Namespace) -> int:
         output.document(answer)
     else:
         for identification in answer.identifications:
-            identify_output.show(identification)
+            identify_output.show(on_screen(identification))
     for refused in answer.refused:
         print(f"monitor: {refused.campaign}: {refused.why}", file=sys.stderr)
     return 2 if answer.refused else 0
@@ -74,5 +75,5 @@ def _stepwise(options: Namespace) -> int:
     if options.json:
         output.document(answer)
     else:
-        identify_output.stepwise(answer)
+        identify_output.stepwise(on_screen(answer))
     return 0

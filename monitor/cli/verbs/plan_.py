@@ -9,6 +9,7 @@ from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
 from monitor.cli.residual_output import files
+from monitor.cli.screen import on_screen
 from monitor.cli.verbs import plan_angles
 from monitor.exceptions import InputError
 from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlan, BallPlanAnswer, PlannedParameter, Pose
@@ -37,7 +38,7 @@ def options(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--wanted", action="append", default=[], metavar="PARAMETER=U",
-        help="a standard uncertainty in display units; the quickest plan that reaches all; may be repeated",
+        help="a standard uncertainty in µm, µrad or µm/m; the quickest plan that reaches all; may be repeated",
     )  # fmt: skip
     parser.add_argument("--separate", metavar="EFFECT,EFFECT", help="poses that tell two effects apart")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw the expected uncertainties")
@@ -83,9 +84,9 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
     elif isinstance(answer, AnglePlanAnswer):
-        plan_angles.tables(answer)
+        plan_angles.tables(on_screen(answer))
     else:
-        _tables(answer)
+        _tables(on_screen(answer))
     return 0
 
 

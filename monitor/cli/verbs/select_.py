@@ -14,6 +14,7 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
 from monitor.store import Database
 from monitor.workflow.selections.request import (
@@ -59,7 +60,7 @@ def run(options: Namespace) -> int:
             f"{answer.selection}: {len(answer.runs)} runs of {answer.campaign} where {answer.condition}"
         )
     elif isinstance(answer, SideBySideAnswer):
-        _comparison(answer)
+        _comparison(on_screen(answer))
     else:
         output.listing(answer.selections, "there is no selection yet")
     return 0

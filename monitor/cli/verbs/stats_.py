@@ -13,6 +13,7 @@ from pathlib import Path
 from monitor.cli import output
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.workflow.run_statistics.answer import DIFFERENT, NoVectorTest, StatisticsAnswer, VectorTestAnswer
 from monitor.workflow.run_statistics.request import StatisticsRequest
 from monitor.workflow.run_statistics.statistics import stats
@@ -55,6 +56,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0
+    answer = on_screen(answer)
     _parameters(answer)
     if answer.moved:
         output.say(

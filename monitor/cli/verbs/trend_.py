@@ -15,6 +15,7 @@ from monitor.cli import output, trend_output
 from monitor.cli.database import opened
 from monitor.cli.moments import moment
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.exceptions import InputError
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend
@@ -81,5 +82,5 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
     else:
-        trend_output.say(answer)
+        trend_output.say(on_screen(answer))
     return 0

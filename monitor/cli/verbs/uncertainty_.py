@@ -11,6 +11,7 @@ from monitor.cli.behind import add_behind, further_sources
 from monitor.cli.budget_output import behind
 from monitor.cli.database import opened
 from monitor.cli.parser import common
+from monitor.cli.screen import on_screen
 from monitor.readers import read_linear_axes
 from monitor.reporting.certificate.grounds import ground_sentence
 from monitor.reporting.factor_sampling import FactorSampling
@@ -85,6 +86,7 @@ def run(options: Namespace) -> int:
     if options.json:
         output.document(answer)
         return 0
+    answer = on_screen(answer)
     _parameters(answer)
     _machine_frame(answer)
     _coverage(answer)

@@ -88,6 +88,10 @@ def read_laboratory(path: str | Path) -> LaboratoryFile:
     try:
         text = read_bounded(file, LARGEST_SETTINGS).decode("utf-8-sig")
         tables = tomllib.loads(text)
+    except FileNotFoundError as error:
+        raise InputError(
+            f"{file} cannot be read: {error.strerror}; `monitor certificate template` writes a file to fill in"
+        ) from error
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
