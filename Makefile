@@ -1,6 +1,6 @@
 # make demo and make test do all the set-up themselves, once. ARGS goes to the tool: make test ARGS="tests/store -x".
 .DEFAULT_GOAL := help
-.PHONY: supply browser challenge fuzz-http load concurrency kills manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
+.PHONY: supply browser challenge fuzz fuzz-http load concurrency kills lake manual pages real-data help setup demo test slow check format bench trials wheel wheel-parts clean distclean
 .NOTPARALLEL:
 
 export MAKECMDGOALS
@@ -85,8 +85,15 @@ trials: setup  ## slow trials over many seeds, an hour; their last results are i
 concurrency: setup  ## eight importers and twenty readers at one database for ten minutes (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/concurrency.py $(ARGS)
 
-kills: setup  ## twelve verbs killed 500 times at random moments (docs/reliability.md)
+kills: setup  ## thirteen verbs killed 500 times at random moments (docs/reliability.md)
 	@OMP_NUM_THREADS=1 $(RUN) tests/soak/kills.py $(ARGS)
+
+lake: setup  ## plants that publish to one lake at once, some killed in the middle (docs/scale.md); needs PostgreSQL
+	@OMP_NUM_THREADS=1 $(RUN) tests/soak/lake.py $(ARGS)
+
+fuzz: setup  ## coverage-guided inputs for all that reads text, ten minutes a target (docs/reliability.md)
+	@$(RUN) -c 'import atheris' 2>/dev/null || $(RUN) -m pip install --quiet 'atheris>=3'
+	@OMP_NUM_THREADS=1 $(RUN) tests/fuzz/fuzz.py $(ARGS)
 
 # CAMPAIGNS=40 writes and answers fewer of them, DIR=... elsewhere.
 CAMPAIGNS ?= 1000
@@ -112,7 +119,7 @@ supply: setup  ## wheel with its bill of materials in dist/, docs/licences.md, t
 	@$(RUN) tests/setup/supply.py
 
 clean:  ## remove what the others left, except the virtual environment
-	@rm -rf demo-output manual-output pages-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
+	@rm -rf demo-output fuzz-output manual-output pages-output build dist .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
 	@find monitor migrations reports tests examples -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean  ## remove the virtual environment too

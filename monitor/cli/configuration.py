@@ -33,6 +33,7 @@ TEMPLATE = """# The configuration of monitor. Take the # away from what you need
 # mail = "mail.toml"               # what `report --mail` without a file sends by
 # time_zone = "Europe/Berlin"      # of moments that are typed without an offset from UTC; else that of this computer
 # angle_unit = "arcsec"            # of angles on the screen: µrad, arcsec or µm/m
+# trusted_signers = "signers.pem"  # who may sign: certificates (PEM, DER), or a SHA-256 fingerprint a line
 # timestamp_url = "https://tsa.example.org"  # authority whose time stamp (RFC 3161) signed certificates get
 
 # Tolerances by machine type ([machine] model of campaign.toml; "*" for all others): limits of absolute values in µm,
@@ -56,6 +57,7 @@ class Configuration:
     time_zone: str | None = None
     angle_unit: str | None = None
     timestamp_url: str | None = None
+    trusted_signers: Path | None = None
     tolerances: Mapping[str, Mapping[str, float]] | None = None
 
 
@@ -90,7 +92,9 @@ def read(file: Path) -> Configuration:
     if faults:
         raise InputError("\n  ".join([f"{file} was refused:", *faults]))
     paths = {
-        key: file.parent / document[key] for key in ("database", "laboratory", "mail") if key in document
+        key: file.parent / document[key]
+        for key in ("database", "laboratory", "mail", "trusted_signers")
+        if key in document
     }
     texts = {key: document[key] for key in _TEXTS if key in document}
     return Configuration(file, **paths, **texts, tolerances=document.get("tolerances"))
@@ -166,4 +170,5 @@ _CHECKS: dict[str, Callable[[str, Path], str]] = {
     "time_zone": _zone,
     "angle_unit": _angle,
     "timestamp_url": _address,
+    "trusted_signers": _file,
 }

@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 Answer = TypeVar("Answer")
 Further = ParamSpec("Further")
 
+
+def is_lake(address: str) -> bool:
+    """Whether --db names a lake of many plants, and no file."""
+    return address.startswith("ducklake:")
+
+
 #: How long a verb waits for another process that has the database, in s; ``--wait`` says otherwise.
 PATIENCE_S = 300.0
 
@@ -108,6 +114,13 @@ def opened_file(options: Namespace, *, threads: int | None = None, judging: bool
             flush=True,
         )
 
+    if is_lake(options.db):
+        from monitor.store.lake.reading import LakeDatabase
+
+        lake = LakeDatabase(options.db, threads=threads, actor=_user())
+        if judging:
+            lake.type_tolerances = configuration().tolerances or {}
+        return lake
     patience = Patience(options.wait, report)
     db = SharedDatabase(options.db, threads=threads, actor=_user(), patience=patience)
     if judging:
@@ -133,6 +146,8 @@ def check_path(path: str, *, may_be_new: bool) -> None:
 
     A mistyped name would otherwise leave an empty database behind. Raises InputError, NotFoundError.
     """
+    if is_lake(path):
+        return
     if not path.strip() or path.startswith(":memory:"):
         raise InputError(f"--db '{path}' names no file; name one, for example --db monitor.duckdb")
     if not may_be_new and not Path(path).exists():

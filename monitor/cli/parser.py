@@ -46,6 +46,7 @@ VERBS = {
     "audit": "who changed what and when",
     "backup": "a second file with everything, checked",
     "restore": "a database from a backup",
+    "publish": "what was stored since the last time to a lake of many plants",
     "sql": "a query of your own, which may only read",
     "export": "tables as CSV or Parquet files, or as one workbook of Excel",
     "config": "the configuration of this place: show, check, init",

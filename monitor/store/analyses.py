@@ -64,7 +64,9 @@ def save_analysis(
     seed: int | None = None,
     **subject: Unpack[Subject],
 ) -> int:
-    """Store a result; its number. ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend.
+    """Store a result; its number, below zero where the database keeps none (a lake).
+
+    ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend.
 
     Raises DataError for a document that is not JSON (NaN and infinities included), NotFoundError for a
     campaign or machine that is not there.
@@ -75,6 +77,8 @@ def save_analysis(
         text = json.dumps(document, ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError) as fault:
         raise DataError(f"the {kind} result cannot be kept as JSON: {fault}") from fault
+    if not db.keeps_answers:
+        return db.remember(text)
     campaign, machine = subject.get("campaign"), subject.get("machine")
     with db.transaction():
         campaign_id = None if campaign is None else campaign_number(db, campaign)
@@ -210,5 +214,7 @@ def check_analysis(db: Database, number: int) -> None:
 
 def analysis_text(db: Database, number: int) -> str:
     """The document of a stored result as it was written: the text that JSON is."""
+    if number < 0:
+        return db.remembered(number)
     ((text,),) = db.rows("SELECT document FROM v_analyses WHERE analysis_id = ?", [number])
     return str(text)

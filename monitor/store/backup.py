@@ -21,7 +21,7 @@ from monitor import __version__
 from monitor.exceptions import StoreError
 from monitor.store.connection import Database, utc_now
 from monitor.store.database_name import check_database_name
-from monitor.store.opening import sync_folder
+from monitor.store.opening import make_log, sync_folder
 
 _MANIFEST_END = ".manifest.json"
 
@@ -126,6 +126,9 @@ def restore(source: str | Path, target: str | Path) -> Backup:
 
 def _copy(db: Database, partial: Path) -> dict[str, tuple[int, str]]:
     with db.attached(partial, "backup_copy"):
+        # Before anything is in it.
+        os.chmod(partial, _mode(db.path))
+        make_log(str(partial))
         ((database,),) = db.rows("SELECT current_database()")
         db.execute(f"COPY FROM DATABASE {_quoted(database)} TO backup_copy")
         tables = _tables(db)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -26,7 +25,7 @@ import duckdb
 from monitor.exceptions import StoreError
 from monitor.store import migrations
 from monitor.store.database_name import check_database_name
-from monitor.store.opening import connect, damaged, is_missing, make
+from monitor.store.opening import connect, damaged, is_missing, make, make_log
 from monitor.store.turns import Patience
 
 if TYPE_CHECKING:
@@ -62,7 +61,8 @@ class Database:
         self._lock = threading.RLock()
         self._one_writes = threading.RLock()  # of the sessions
         self._in_transaction = False
-        check_database_name(self.path)
+        self._remembered: list[str] = []
+        self._check_name()
         self._available = migrations.available()
         self._connection: duckdb.DuckDBPyConnection | None = None
         if not self.read_only and self.path != ":memory:" and is_missing(self.path):
@@ -81,8 +81,11 @@ class Database:
         """Close the file; other processes can open it then."""
         with self._lock:
             if self._connection is not None:
-                with _as_private_as(self.path):
-                    self._connection.close()
+                self._connection.close()
+
+    def _check_name(self) -> None:
+        """Refuse a name that is none of a database."""
+        check_database_name(self.path)
 
     def patience(self) -> Patience:
         """How long another process is waited for."""
@@ -223,11 +226,12 @@ class Database:
             if self._in_transaction:
                 yield
                 return
-            with self._writing() as connection, _as_private_as(self.path):
+            with self._writing() as connection:
                 connection.begin()
                 self._in_transaction = True
                 try:
                     yield
+                    make_log(self.path)
                     connection.commit()
                 except BaseException as fault:
                     _roll_back(connection)
@@ -245,8 +249,7 @@ class Database:
         """Bring the schema to the present one; refuse a database that does not fit this software."""
         try:
             if not self.read_only:
-                with _as_private_as(self.path):
-                    migrations.migrate(connection, self._available)
+                migrations.migrate(connection, self._available, before_commit=lambda: make_log(self.path))
                 return
             waiting = migrations.pending(connection, self._available)
         except StoreError as fault:
@@ -256,6 +259,18 @@ class Database:
                 f"{self.path}: the database is older than this software and was opened for reading only; "
                 "open it once for writing, which brings it to the present schema"
             )
+
+    #: Whether computed answers are stored; of a lake they are remembered until it is closed.
+    keeps_answers = True
+
+    def remember(self, document: str) -> int:
+        """Remember an answer that is not stored; its number, below zero."""
+        self._remembered.append(document)
+        return -len(self._remembered)
+
+    def remembered(self, number: int) -> str:
+        """Return an answer that was remembered under a number."""
+        return self._remembered[-number - 1]
 
     def is_same_campaign(self, name: str, number: int) -> bool:
         """Whether a name still is that of the campaign that it was before; always, where nobody else writes."""
@@ -269,20 +284,6 @@ def _roll_back(connection: duckdb.DuckDBPyConnection) -> None:
     # A commit that failed has rolled back already; after a fault of the file nothing can be.
     with contextlib.suppress(duckdb.Error):
         connection.rollback()
-
-
-@contextmanager
-def _as_private_as(path: str) -> Iterator[None]:
-    """Let the log that DuckDB writes beside the file be read by those who may read the file, and by nobody else."""
-    try:
-        mode = os.stat(path).st_mode & 0o666
-    except (OSError, ValueError):
-        mode = 0o600
-    before = os.umask(0o666 & ~mode)
-    try:
-        yield
-    finally:
-        os.umask(before)
 
 
 @contextmanager

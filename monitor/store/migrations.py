@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -111,19 +111,25 @@ def pending(connection: duckdb.DuckDBPyConnection, migrations: Sequence[Migratio
     return tuple(migrations[len(ledger) :])
 
 
-def migrate(connection: duckdb.DuckDBPyConnection, migrations: Sequence[Migration]) -> tuple[str, ...]:
+def migrate(
+    connection: duckdb.DuckDBPyConnection,
+    migrations: Sequence[Migration],
+    before_commit: Callable[[], None] = lambda: None,
+) -> tuple[str, ...]:
     """Apply what is pending, each in its own transaction; the names of what was applied.
 
     Raises StoreError naming the migration that failed; nothing of that one is left, those before it stay.
     """
     names = []
     for migration in pending(connection, migrations):
-        _apply(connection, migration)
+        _apply(connection, migration, before_commit)
         names.append(migration.name)
     return tuple(names)
 
 
-def _apply(connection: duckdb.DuckDBPyConnection, migration: Migration) -> None:
+def _apply(
+    connection: duckdb.DuckDBPyConnection, migration: Migration, before_commit: Callable[[], None]
+) -> None:
     try:
         statements = connection.extract_statements(migration.sql)
     except duckdb.Error as fault:
@@ -150,6 +156,7 @@ def _apply(connection: duckdb.DuckDBPyConnection, migration: Migration) -> None:
                 datetime.now(UTC).replace(tzinfo=None),
             ],
         )
+        before_commit()
         connection.commit()
     except duckdb.Error as fault:
         # A commit that found the disk full has rolled back already.

@@ -121,6 +121,22 @@ def _make(path: str, partial: str) -> None:
         _remove(partial)
 
 
+def make_log(path: str) -> None:
+    """Make the log that DuckDB writes beside a file, so that those may read it who may read the file, and no others.
+
+    DuckDB would make it with the mode that the process gives all its files. Called before each commit by whoever has
+    the turn to write; DuckDB opens the empty log as one that it made (1.5.5). One that is there already stays.
+    """
+    if path == ":memory:":
+        return
+    # What is there already was made so; a folder that cannot be written is DuckDB's to report.
+    with contextlib.suppress(OSError, ValueError):
+        mode = stat.S_IMODE(os.stat(path).st_mode) & 0o666
+        name = path + ".wal"
+        os.close(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode))
+        os.chmod(name, mode)
+
+
 def sync_folder(folder: Path) -> None:
     """Write the names of a folder to the disk, so that a file keeps the name that it was given when the power fails."""
     # A file system that cannot do so (some of networks) has its own way.

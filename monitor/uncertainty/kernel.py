@@ -10,10 +10,13 @@ its steps. So a class costs the same for one unknown or for thirty.
 
 from __future__ import annotations
 
+import contextlib
+
 import numba
 import numpy as np
 
 from monitor.records import Array
+from monitor.uncertainty.interrupts import interrupts_kept
 from monitor.uncertainty.program import (
     SHIFT_READING,
     SHIFT_SET,
@@ -556,11 +559,17 @@ def _block(theta, x, gradient, held, segments, steps, entries, walk, probings, d
             gradient[i, begin : begin + width] = out[i, :width]
 
 
+def call_block(*arguments: object) -> None:
+    """Call the compiled block; the first call compiles it or loads it from the cache, and then Ctrl-C waits."""
+    with contextlib.nullcontext() if _block.signatures else interrupts_kept():
+        _block(*arguments)
+
+
 def gradient_of(program: Program, unknowns: Array, inputs: Array) -> Array:
     """J^T r (p, B), whitened, at ``unknowns`` (p, B) and ``inputs`` (N, B); error angles up to 0.01 rad."""
     out = np.empty(unknowns.shape)
     angles = program.sign * program.amount
-    _block(
+    call_block(
         np.ascontiguousarray(unknowns),
         np.ascontiguousarray(inputs),
         out,

@@ -21,6 +21,7 @@ APPROVERS = frozenset(
 )
 #: Questions about files of the computer itself: they stay with the command line there.
 NOT_OFFERED: Mapping[str, str] = {
+    "publish": "a plant publishes beside the server, by monitor publish",
     "restore": "a backup is restored beside the server, by monitor restore: no second database is served",
     "simulate": "a rehearsal is written by monitor simulate; upload its folder",
     "simulate like a folder": "a rehearsal is written by monitor simulate; upload its folder",

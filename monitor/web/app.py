@@ -61,7 +61,7 @@ def application(db: Database, settings: ServerSettings, working_folder: Path) ->
     # Documentation of FastAPI's own would load scripts from elsewhere; the interface describes itself.
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     db.type_tolerances = settings.tolerances
-    asker = Asker(db)
+    asker = Asker(db, settings.trusted_signers)
     app.state.settings = settings
     app.state.sessions = Sessions(users, User(host_user_name(), role))
     app.state.asker = asker

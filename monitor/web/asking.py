@@ -18,17 +18,24 @@ from monitor.web.freshness import IDENTIFYING, REMEMBERED, Freshness
 from monitor.web.users import User
 from monitor.workflow.contract import QUESTIONS
 
+#: Questions that take a file of trusted signers.
+_OF_SIGNERS = ("verify", "verify certificate")
+
 
 class ForbiddenError(MonitorError):
     """A question that the user's role may not ask."""
 
 
 class Asker:
-    """Asks questions of the served database; ``freshness`` says which answers still hold."""
+    """Asks questions of the served database; ``freshness`` says which answers still hold.
 
-    def __init__(self, db: Database) -> None:
+    ``trusted_signers`` is the server's own file of them: nobody names another over HTTP.
+    """
+
+    def __init__(self, db: Database, trusted_signers: Path | None = None) -> None:
         self._db = db
         self.freshness = Freshness()
+        self._own_files = {question: {"trusted": trusted_signers} for question in _OF_SIGNERS}
 
     def __call__(
         self, user: User, question: str, document: Mapping[str, Any] | None = None,
@@ -53,7 +60,8 @@ class Asker:
         self, user: User, question: str, document: Mapping[str, Any], files: Mapping[str, Any],
         tolerances: Mapping[str, Mapping[str, float]] | None,
     ) -> Any:  # fmt: skip
-        request = request_of(question, document, files)
+        own_files: Mapping[str, Any] = self._own_files.get(question, {})
+        request = request_of(question, document, {**own_files, **files})
         asked = QUESTIONS[question]
         arguments = [] if request is None else [request]
         if not asked.needs_database:

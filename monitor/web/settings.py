@@ -20,7 +20,8 @@ class ServerSettings:
 
     ``users`` is the file of tokens (None: no log-in, loopback alone). ``certificate`` and ``key`` are PEM files of TLS;
     ``proxy`` is the name under which a proxy that does TLS is reached. ``reading_only`` makes everybody a viewer.
-    ``tolerances`` are the limits by machine type of the configuration.
+    ``tolerances`` are the limits by machine type of the configuration; ``trusted_signers`` is the file of those whose
+    certificates are called genuine.
     """
 
     database: Path
@@ -32,6 +33,7 @@ class ServerSettings:
     proxy: str | None = None
     reading_only: bool = False
     tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    trusted_signers: Path | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.port <= 65535:

@@ -82,6 +82,7 @@ QUESTIONS = {
         "plan": "plan.plan:plan",
         "poses": "kinematics:poses",
         "predict": "predict.predict:predict",
+        "publish": "publishing:publish",
         "readings": "query:readings",
         "remake certificate": "certificate.remaking:remake",
         "remove effect": "model.change:remove_effect",

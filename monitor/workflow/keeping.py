@@ -29,7 +29,8 @@ class VerifyAnswer:
     """Whether the database is as it was written, with the hash of the last audit entry to be noted elsewhere.
 
     ``anchored_entry`` is the entry that the hash kept elsewhere is of, ``recomputed`` how many identifications were
-    computed anew.
+    computed anew. ``signed_certificates`` is how many of the stored documents bear a signature,
+    ``trusted_signatures`` how many of these are of a trusted signer; None where nobody was named as such.
     """
 
     ok: bool
@@ -38,6 +39,8 @@ class VerifyAnswer:
     faults: tuple[str, ...]
     anchored_entry: int | None = None
     recomputed: int = 0
+    signed_certificates: int | None = None
+    trusted_signatures: int | None = None
 
 
 @dataclass(frozen=True)
@@ -45,12 +48,15 @@ class VerifyRequest:
     """What is verified besides the database itself.
 
     ``anchor`` is a hash of the chain that was kept elsewhere: on paper, on a certificate or in a report. ``recompute``
-    is how many identifications, drawn by the last hash, are computed anew. Raises InputError for what is no hash or
-    number.
+    is how many identifications, drawn by the last hash, are computed anew. ``trusted`` is a file of trusted signers
+    (certificates in PEM or DER, or fingerprints): every signed certificate has to be of one of them.
+
+    Raises InputError for what is no hash or number.
     """
 
     anchor: str | None = None
     recompute: int = 3
+    trusted: Path | None = None
 
     def __post_init__(self) -> None:
         if self.anchor is not None and not re.fullmatch(r"\s*[0-9a-fA-F]{64}\s*", self.anchor):
@@ -60,7 +66,11 @@ class VerifyRequest:
 
 
 def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
-    """Hash everything that is stored anew, compare it with the audit, and compute some identifications again."""
+    """Hash everything that is stored anew, compare it with the audit, and compute some identifications again.
+
+    Raises InputError for a lake.
+    """
+    _refuse_lake(db, "verified")
     with db.reading():
         verification = verify_audit(db)
         faults = list(verification.faults)
@@ -76,9 +86,36 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
     # Computed outside: nobody waits for a fit.
     recomputed, different = recompute(db, verification.last_sha256, request.recompute)
     faults += different
+    signed = trusted = None
+    if request.trusted is not None:
+        # What looks at certificates takes longer to load than most databases to verify.
+        from monitor.workflow.certificate.signatures import stored_signatures
+
+        findings = dict(stored_signatures(db, request.trusted))
+        signed, trusted = len(findings), sum(finding.signer_trusted for finding in findings.values())
+        faults += [
+            f"certificate {number}: {fault}"
+            for number, finding in findings.items()
+            for fault in finding.faults
+        ]
     return VerifyAnswer(
-        not faults, verification.entries, verification.last_sha256, tuple(faults), entry, recomputed
+        not faults,
+        verification.entries,
+        verification.last_sha256,
+        tuple(faults),
+        entry,
+        recomputed,
+        signed,
+        trusted,
     )
+
+
+def _refuse_lake(db: Database, participle: str) -> None:
+    if not db.keeps_answers:
+        raise InputError(
+            f"{db.path} is a lake of many plants, which is not {participle}: the chain is that of each plant's own "
+            "database, and the lake can be made again from these"
+        )
 
 
 @dataclass(frozen=True)
@@ -105,7 +142,11 @@ class AuditAnswer:
 
 
 def audit(db: Database, request: AuditRequest) -> AuditAnswer:
-    """List the last entries of the audit, the newest first, and what is wrong with the chain where that is asked."""
+    """List the last entries of the audit, the newest first, and what is wrong with the chain where that is asked.
+
+    Raises InputError for a lake, which has the chains of its plants beside each other.
+    """
+    _refuse_lake(db, "audited")
     return AuditAnswer(last_entries(db, request.last), chain_faults(db) if request.check else None)
 
 
@@ -127,7 +168,11 @@ class BackupAnswer:
 
 
 def backup(db: Database, request: BackupRequest) -> BackupAnswer:
-    """Copy everything into a second file. Raises StoreError where it exists or cannot be written."""
+    """Copy everything into a second file. Raises StoreError where it exists or cannot be written.
+
+    Raises InputError for a lake, too.
+    """
+    _refuse_lake(db, "copied")
     with db.reading():
         copy = take_backup(db, request.target)
     rows = sum(count for count, _ in copy.tables.values())

@@ -81,7 +81,9 @@ def test_show_one_and_all(typed: Any, issued_once: Any) -> None:
     assert "record" not in typed("certificate", "show", "2026-0001", db=issued_once.db).out
 
 
-def test_a_genuine_certificate_under_any_file_name(typed: Any, issued_once: Any, tmp_path: Path) -> None:
+def test_a_certificate_that_nobody_signed_is_not_called_genuine(
+    typed: Any, issued_once: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     renamed = tmp_path / "it's renamed [1].pdf"
     shutil.copyfile(issued_once.file("2026-0001"), renamed)
     answer = typed("certificate", "verify", renamed, "--json", db=issued_once.db)
@@ -89,9 +91,22 @@ def test_a_genuine_certificate_under_any_file_name(typed: Any, issued_once: Any,
     assert answer.document["number"] == "2026-0001"
     assert answer.document["ok"] is True
     assert set(answer.document["checks"]) == {"hash", "chain", "signature", "database"}
-    assert typed("certificate", "verify", renamed, db=issued_once.db).out.endswith(
-        "certificate 2026-0001 is genuine and valid\n"
-    )
+    # Nobody signed it: that the record matches says nothing against somebody who may write the database.
+    assert answer.document["verdict"] == "not signed"
+    said = typed("certificate", "verify", renamed, db=issued_once.db).out
+    assert said.endswith("certificate 2026-0001 matches this database's record and is in force; not signed\n")
+    assert "genuine" not in said
+    # Who names trusted signers asks for a signature: leaving it out is no way around.
+    Path("signers.txt").write_text("ab" * 32 + "\n")
+    Path("trusting.toml").write_text('trusted_signers = "signers.txt"\n')
+    monkeypatch.setenv("MONITOR_CONFIG", "trusting.toml")
+    asked = typed("certificate", "verify", renamed, db=issued_once.db)
+    assert asked.status == 1
+    assert "the file is not signed, and who names trusted signers asks for a signature" in asked.out
+    assert asked.out.endswith("certificate 2026-0001 is NOT confirmed\n")
+    Path("signers.txt").write_text("somebody\n")
+    refused = typed("verify", "--recompute", 0, db=issued_once.db)
+    assert refused.status == 0  # no document is signed, and none is looked at
 
 
 def test_one_altered_byte_anywhere_is_found(typed: Any, issued_once: Any, tmp_path: Path) -> None:

@@ -130,6 +130,28 @@ def test_trust_is_said_only_against_certificates_that_are_given(signed: bytes, k
     )
 
 
+def test_a_signer_is_trusted_by_fingerprint_or_by_an_authority(
+    signed: bytes, keys: dict[str, Path], tmp_path: Path
+) -> None:
+    # Computed by another library than the product's.
+    certificate = x509.load_pem_x509_certificate(keys["lab.pem"].read_bytes())
+    fingerprints = tmp_path / "signers.txt"
+    fingerprints.write_text(f"\ufeff# ours\n\n{certificate.fingerprint(hashes.SHA256()).hex(':')} # 2026\n")
+    assert check_signature(signed, fingerprints).signer_trusted is True
+    der = tmp_path / "lab.der"
+    der.write_bytes(certificate.public_bytes(Encoding.DER))
+    assert check_signature(signed, der).signer_trusted is True
+    # Nobody named, or another: the signature is whole and says nothing of who made it.
+    assert check_signature(signed).signer_trusted is False
+    assert check_signature(signed, keys["other.pem"]).signer_trusted is False
+    for content in (b"", b"nobody\n", b"ab" * 31, bytes(range(256))):
+        fingerprints.write_bytes(content)
+        with pytest.raises(
+            InputError, match=r"signers\.txt holds no certificates in PEM or DER, and no finger"
+        ):
+            check_signature(signed, fingerprints)
+
+
 def test_an_unsigned_certificate_has_no_finding(plain: bytes) -> None:
     assert check_signature(plain).good is None
 

@@ -18,7 +18,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parents[2]
 VENV = CHECKOUT / ".venv"
 PYTHON = VENV / "bin" / "python"
-EXTRAS = "dev,sign,token,web,cluster"
+EXTRAS = "dev,sign,token,web,cluster,lake"
 # Every file of every pinned version with its SHA-256; made by `make supply` from constraints.txt.
 HASHES = CHECKOUT / "tests" / "setup" / "hashes.txt"
 

@@ -26,6 +26,8 @@ from pathlib import Path
 import monitor.workflow.certificate.issue as issuing
 from monitor.cli import main as verb
 from monitor.store import Database, verify_audit
+from monitor.store.lake.copying import SOURCES
+from monitor.store.lake.reading import LakeDatabase
 from monitor.workflow.contract import QUESTIONS
 
 CHECKOUT = Path(__file__).resolve().parents[2]
@@ -52,12 +54,20 @@ def arguments(name: str, room: Path) -> list[str]:
         "backup": [*database, "backup", str(room / "copy.duckdb")],
         "restore": ["--db", str(room / "again.duckdb"), "restore", str(room / "kept.duckdb")],
         "export": [*database, "export", str(room / "exported")],
+        "publish": [
+            *database,
+            "publish",
+            "--to",
+            f"ducklake:{room}/shops.ducklake",
+            "--files",
+            str(room / "files"),
+        ],
     }[name]
 
 
 VERBS = (
     "import", "identify", "uncertainty", "issue", "amend", "withdraw certificate", "withdraw", "report", "migration",
-    "backup", "restore", "export",
+    "backup", "restore", "export", "publish",
 )  # fmt: skip
 
 
@@ -114,6 +124,8 @@ def faults_after(name: str, room: Path, status: int) -> list[str]:
             if not file.read_bytes().rstrip().endswith(b"%%EOF"):
                 faults.append(f"{file.name} is half a file")
     again, said = typed(arguments(name, room))
+    if name == "publish" and again == 0:
+        faults += lake_faults(room)
     if again != 0 and not (again == 2 and name in DONE_BEFORE and _was_done(name, room, said)):
         faults.append(f"the same verb again: {again} {said}")
     left = sorted(
@@ -122,6 +134,19 @@ def faults_after(name: str, room: Path, status: int) -> list[str]:
     if left and name not in ("amend", "report"):
         faults.append(f"left behind: {', '.join(left)}")
     return faults
+
+
+def lake_faults(room: Path) -> list[str]:
+    """What a lake holds more or less of than the database that was published."""
+    with (
+        LakeDatabase(f"ducklake:{room}/shops.ducklake") as lake,
+        Database(room / "shop.duckdb", read_only=True) as db,
+    ):
+        return [
+            f"the lake has {lake.rows(count)} rows of {table}, the database {db.rows(count)}"
+            for table in SOURCES
+            if lake.rows(count := f"SELECT count(*) FROM {table}") != db.rows(count)
+        ]
 
 
 def _was_done(name: str, room: Path, said: str) -> bool:
@@ -232,9 +257,11 @@ def main() -> int:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--kills", type=int, default=500)
     options.add_argument("--first-seed", type=int, default=0)
+    options.add_argument("--verbs", default=",".join(VERBS), help="which, with commas between them")
     chosen = options.parse_args()
-    hits, wrong = trial(chosen.kills, chosen.first_seed)
-    for name in VERBS:
+    verbs = tuple(chosen.verbs.split(","))
+    hits, wrong = trial(chosen.kills, chosen.first_seed, verbs)
+    for name in verbs:
         print(f"{name:<22} {hits[name]} killed before its end")
     print(f"{chosen.kills} kills from seed {chosen.first_seed}; {len(wrong)} faults")
     for fault in wrong:

@@ -218,6 +218,8 @@ def test_a_new_database_is_its_owners_alone_and_log_and_lock_follow_its_mode(tmp
     path = tmp_path / "mine.duckdb"
     code = (
         "import os, sys; from monitor.store import SharedDatabase\n"
+        # Other threads of the program make files meanwhile, which is none of the database's affair.
+        "os.umask(0); os.umask = None\n"
         "db = SharedDatabase(sys.argv[1])\n"
         "with db.transaction():\n"
         "    db.execute(\"INSERT INTO registered_machine VALUES (1, 'M', 'w X t', TIMESTAMP '2026-01-01')\")\n"

@@ -25,7 +25,7 @@ from monitor.reporting.signature.signature import SignatureFinding, check_signat
 from monitor.reporting.signature.signing import FileKey, sign
 from monitor.store import Database, import_campaign, list_certificates, load_certificate
 from monitor.workflow.certificate import issue as certificates
-from monitor.workflow.certificate.answer import CertificateChecks
+from monitor.workflow.certificate.answer import CertificateChecks, Verdict
 from monitor.workflow.certificate.issue import issue, withdraw
 from monitor.workflow.certificate.remaking import remake
 from monitor.workflow.certificate.request import (
@@ -158,6 +158,21 @@ def test_a_signed_certificate_is_verified_check_by_check(db: Database, key: File
     assert fingerprint in page
     (anchor,) = re.findall(r"isnumber\d+;itsSHA-256is([0-9a-f]{64})", page)
     assert verify(db, VerifyRequest(anchor, recompute=0)).anchored_entry is not None
+    # Genuine is what a trusted signer signed: by fingerprint, as it is printed with colons or without.
+    assert good.verdict is Verdict.SIGNER_NOT_TRUSTED
+    trusted = tmp_path / "signers.txt"
+    trusted.write_text(f"# of 2026\n{fingerprint.upper()}  # ours\n")
+    genuine = verify_file(db, VerificationRequest(file, trusted))
+    assert (genuine.ok, genuine.verdict) == (True, Verdict.GENUINE)
+    whole_database = verify(db, VerifyRequest(recompute=0, trusted=trusted))
+    assert whole_database.signed_certificates == whole_database.trusted_signatures
+    trusted.write_text(":".join(["ab"] * 32))
+    stranger = verify_file(db, VerificationRequest(file, trusted))
+    assert (stranger.ok, stranger.verdict) == (False, Verdict.NOT_CONFIRMED)
+    assert stranger.faults == (
+        "the certificate of Common Name: Made-up Laboratory does not lead to a trusted one",
+    )
+    assert f"certificate S-1: {stranger.faults[0]}" in verify(db, VerifyRequest(trusted=trusted)).faults
     assert remake(db, RemakeRequest("S-1")).identical is True
     whole = file.read_bytes()
     altered = bytearray(whole)

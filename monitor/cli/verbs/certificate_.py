@@ -13,10 +13,11 @@ from monitor.cli.issuing import add_fonts, add_issuing, issuing
 from monitor.cli.parser import common, described
 from monitor.exceptions import InputError
 from monitor.workflow.certificate.answer import (
-    CertificateChecks,
     CertificateFileAnswer,
     CertificatesAnswer,
     CertificateShowAnswer,
+    Verdict,
+    VerificationAnswer,
 )
 from monitor.workflow.certificate.request import (
     AmendmentRequest,
@@ -91,8 +92,10 @@ def _show_options(shown: ArgumentParser) -> None:
 def _verify_options(verified: ArgumentParser) -> None:
     verified.add_argument("file", type=Path, metavar="FILE")
     verified.add_argument(
-        "--trust", type=Path, metavar="PEM", help="certificates that the signer's has to lead to"
-    )
+        "--trust", type=Path, metavar="FILE",
+        help="trusted signers: certificates that the signer's has to lead to (PEM or DER), or a SHA-256 fingerprint a "
+        "line (default: trusted_signers of the configuration)",
+    )  # fmt: skip
     verified.add_argument(
         "--expect", metavar="SHA256", help="the hash of the file as it was noted elsewhere when it was issued"
     )
@@ -239,33 +242,45 @@ def _verify(options: Namespace) -> int:
     from monitor.workflow.certificate.verification import verify_file
 
     with opened(options) as db, output.working("verifying"):
-        answer = ask(db, verify_file, VerificationRequest(options.file, options.trust, options.expect))
+        trusted = options.trust or configuration().trusted_signers
+        answer = ask(db, verify_file, VerificationRequest(options.file, trusted, options.expect))
     if options.json:
         output.document(answer)
         return 0 if answer.ok else 1
-    _say_checks(answer.checks)
+    _say_checks(answer)
     if answer.signer is not None:
-        output.say(f"signed by {answer.signer}{'' if options.trust else ' (not checked against --trust)'}")
+        output.say(f"signed by {answer.signer}")
         output.say(f"           its certificate has the SHA-256 {answer.signer_sha256}")
     if answer.stamped_at is not None:
         output.say(f"           time stamp of {answer.stamped_at:%Y-%m-%d %H:%M:%S %Z}")
     for fault in answer.faults:
         output.say(f"  {fault}")
     name = options.file if answer.number is None else f"certificate {answer.number}"
-    # Only a signer who was checked says who it is from; the database alone may have been rewritten as a whole.
-    verdict = (
-        "genuine and valid" if answer.signer is None or options.trust else "valid, its signer was not checked"
-    )
-    output.say(f"{name} is {verdict if answer.ok else 'NOT confirmed'}")
+    output.say(f"{name} {_VERDICTS[answer.verdict]}")
+    if answer.verdict is Verdict.SIGNER_NOT_TRUSTED:
+        output.say(f"signature intact, signer not trusted: fingerprint {answer.signer_sha256}")
     return 0 if answer.ok else 1
 
 
-def _say_checks(checks: CertificateChecks) -> None:
+#: What is said of a file. The database may have been rewritten as a whole, and anybody can make a key: neither
+#: a record that matches nor an intact signature says by itself who it is from.
+_VERDICTS = {
+    Verdict.GENUINE: "is genuine and valid",
+    Verdict.NOT_SIGNED: "matches this database's record and is in force; not signed",
+    Verdict.SIGNER_NOT_TRUSTED: "matches this database's record and is in force; its signer is not trusted",
+    Verdict.NOT_CONFIRMED: "is NOT confirmed",
+}
+
+
+def _say_checks(answer: VerificationAnswer) -> None:
     """Say what was checked; that nothing was expected of the anchor is no check."""
-    for name, passed in dataclasses.asdict(checks).items():
+    for name, passed in dataclasses.asdict(answer.checks).items():
         if name == "expected" and passed is None:
             continue
-        output.say(f"{name:<10} {'not signed' if passed is None else 'good' if passed else 'FAILED'}")
+        word = "not signed" if passed is None else "good" if passed else "FAILED"
+        if name == "signature" and passed and answer.verdict is not Verdict.GENUINE:
+            word = "intact"
+        output.say(f"{name:<10} {word}")
 
 
 def _template(options: Namespace) -> int:

@@ -63,7 +63,7 @@ def run(options: Namespace) -> int:
     settings = ServerSettings(
         database=Path(options.db), host=options.host, port=options.port, users=options.users,
         certificate=options.certificate, key=options.key, proxy=options.behind_proxy, reading_only=options.read_only,
-        tolerances=configuration().tolerances or {},
+        tolerances=configuration().tolerances or {}, trusted_signers=configuration().trusted_signers,
     )  # fmt: skip
     serve(settings, lambda text: print(text, flush=True))
     return 0

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
 
 from monitor.cli import output
+from monitor.cli.configuration import configuration
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow import keeping
@@ -23,11 +25,17 @@ def options(parser: ArgumentParser) -> None:
         "--recompute", type=int, default=3, metavar="N",
         help="how many identifications to compute anew from the stored readings (default 3)",
     )  # fmt: skip
+    parser.add_argument(
+        "--trust", type=Path, metavar="FILE",
+        help="check the signature of every certificate against these signers: certificates (PEM or DER), or a SHA-256 "
+        "fingerprint a line (default: trusted_signers of the configuration)",
+    )  # fmt: skip
 
 
 def run(options: Namespace) -> int:
     with opened(options) as db, output.working("verifying"):
-        answer = ask(db, keeping.verify, keeping.VerifyRequest(options.anchor, options.recompute))
+        trusted = options.trust or configuration().trusted_signers
+        answer = ask(db, keeping.verify, keeping.VerifyRequest(options.anchor, options.recompute, trusted))
     if options.json:
         output.document(answer)
     else:
@@ -37,8 +45,20 @@ def run(options: Namespace) -> int:
             output.say(f"the hash kept elsewhere is that of entry {answer.anchored_entry}")
         if answer.recomputed:
             output.say(f"identifications computed anew from the stored readings: {answer.recomputed}")
-        verdict = "as it was written" if answer.ok else "NOT as it was written"
+        if answer.signed_certificates is not None:
+            output.say(
+                f"signed certificates: {answer.signed_certificates}, of trusted signers: {answer.trusted_signatures}"
+            )
         output.say(
-            f"{options.db} is {verdict}: {answer.entries} entries, the last with hash {answer.last_sha256}"
+            f"{options.db} {_verdict(answer)}: {answer.entries} entries, the last with hash {answer.last_sha256}"
         )
     return 0 if answer.ok else 1
+
+
+def _verdict(answer: keeping.VerifyAnswer) -> str:
+    """Say what was shown: a record that agrees with itself may have been rewritten as a whole."""
+    if not answer.ok:
+        return "is NOT as it was written"
+    if answer.anchored_entry is None:
+        return "agrees with its own record (--anchor shows that it was not rewritten as a whole)"
+    return f"is as it was written up to entry {answer.anchored_entry}, and agrees with its own record"

@@ -14,6 +14,7 @@ from typing import Any
 
 from monitor.exceptions import InputError
 from monitor.reporting.certificate.record import Signer
+from monitor.reporting.signature.trust import TrustedSigners, read_trusted
 
 #: A file with any of these bytes carries a signature, or carried one before it was altered.
 _MARKS = (b"/ByteRange", b"/ETSI.CAdES.detached", b"/Adobe.PPKLite", b"/Type /Sig")
@@ -24,12 +25,14 @@ class SignatureFinding:
     """The finding about a file's signature: None for ``good`` where it carries none.
 
     ``stamped_at`` is when a time stamp authority saw it; None without a time stamp that fits the signature.
+    ``signer_trusted``: whether the signer is a trusted one; never where nobody was named as such.
     """
 
     good: bool | None
     signer: Signer | None
     faults: tuple[str, ...]
     stamped_at: datetime | None = None
+    signer_trusted: bool = False
 
 
 def is_signed(pdf: bytes) -> bool:
@@ -40,8 +43,8 @@ def is_signed(pdf: bytes) -> bool:
 def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None = None) -> SignatureFinding:
     """Check whether a PDF's signature covers the whole file and fits it.
 
-    ``trusted`` is a PEM or DER file with the certificates that a signer's must lead to; without one nothing is
-    concluded about the signer beyond the name in the certificate. ``at`` (with an offset) is a time at which the
+    ``trusted`` is a file of trusted signers (``trust``); without one nothing is concluded about the signer beyond the
+    name in the certificate, which whoever made the key chose. ``at`` (with an offset) is a time at which the
     signature existed, from another source than the signer: certificates end, and what was signed before stays signed.
     Without it they have to be valid today (ETSI EN 319 102-1, 5.2.6: past validation needs a proof of existence).
     Never raises for the file's own faults: they are the finding. Raises InputError where pyHanko is not installed or
@@ -52,7 +55,8 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
     from pyhanko.sign.validation import validate_pdf_signature
 
     moment = at or datetime.now(UTC)
-    context = _context(trusted, moment)
+    signers = TrustedSigners() if trusted is None else read_trusted(trusted)
+    context = _context(signers, moment)
     # What is wrong is the finding; pyHanko's own log says it again, with a traceback.
     logging.getLogger("pyhanko").setLevel(logging.CRITICAL)
     logging.getLogger("pyhanko_certvalidator").setLevel(logging.CRITICAL)
@@ -72,14 +76,18 @@ def check_signature(pdf: bytes, trusted: Path | None = None, at: datetime | None
         message = f"the file's signature cannot be read: {_message(error)}: altered"
         return SignatureFinding(False, None, (message,))
     faults = _faults_of_file(status, clean)
+    is_trusted = status.trusted or certificate.signer.sha256 in signers.fingerprints
     if trusted is not None:
-        faults += _faults_of_signer(status, certificate, moment)
+        faults += _faults_of_signer(is_trusted, certificate, moment)
     stamp, stamped_at = status.timestamp_validity, None
     if stamp is not None and stamp.intact and stamp.valid:
         stamped_at = stamp.timestamp
     elif stamp is not None:
         faults.append("the time stamp does not fit the signature")
-    return SignatureFinding(not faults, certificate.signer, tuple(faults), stamped_at)
+    good = not faults
+    return SignatureFinding(
+        good, certificate.signer, tuple(faults), stamped_at, good and trusted is not None and is_trusted
+    )
 
 
 @dataclass(frozen=True)
@@ -110,13 +118,13 @@ def _faults_of_file(status: Any, clean: bool) -> list[str]:
     return [fault for passed, fault in checks if not passed]
 
 
-def _faults_of_signer(status: Any, certificate: _Certificate, moment: datetime) -> list[str]:
+def _faults_of_signer(is_trusted: bool, certificate: _Certificate, moment: datetime) -> list[str]:
     signer, first, last = certificate.signer.name, certificate.first, certificate.last
     if not first <= moment <= last:
         return [
             f"the certificate of {signer} is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d}, not on {moment:%Y-%m-%d}"
         ]
-    return [] if status.trusted else [f"the certificate of {signer} does not lead to a trusted one"]
+    return [] if is_trusted else [f"the certificate of {signer} does not lead to a trusted one"]
 
 
 def _room_is_clean(pdf: bytes, covered: list[int]) -> bool:
@@ -148,19 +156,10 @@ def need_pyhanko() -> None:
         raise InputError("signatures need pyHanko: pip install 'machine-health-monitor[sign]'") from error
 
 
-def _context(trusted: Path | None, moment: datetime) -> Any:
-    from pyhanko.keys import load_certs_from_pemder
+def _context(signers: TrustedSigners, moment: datetime) -> Any:
     from pyhanko_certvalidator import ValidationContext
 
-    if trusted is None:
-        return ValidationContext(trust_roots=[], allow_fetching=False, moment=moment)
-    try:
-        roots = list(load_certs_from_pemder([str(trusted)]))  # type: ignore[no-untyped-call]
-    except OSError as error:
-        raise InputError(f"{trusted} cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
-        raise InputError(f"{trusted} holds no certificates in PEM or DER: {error}") from error
-    return ValidationContext(trust_roots=roots, allow_fetching=False, moment=moment)
+    return ValidationContext(trust_roots=list(signers.roots), allow_fetching=False, moment=moment)
 
 
 def _message(error: Exception) -> str:

@@ -66,7 +66,8 @@ def _asked(request: Request, week: str, machine: str) -> Ticket:
     document = {"week": week, **({"machine": machine} if machine else {})}
     desk = request.app.state.desk
     name = "".join(letter if letter.isalnum() else "_" for letter in f"{week} {machine}")
-    folder = Path(request.app.state.working_folder, "reports", f"{desk.asker.generation} {name}"[:120])
+    stamp = "-".join(map(str, desk.asker.freshness.stamp("report", document)))
+    folder = Path(request.app.state.working_folder, "reports", f"{stamp} {name}"[:120])
     ticket: Ticket = desk.ask(request.state.user, "report", document, {"out": folder, "workers": 1})
     return ticket
 

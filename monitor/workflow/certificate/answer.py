@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from enum import StrEnum
 from typing import Any
 
 from monitor.documents import INLINED, OMITTED
@@ -81,9 +82,21 @@ class CertificateChecks:
         )
 
 
+class Verdict(StrEnum):
+    """What may be said of a file: genuine is only what a trusted signer signed.
+
+    Whoever may write the database can make a record that a file of his own matches.
+    """
+
+    GENUINE = "genuine"
+    NOT_SIGNED = "not signed"
+    SIGNER_NOT_TRUSTED = "signer not trusted"
+    NOT_CONFIRMED = "not confirmed"
+
+
 @dataclass(frozen=True)
 class VerificationAnswer:
-    """Whether a file is a genuine and valid certificate of this database; ``faults`` say why not.
+    """Whether a file is a valid certificate of this database, by its ``verdict`` a genuine one; ``faults`` say why not.
 
     ``signer_sha256`` is the fingerprint of the signer's certificate, None where the file is not signed; ``stamped_at``
     when a time stamp authority saw the signature.
@@ -97,3 +110,4 @@ class VerificationAnswer:
     faults: tuple[str, ...]
     signer_sha256: str | None = None
     stamped_at: datetime | None = field(default=None, metadata=OMITTED)
+    verdict: Verdict = Verdict.NOT_CONFIRMED

@@ -164,8 +164,9 @@ class RemakeRequest:
 
 @dataclass(frozen=True)
 class VerificationRequest:
-    """A ``file`` that may be a certificate of this database; ``trusted`` names the certificates (PEM or DER) that the
-    signer's has to lead to, ``expected`` the hash of the file as it was noted elsewhere when it was issued.
+    """A ``file`` that may be a certificate of this database; ``trusted`` is a file of trusted signers
+    (certificates in PEM or DER, or fingerprints), ``expected`` the hash of the file as it was noted elsewhere
+    when it was issued.
 
     Raises InputError for what is no hash.
     """

@@ -1,4 +1,4 @@
-"""Verifies that a file is a genuine and valid certificate of this database."""
+"""Verifies that a file is a valid certificate of this database, and that a trusted signer signed it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from monitor.bounded import LARGEST_DOCUMENT, read_bounded
 from monitor.exceptions import InputError, NotFoundError
 from monitor.reporting.signature.signature import SignatureFinding, check_signature, is_signed
 from monitor.store import Database, StoredCertificate, find_certificate, load_certificate, verify_audit
-from monitor.workflow.certificate.answer import CertificateChecks, VerificationAnswer
+from monitor.workflow.certificate.answer import CertificateChecks, Verdict, VerificationAnswer
 from monitor.workflow.certificate.request import VerificationRequest
 
+_WITHOUT_SIGNATURE = (
+    "the file is not signed, and who names trusted signers asks for a signature of one of them"
+)
 #: The identifier that a certificate's file bears, its number (ISO 32000-2:2020, 14.4).
 _IDENTIFIER = re.compile(rb"/ID ?\[ ?\(([^()\\]*)\)")
 
@@ -33,13 +36,7 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
     number = find_certificate(db, sha256)
     chain = verify_audit(db)
     stored = None if number is None else load_certificate(db, number)
-    # The chain of entries, not the signer, says when this very file was there.
-    at = stored.made_at.replace(tzinfo=UTC) if stored is not None and chain.ok else None
-    signature = SignatureFinding(None, None, ())
-    if is_signed(content):
-        signature = check_signature(content, request.trusted, at)
-    if stored is not None:
-        signature = _as_stated(signature, stored)
+    signature = _signature(content, request, stored, chain.ok)
     signer = signature.signer
     checks = CertificateChecks(
         hash=stored is not None,
@@ -48,19 +45,43 @@ def verify_file(db: Database, request: VerificationRequest) -> VerificationAnswe
         database=stored is not None and stored.state == "issued" and stored.campaign_withdrawn is None,
         expected=None if request.expected is None else request.expected.strip().lower() == sha256,
     )
-    faults = [_unknown(db, file.name, content) if stored is None else _no_longer(stored)]
-    if checks.expected is False:
-        faults.append(f"the file has the hash {sha256}, not the one noted elsewhere")
+    without = request.trusted is not None and signature.good is None
+    ok = checks.passed and not without
+    faults = (
+        _unknown(db, file.name, content) if stored is None else _no_longer(stored),
+        f"the file has the hash {sha256}, not the one noted elsewhere" if checks.expected is False else None,
+        _WITHOUT_SIGNATURE if without else None,
+    )
     return VerificationAnswer(
         number=number,
-        ok=checks.passed,
+        ok=ok,
         state=None if stored is None else stored.state,
         checks=checks,
         signer=None if signer is None else signer.name,
         signer_sha256=None if signer is None else signer.sha256,
         faults=(*filter(None, faults), *signature.faults, *chain.faults),
         stamped_at=signature.stamped_at,
+        verdict=_verdict(signature) if ok else Verdict.NOT_CONFIRMED,
     )
+
+
+def _signature(
+    content: bytes, request: VerificationRequest, stored: StoredCertificate | None, chain_ok: bool
+) -> SignatureFinding:
+    """Return what the file's signature says, held against the certificate that the database stored."""
+    # The chain of entries, not the signer, says when this very file was there.
+    at = stored.made_at.replace(tzinfo=UTC) if stored is not None and chain_ok else None
+    signature = SignatureFinding(None, None, ())
+    if is_signed(content):
+        signature = check_signature(content, request.trusted, at)
+    return signature if stored is None else _as_stated(signature, stored)
+
+
+def _verdict(signature: SignatureFinding) -> Verdict:
+    """Return what may be said of a file that no check speaks against."""
+    if signature.good is None:
+        return Verdict.NOT_SIGNED
+    return Verdict.GENUINE if signature.signer_trusted else Verdict.SIGNER_NOT_TRUSTED
 
 
 def _content(file: Path) -> bytes:

@@ -1,0 +1,94 @@
+"""Opens a lake: the extensions of DuckDB, the address, the retries.
+
+An address is ``ducklake:postgres:dbname=lake host=...`` (catalogue in PostgreSQL, for many plants at once) or
+``ducklake:FILE`` (catalogue in a DuckDB file, for one process at a time). The catalogue holds where the Parquet files
+lie. Passwords do not belong into an address, which everybody sees in the list of processes: PostgreSQL's own client
+library reads ``~/.pgpass`` and ``$PGPASSWORD``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import duckdb
+
+from monitor.exceptions import InputError, StoreError
+
+#: Under which name a lake is attached.
+LAKE = "lake"
+_SCHEME = "ducklake:"
+_EXTENSIONS = {
+    "ducklake": "duckdb_extension_ducklake",
+    "postgres_scanner": "duckdb_extension_postgres_scanner",
+}
+
+
+def is_lake(address: str) -> bool:
+    """Whether a database is named by the address of a lake."""
+    return address.startswith(_SCHEME)
+
+
+def check_lake_address(address: str) -> None:
+    """Raise InputError for what is no address of a lake, or holds a password."""
+    if not is_lake(address) or not address.removeprefix(_SCHEME).strip():
+        raise InputError(
+            f"{address} is no address of a lake; write 'ducklake:postgres:dbname=lake host=db.example.org', or "
+            "ducklake:FILE for a lake of one process at a time"
+        )
+    if re.search(r"password\s*=|://[^/@\s]*:[^/@\s]*@", address):
+        raise InputError(
+            "the address of a lake holds a password, which the list of processes shows to everybody; put it into "
+            "~/.pgpass or $PGPASSWORD, which PostgreSQL's client reads"
+        )
+
+
+def connection_with_extensions(threads: int | None = None) -> duckdb.DuckDBPyConnection:
+    """Return a connection in memory that can attach lakes. Raises InputError where the extra is not installed."""
+    config: dict[str, str | bool | int | float | list[str]] = {
+        "autoinstall_known_extensions": "false",
+        "autoload_known_extensions": "false",
+    }
+    if threads is not None:
+        config["threads"] = str(threads)
+    paths = [_extension(name, module) for name, module in _EXTENSIONS.items()]
+    connection = duckdb.connect(":memory:", config=config)
+    connection.execute("SET enable_progress_bar = false")
+    for path in paths:
+        connection.execute(f"LOAD {literal(str(path))}")
+    return connection
+
+
+def _extension(name: str, module: str) -> Path:
+    spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None:
+        raise InputError("a lake needs extensions of DuckDB: pip install 'machine-health-monitor[lake]'")
+    path = Path(spec.origin).parent / "extensions" / f"v{duckdb.__version__}" / f"{name}.duckdb_extension"
+    if not path.is_file():
+        raise InputError(
+            f"the extension {name} that is installed is not for DuckDB {duckdb.__version__}: "
+            "pip install 'machine-health-monitor[lake]'"
+        )
+    return path
+
+
+def attach(connection: duckdb.DuckDBPyConnection, address: str, *options: str) -> None:
+    """Attach a lake under its name. Raises StoreError for one that cannot be opened or is not there."""
+    check_lake_address(address)
+    bracketed = f" ({', '.join(options)})" if options else ""
+    try:
+        connection.execute(f"ATTACH {literal(address)} AS {LAKE}{bracketed}")
+    except duckdb.Error as fault:
+        raise StoreError(_in_words(address, str(fault))) from fault
+
+
+def _in_words(address: str, message: str) -> str:
+    if "does not exist" in message:
+        return f"there is no lake at {address}; `monitor publish --to {address!r} --files FOLDER` makes one"
+    return f"the lake {address} cannot be opened: {' '.join(message.split())}"
+
+
+def literal(text: str) -> str:
+    """Return a text as SQL writes it, where it cannot be bound."""
+    return "'" + text.replace("'", "''") + "'"

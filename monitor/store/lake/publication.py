@@ -1,0 +1,265 @@
+"""Publishes what a plant stored since it last published: append-only, nothing twice, resumed after any break.
+
+The audit of a plant names everything that it ever stored, in order. A publication is the next entries of it with all
+rows that they record, in one transaction: what was published is known by the last entry, and its hash shows that the
+plant is still the same. A campaign is so published whole or not at all. A transaction that another one was in the way
+of, or that the network lost, is begun anew with growing pauses; what is there by then is not added again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import duckdb
+
+from monitor import __version__
+from monitor.exceptions import StoreError
+from monitor.store.connection import Database, utc_now
+from monitor.store.lake.attaching import LAKE, attach, connection_with_extensions, is_lake, literal
+from monitor.store.lake.copying import PORTION_OF_ENTRIES, attach_origin, statements
+from monitor.store.lake.names import (
+    register_names,
+    register_plant,
+    registered_plant,
+    turn_of,
+    unregistered_names,
+)
+from monitor.store.lake.schema import LARGEST_OWN, check_schema, has_schema, make_schema
+from monitor.store.turns import Patience
+
+Result = TypeVar("Result")
+
+#: Entries of an audit that are published in one transaction.
+PORTION = 200
+#: DuckLake 1.5.5 keeps a few rows in the catalogue instead of a Parquet file, lists and maps of doubles as text that is
+#: not exact (the 17th digit); a test looks whether it still does.
+_NOTHING_INLINED = "DATA_INLINING_ROW_LIMIT 0"
+#: How often a transaction is begun, and the first and longest pause in between, in s.
+_TRIES, _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 40, 0.1, 5.0
+
+
+@dataclass(frozen=True)
+class Published:
+    """What a publication did: the plant's name in the lake, how many entries and rows were added, and how often it was
+    begun anew; ``last_entry`` is the last entry of the plant's audit that the lake holds."""
+
+    plant: str
+    entries: int
+    rows: int
+    last_entry: int
+    last_sha256: str
+    tries: int
+
+
+def publish(
+    db: Database,
+    address: str,
+    *,
+    files: Path | None = None,
+    plant: str | None = None,
+    progress: Callable[[int, int], None] = lambda last, end: None,
+) -> Published:
+    """Publish everything that a database stored since it last published; ``files`` is the folder of a new lake.
+
+    ``plant`` names the database at its first publication (default: the name of its file); ``progress`` is called with
+    the last entry that was published and the last that is there. The database is closed. Raises StoreError, InputError.
+    """
+    if db.path == ":memory:" or is_lake(db.path):
+        raise StoreError(f"{db.path} is no database file of a plant; name one with --db")
+    # Finishes a log that a killed process left, and brings an old schema to the present one.
+    db.rows("SELECT max(entry) FROM audit")
+    # DuckDB's lock belongs to the process: a second opening of the file would end that of the first.
+    db.close()
+    with contextlib.closing(_Publisher(db.path, db.patience(), address, files)) as publisher:
+        return publisher.publish(plant or Path(db.path).stem, progress)
+
+
+class _Publisher:
+    """A connection that has the lake, and the file of the plant for as long as it is read."""
+
+    def __init__(self, path: str, patience: Patience, address: str, files: Path | None) -> None:
+        self._path, self._patience, self._address, self._files = path, patience, address, files
+        self._connection = connection_with_extensions()
+        self._attached = False
+        self._tries = 0
+
+    def close(self) -> None:
+        self._connection.close()
+
+    def publish(self, name: str, progress: Callable[[int, int], None]) -> Published:
+        """Publish portion by portion; the file is let go in between, so that those who write get their turn."""
+        self._again(self._make)
+        with self._origin():
+            plant_no, name = self._again(lambda: self._registered(name))
+        entries = rows = 0
+        while True:
+            with self._origin():
+                first, end, sha256 = self._span(plant_no)
+                if first > end:
+                    return Published(name, entries, rows, end, sha256, self._tries)
+                last = min(first + PORTION - 1, end)
+                added = self._publish_portion(plant_no, name, first, last)
+            if added is not None:
+                entries, rows = entries + last - first + 1, rows + added
+            progress(last, end)
+
+    def _again(self, attempt: Callable[[], Result]) -> Result:
+        """Return what an attempt returns, made anew with growing pauses where the lake refused or was away."""
+        pause = _FIRST_PAUSE_S
+        for remaining in reversed(range(_TRIES)):
+            self._tries += 1
+            try:
+                if not self._attached:
+                    self._attach()
+                return attempt()
+            except (duckdb.Error, StoreError) as fault:
+                self._roll_back()
+                if not remaining or not _may_pass(str(fault)):
+                    if isinstance(fault, StoreError):
+                        raise
+                    raise StoreError(
+                        f"nothing more could be published to {self._address}: {' '.join(str(fault).split())}; what was "
+                        "published stays, and the next `monitor publish` goes on behind it"
+                    ) from fault
+            # No randomness of a result: only when two processes try again.
+            time.sleep(random.uniform(pause / 3, pause))
+            pause = min(1.5 * pause, _LONGEST_PAUSE_S)
+        raise AssertionError("the last try returns or raises")
+
+    def _roll_back(self) -> None:
+        """Forget the transaction and the lake's connection, which may be the one that is broken."""
+        for statement in ("ROLLBACK", "USE memory", f"DETACH {LAKE}"):
+            with contextlib.suppress(duckdb.Error):
+                self._connection.execute(statement)
+        self._attached = False
+
+    def _attach(self) -> None:
+        options = ["CREATE_IF_NOT_EXISTS false"]
+        if self._files is not None:
+            options = [f"DATA_PATH {literal(str(self._files.resolve()))}", "OVERRIDE_DATA_PATH false"]
+        attach(self._connection, self._address, *options, _NOTHING_INLINED)
+        self._attached = True
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        self._connection.begin()
+        yield
+        self._connection.commit()
+
+    def _make(self) -> None:
+        """Make the tables of a new lake; refuse one of another schema."""
+        if not has_schema(self._connection):
+            with self._transaction():
+                make_schema(self._connection)
+        check_schema(self._connection, self._address)
+
+    @contextmanager
+    def _origin(self) -> Iterator[None]:
+        """Have the plant's file for this block, as those have it who read."""
+        attach_origin(self._connection, self._path, self._patience)
+        try:
+            yield
+        finally:
+            with contextlib.suppress(duckdb.Error):
+                self._connection.execute("ROLLBACK")
+            self._connection.execute("DETACH origin")
+
+    def _rows(self, sql: str, *parameters: object) -> list[tuple[Any, ...]]:
+        return self._connection.execute(sql, parameters).fetchall()
+
+    def _registered(self, name: str) -> tuple[int, str]:
+        """Return number and name of the plant, registered where it never published."""
+        first = self._rows("SELECT entry_sha256 FROM origin.audit WHERE entry = 1")
+        if not first:
+            raise StoreError(f"{self._path} holds nothing that could be published")
+        registered = registered_plant(self._connection, first[0][0])
+        if registered is not None:
+            return registered
+        with self._transaction():
+            return register_plant(self._connection, name, first[0][0]), name
+
+    def _span(self, plant_no: int) -> tuple[int, int, str]:
+        """Return the first entry to publish, the last of the audit and its hash. Raises StoreError for another past."""
+        ((end, sha256),) = self._rows("SELECT max(entry), max_by(entry_sha256, entry) FROM origin.audit")
+        published = self._again(lambda: self._last_published(plant_no))
+        if published is None:
+            return 1, end, sha256
+        entry, expected = published
+        if self._rows("SELECT entry_sha256 FROM origin.audit WHERE entry = ?", entry) != [(expected,)]:
+            raise StoreError(
+                f"{self._path} has another past than it published: entry {entry} of its audit, the last that the lake "
+                "holds, is missing or has another hash. The file was put back to an earlier state, or rewritten: "
+                "publish the newer file, or make a new lake from the plants"
+            )
+        return entry + 1, end, sha256
+
+    def _last_published(self, plant_no: int) -> tuple[int, str] | None:
+        """Return number and hash of the last entry that the lake holds of a plant."""
+        rows = self._rows(
+            f"SELECT last_entry, last_sha256 FROM {LAKE}.publication WHERE plant_no = ? ORDER BY 1 DESC LIMIT 1",
+            plant_no,
+        )
+        return rows[0] if rows else None
+
+    def _publish_portion(self, plant_no: int, name: str, first: int, last: int) -> int | None:
+        """Add the entries from first to last with all that they record; rows, None where another process did."""
+        self._connection.execute(PORTION_OF_ENTRIES, {"first": first, "last": last})
+        ((largest,),) = self._rows("SELECT max(number) FROM portion")
+        if largest > LARGEST_OWN:
+            raise StoreError(f"a lake takes numbers of a plant up to {LARGEST_OWN}, not {largest}")
+        self._again(lambda: self._register_names(plant_no, name))
+        return self._again(lambda: self._insert(plant_no, first, last))
+
+    def _register_names(self, plant_no: int, name: str) -> None:
+        if unregistered_names(self._connection, plant_no):
+            with self._transaction():
+                register_names(self._connection, plant_no, name)
+
+    def _insert(self, plant_no: int, first: int, last: int) -> int | None:
+        names = self._rows(
+            f"SELECT kind, name, shown FROM {LAKE}.plant_name WHERE plant_no = ? AND name <> shown", plant_no
+        )
+        self._connection.execute(
+            "CREATE OR REPLACE TEMP TABLE renamed (kind VARCHAR, name VARCHAR, shown VARCHAR)"
+        )
+        if names:
+            self._connection.executemany("INSERT INTO renamed VALUES (?, ?, ?)", names)
+        self._connection.begin()
+        self._connection.execute(f"UPDATE {LAKE}.{turn_of(plant_no)} SET publications = publications + 1")
+        published = self._last_published(plant_no)
+        if (0 if published is None else published[0]) != first - 1:
+            self._connection.rollback()
+            return None
+        ((sha256,),) = self._rows("SELECT entry_sha256 FROM origin.audit WHERE entry = ?", last)
+        copied = sum(
+            self._rows(statement)[0][0]
+            for statement in statements(self._connection, plant_no, {kind for kind, _, _ in names})
+        )
+        self._connection.execute(
+            f"INSERT INTO {LAKE}.publication VALUES (?, ?, ?, ?, ?, ?, ?)",
+            [plant_no, first, last, sha256, copied, __version__, utc_now()],
+        )
+        self._connection.commit()
+        return int(copied)
+
+
+def _may_pass(message: str) -> bool:
+    """Whether a fault may be gone with the next try: a conflict with another writer, or a lake that was away."""
+    return any(
+        phrase in message.lower()
+        for phrase in (
+            "conflict",
+            "connection",
+            "connect to",
+            "failed to commit",
+            "could not set lock",
+            "deadlock",
+        )
+    )
