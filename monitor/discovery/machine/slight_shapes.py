@@ -23,7 +23,8 @@ from monitor.records import Array
 LEVEL, FLIP_LEVEL = 5e-4, 5e-2
 # With fewer runs than this no flip is rare enough: two runs to the power of six are 1 in 64 and more.
 FEWEST_RUNS = 8
-# Fewer runs than this have no other run to speak of: what stands there has to stand beyond any doubt of its noise.
+# Fewer runs than this have no other run to speak of, and a correlation of neighbours is an estimate: what stands
+# there has to stand beyond any doubt of its noise.
 FEWEST, LEVEL_OF_FEW = 3, 1e-6
 # A part of which less than this is left beside the runs' own unknowns shows nothing.
 SMALLEST_SHARE = 1e-2
@@ -57,7 +58,8 @@ def slight_shape(scene: ChainScene, wholes: Sequence[ChainVariant]) -> tuple[str
     if dof < 1 or rest <= 0.0:
         return None
     p_value = float(scipy.special.fdtrc(1, dof, squares / (rest / dof)))
-    if p_value * len(parts) > (LEVEL if runs >= FEWEST else LEVEL_OF_FEW):
+    is_white = runs >= FEWEST and scene.fit.whitening is None
+    if p_value * len(parts) > (LEVEL if is_white else LEVEL_OF_FEW):
         return None
     if runs >= FEWEST_RUNS and _share_of_flips(scene, every, beside.residual, abs(sizes[best])) > FLIP_LEVEL:
         return None
