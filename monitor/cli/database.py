@@ -83,8 +83,8 @@ def _server(options: Namespace, tolerances: Any) -> Server | None:
 
 def served_by(database: str) -> Any:
     """Return the note of the server that has a database now, of the same account; None where there is none."""
-    # Asked before anything is loaded: hardly any database is served.
-    if not os.path.lexists(f"{os.path.realpath(database)}.server"):
+    # Asked before anything is loaded: hardly any database is served. A name with a NUL in it is refused later.
+    if "\0" in database or not os.path.lexists(f"{os.path.realpath(database)}.server"):
         return None
     from monitor.web.note import read_note
 

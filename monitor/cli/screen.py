@@ -33,6 +33,8 @@ IN_UNIT = frozenset(
         *("latest", "latest_u", "slope_per_year", "u_slope", "slope_interval"),
         *("robust_slope_per_year", "robust_interval", "bias", "lower", "upper", "stable_within"),
         *("stepwise", "u_stepwise", "at_once", "u_at_once", "difference_by_method", "u_difference_by_noise"),
+        *("earlier", "later", "parts", "known_beforehand"),
+        *("mean_forward", "mean_backward", "s_forward", "s_backward", "reversal"),
         *("first", "u_first", "second", "u_second", "difference"),
         *("rms", "rms_before", "rms_after", "largest", "repeatability", "expected_rms", "peak"),
         *("residual_deviation", "stated_uncertainty", "heldout_before", "heldout_after", "heldout_rms"),

@@ -75,8 +75,10 @@ FILES: Mapping[str, FileFields] = {
     "report": FileFields(download="out"),
     "selections side by side": _FIGURES,
     "simulate like a campaign": FileFields(download="out", file_name="rehearsal"),
+    "standards": FileFields(downloads=("figures", "csv")),
     "statistics": FileFields(downloads=("figures", "matrices")),
     "trend": _FIGURES,
+    "verify": FileFields(uploads=("trusted",)),
     "verify certificate": FileFields(upload="file", uploads=("trusted",)),
 }
 #: Questions that make a file only where it is asked for, and else answer with a document.

@@ -29,7 +29,7 @@ class ForbiddenError(MonitorError):
 class Asker:
     """Asks questions of the served database; ``freshness`` says which answers still hold.
 
-    ``trusted_signers`` is the server's own file of them: nobody names another over HTTP.
+    ``trusted_signers`` is the server's own file of them, for whoever sends none.
     """
 
     def __init__(self, db: Database, trusted_signers: Path | None = None) -> None:
@@ -61,7 +61,8 @@ class Asker:
         tolerances: Mapping[str, Mapping[str, float]] | None,
     ) -> Any:  # fmt: skip
         own_files: Mapping[str, Any] = self._own_files.get(question, {})
-        request = request_of(question, document, {**own_files, **files})
+        sent = {name: file for name, file in files.items() if file is not None}
+        request = request_of(question, document, {**own_files, **sent})
         asked = QUESTIONS[question]
         arguments = [] if request is None else [request]
         if not asked.needs_database:

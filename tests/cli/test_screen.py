@@ -87,7 +87,7 @@ OTHER = frozenset(
             "temperature_offset",
         ),
         *("expansion_coefficient", "node_spacing", "budget", "lag_one", "slow", "independent_share"),
-        *("effective_rows",),
+        *("effective_rows", "k_p_of_all", "k_q_of_all", "needed", "position"),
         # the errors of linear axes that a request or a source states: asked for, not answered
         *("proportional", "positioning", "straightness", "squareness"),
     }

@@ -40,7 +40,8 @@ class Silent(np.random.Generator):
 
 
 def test_the_contract_has_every_kind() -> None:
-    assert {kind for kind, *_ in SETUPS.values()} == set(readings())
+    # A pose needs a body of its own on the tool: test_pose_readings.py.
+    assert {kind for kind, *_ in SETUPS.values()} == set(readings()) - {"pose"}
 
 
 @pytest.mark.parametrize("name", SETUPS)

@@ -31,7 +31,8 @@ from monitor.store.lake.copying import OTHERWISE, SOURCES
 from monitor.store.lake.publication import Published, publish
 from monitor.store.lake.reading import LakeDatabase
 from monitor.store.lake.schema import LAKE_TABLES, OWN_BITS
-from monitor.workflow.fleet import FleetRequest, fleet
+from monitor.workflow.fleet.fleet import fleet
+from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.keeping import VerifyRequest, verify
 from monitor.workflow.publishing import PublishRequest
 from monitor.workflow.trend.request import TrendRequest

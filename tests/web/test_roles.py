@@ -19,12 +19,14 @@ FORMS = {
     "/model/add": Role.ENGINEER,
     "/model/undo": Role.ENGINEER,
     "/work/cancel": Role.VIEWER,
+    "/certificate/new": Role.APPROVER,
+    "/certificates/withdraw": Role.APPROVER,
     "/certificates/verify": Role.VIEWER,
     "/logout": Role.VIEWER,
 }
 FIELDS = {
     "machine": "HU40-T", "text": "x", "campaign": "nowhere", "effect": "EXX:const", "to": "samba", "model": "samba",
-    "number": "1", "at": "2026-01-01T00:00:00+00:00",
+    "number": "1", "reason": "x", "at": "2026-01-01T00:00:00+00:00",
 }  # fmt: skip
 
 

@@ -9,10 +9,9 @@ about the directions of the instrument's frame, at ``LEVER`` as a length.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from monitor.machine import orientation
 from monitor.methods.chain.first_frame import nearest_rotation
@@ -97,7 +96,7 @@ class Pose(Point):
         mounts, _ = self._mounts(np.zeros((len(rows), len(self.unknowns))), rows)
         frames = rows.guess[:, :9].reshape(-1, 3, 3)
         turned = np.swapaxes(frames, 1, 2) @ _tool(rows) @ mounts
-        return np.concatenate([points, Rotation.from_matrix(turned).as_quat()[:, [3, 0, 1, 2]]], axis=1)
+        return np.concatenate([points, _rotations().from_matrix(turned).as_quat()[:, [3, 0, 1, 2]]], axis=1)
 
     def _of_places(self, values: Array) -> Array:
         """The unknowns of the place alone."""
@@ -137,7 +136,14 @@ def _measured(rows: Rows) -> Array:
     quaternions = rows.measured[:, 3:]
     whole = np.isfinite(quaternions).all(axis=1, keepdims=True)
     read = np.where(whole, quaternions, [1.0, 0.0, 0.0, 0.0])
-    return np.asarray(Rotation.from_quat(read[:, [1, 2, 3, 0]]).as_matrix())
+    return np.asarray(_rotations().from_quat(read[:, [1, 2, 3, 0]]).as_matrix())
+
+
+def _rotations() -> Any:
+    """Return scipy's rotations, loaded when a pose is read: the registry of methods waits for no solver."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation
 
 
 def _tool(rows: Rows) -> Array:
