@@ -5,9 +5,7 @@ One method, one file. Units are those of the arrays passed in; nothing here know
 
 from monitor.statistics.backtest import Backtest, backtest
 from monitor.statistics.changes import Change, History, find_changes
-from monitor.statistics.components import VarianceComponents, variance_components
-from monitor.statistics.conditions import Coefficient, Cycle, Dependence, DependenceUnits, dependence
-from monitor.statistics.control import (
+from monitor.statistics.charts.control import (
     ControlChart,
     CusumChart,
     Reference,
@@ -18,6 +16,9 @@ from monitor.statistics.control import (
     known_reference,
     reference_period,
 )
+from monitor.statistics.charts.vector_control import VectorChart, mewma_chart, mewma_limit, t_squared_chart
+from monitor.statistics.components import VarianceComponents, variance_components
+from monitor.statistics.conditions import Coefficient, Cycle, Dependence, DependenceUnits, dependence
 from monitor.statistics.fdr import FalseDiscoveries, control_false_discoveries
 from monitor.statistics.forecast import Crossing, Forecast, forecast, predict
 from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
@@ -45,7 +46,6 @@ from monitor.statistics.normality import Normality, normality
 from monitor.statistics.pooling import Covariance, Pooling, pool
 from monitor.statistics.trend import Resemblance, Trend, trend
 from monitor.statistics.variances import bartlett, levene
-from monitor.statistics.vector_control import VectorChart, mewma_chart, mewma_limit, t_squared_chart
 from monitor.statistics.warmup import WarmUp, warm_up
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Makes the limits of ``monitor/statistics/chart_limits.py`` anew: ``python tests/benchmarks/trial_chart_limits.py``.
+"""Makes the limits of ``statistics/charts/chart_limits.py`` anew: ``python tests/benchmarks/trial_chart_limits.py``.
 
 Prints its tables. Takes some minutes: 20 000 simulated charts for each number of parameters.
 """
@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 
 from monitor.exceptions import DataError
-from monitor.statistics.chart_limits import ARL, ARL_VECTOR, LAM, REFERENCE, SEED, SIZES, TRIALS, K
-from monitor.statistics.run_length import cusum_run_length, ewma_run_length, solved_limit
-from monitor.statistics.vector_control import mewma_limit
+from monitor.statistics.charts.chart_limits import ARL, ARL_VECTOR, LAM, REFERENCE, SEED, SIZES, TRIALS, K
+from monitor.statistics.charts.run_length import cusum_run_length, ewma_run_length, solved_limit
+from monitor.statistics.charts.vector_control import mewma_limit
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ from monitor.statistics import (
     trend,
     welch_anova,
 )
-from monitor.statistics.control import Reference
+from monitor.statistics.charts.control import Reference
 
 LINEWIDTHS = Path(__file__).resolve().parents[1] / "references" / "nist-cases" / "nist_LINEWID.DAT"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from monitor.statistics import ewma_chart, mewma_chart, reference_period
-from monitor.statistics.chart_limits import (
+from monitor.statistics.charts.chart_limits import (
     ARL,
     ARL_VECTOR,
     LAM,
@@ -17,8 +17,8 @@ from monitor.statistics.chart_limits import (
     tabulated_limit,
     tabulated_vector_limit,
 )
-from monitor.statistics.run_length import cusum_run_length, ewma_run_length, run_length
-from monitor.statistics.vector_control import mewma_limit
+from monitor.statistics.charts.run_length import cusum_run_length, ewma_run_length, run_length
+from monitor.statistics.charts.vector_control import mewma_limit
 
 
 @pytest.mark.parametrize("n", [5, 8, 17, 30, 60])

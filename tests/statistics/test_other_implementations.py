@@ -11,7 +11,7 @@ import statsmodels.api as sm
 from scipy import optimize, signal
 
 from monitor.statistics import DependenceUnits, dependence, mewma_limit, warm_up
-from monitor.statistics.run_length import cusum_run_length, ewma_run_length
+from monitor.statistics.charts.run_length import cusum_run_length, ewma_run_length
 from monitor.units import DEGREE_CELSIUS, METRE, MICROMETRE
 
 HOT_COLD = Path(__file__).resolve().parents[1] / "references" / "campaign-parameters" / "hot-cold.csv"

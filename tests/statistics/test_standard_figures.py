@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from monitor.exceptions import InputError
-from monitor.statistics.circles import circles
-from monitor.statistics.positioning import directions_of_approach, positioning
+from monitor.statistics.standards.circles import circles
+from monitor.statistics.standards.positioning import directions_of_approach, positioning
 
 NOISE, GAIN = 0.4, 1e-3
 

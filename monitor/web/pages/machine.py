@@ -70,33 +70,7 @@ def routes() -> APIRouter:
         )
         return attachment(f"{name}.csv", _csv(values).encode("utf-8"))
 
-    @router.get("/machine/periods")
-    def two_periods(
-        request: Request,
-        name: str,
-        since_1: str = "",
-        until_1: str = "",
-        since_2: str = "",
-        until_2: str = "",
-    ) -> Response:
-        """Show two periods of a machine side by side; dates belong to the period whole."""
-        ends = {"since_1": since_1, "until_1": until_1, "since_2": since_2, "until_2": until_2}
-        answer, refusal, chart = None, "", None
-        ask, user = request.app.state.asker, request.state.user
-        if all(ends.values()):
-            try:
-                pair = {"earlier": _whole_days(since_1, until_1), "later": _whole_days(since_2, until_2)}
-                answer = ask(user, "periods", {"machine": name, **pair})
-            except MonitorError as error:
-                refusal = str(error)
-            chart = None if answer is None else periods_chart(answer)
-        values: ValuesAnswer = ask(user, "values", {"machine": name})
-        days = [f"{at:%Y-%m-%d}" for at in values.started_at]
-        return page(
-            request, "periods.html",
-            name=name, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
-            first=min(days, default=""), last=max(days, default=""),
-        )  # fmt: skip
+    router.get("/machine/periods")(_two_periods)
 
     @router.post("/machine/event")
     async def event(request: Request) -> Response:
@@ -108,6 +82,34 @@ def routes() -> APIRouter:
         return RedirectResponse(link("/machine", name=machine), status_code=303)
 
     return router
+
+
+def _two_periods(
+    request: Request,
+    name: str,
+    since_1: str = "",
+    until_1: str = "",
+    since_2: str = "",
+    until_2: str = "",
+) -> Response:
+    """Show two periods of a machine side by side; dates belong to the period whole."""
+    ends = {"since_1": since_1, "until_1": until_1, "since_2": since_2, "until_2": until_2}
+    answer, refusal, chart = None, "", None
+    ask, user = request.app.state.asker, request.state.user
+    if all(ends.values()):
+        try:
+            pair = {"earlier": _whole_days(since_1, until_1), "later": _whole_days(since_2, until_2)}
+            answer = ask(user, "periods", {"machine": name, **pair})
+        except MonitorError as error:
+            refusal = str(error)
+        chart = None if answer is None else periods_chart(answer)
+    values: ValuesAnswer = ask(user, "values", {"machine": name})
+    days = [f"{at:%Y-%m-%d}" for at in values.started_at]
+    return page(
+        request, "periods.html",
+        name=name, ends=ends or {}, answer=answer, refusal=refusal, chart=chart,
+        first=min(days, default=""), last=max(days, default=""),
+    )  # fmt: skip
 
 
 def _check_names(values: ValuesAnswer, parameter: str, campaign: str, *, may_lack: bool) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 from monitor.exceptions import DataError, InputError, NotFoundError, did_you_mean
 from monitor.methods import campaign_method
 from monitor.methods.method import AxisTest, CircleTest, StandardTests
-from monitor.statistics.circles import Circles, circles
-from monitor.statistics.positioning import USUAL_RUNS, AxisFigures, Positioning, positioning
+from monitor.statistics.standards.circles import Circles, circles
+from monitor.statistics.standards.positioning import USUAL_RUNS, AxisFigures, Positioning, positioning
 from monitor.store import Database
 from monitor.units import DEGREE, MICROMETRE, MICRORADIAN
 from monitor.workflow.figure_files import make_folder, save_figure

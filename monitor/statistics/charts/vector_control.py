@@ -15,9 +15,9 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.chart_limits import tabulated_vector_limit
+from monitor.statistics.charts.chart_limits import tabulated_vector_limit
+from monitor.statistics.charts.control import THREE_SIGMA, allowed_correlation, effective_points
 from monitor.statistics.checks import as_matrix
-from monitor.statistics.control import THREE_SIGMA, allowed_correlation, effective_points
 
 #: Steps of the simulated charts that are held at a time: 2000 trials of 20 parameters take 16 MB.
 _STEPS = 50

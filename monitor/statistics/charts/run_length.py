@@ -15,7 +15,7 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.chart_limits import tabulated_limit
+from monitor.statistics.charts.chart_limits import tabulated_limit
 
 #: States of the chain: with 101 the run length of the tables of Lucas and Saccucci (1990) comes to 4 digits.
 STATES = 101

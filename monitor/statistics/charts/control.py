@@ -17,9 +17,9 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
+from monitor.statistics.charts.run_length import cusum_run_length, ewma_run_length, limit_for, run_length
 from monitor.statistics.checks import as_vector
 from monitor.statistics.monotone import lag_one
-from monitor.statistics.run_length import cusum_run_length, ewma_run_length, limit_for, run_length
 
 #: Run length of the three-sigma chart with known parameters, 1 / (2 (1 - Phi(3))).
 THREE_SIGMA = 370.398

@@ -1,0 +1,1 @@
+"""Control charts of one parameter and of the vector of all, with their limits."""
