@@ -26,6 +26,7 @@ from monitor.web.note import Note, note_path, posted, read_note
 from monitor.web.opening import host_user_name, opened
 from monitor.web.settings import ServerSettings
 from monitor.workflow.contract import QUESTIONS
+from monitor.workflow.history.periods import Period
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CAMPAIGN, CURVE, MACHINE = "hidden-spindle-growth", "load-cell", "HU40-T"
@@ -66,10 +67,18 @@ ASKED: list[tuple[str, Callable[[Path], dict[str, Any]]]] = [
     ("event", lambda out: {
         "machine": MACHINE, "text": "belt changed", "at": datetime(2026, 3, 1, 7, tzinfo=UTC), "kind": "repair"}),
     ("trend", lambda out: {"machine": MACHINE, "parameter": "EB0C"}),
+    ("periods", lambda out: {
+        "machine": MACHINE, "earlier": Period(datetime(2026, 3, 2, tzinfo=UTC), datetime(2026, 3, 5, tzinfo=UTC)),
+        "later": Period(datetime(2026, 3, 5, tzinfo=UTC), datetime(2026, 3, 11, tzinfo=UTC))}),
     ("fleet", lambda out: {}),
     ("map", lambda out: {
         "campaign": CAMPAIGN, "points": 3, "compensation": "positioning-csv", "out": out / "tables"}),
+    ("map over the stroke", lambda out: {"campaign": CAMPAIGN, "run": 20, "points": 3}),
     ("plan", lambda out: {"campaign": CAMPAIGN}),
+    ("monte carlo cloud", lambda out: {"campaign": CAMPAIGN, "first": "EXX", "second": "EB0C", "trials": 1000}),
+    ("residuals by driver", lambda out: {"campaign": CAMPAIGN}),
+    ("contributions", lambda out: {"campaign": CAMPAIGN}),
+    ("standards", lambda out: {"campaign": CAMPAIGN, "figures": out / "figures"}),
     ("poses", lambda out: {
         "topology": "w C B X b Z Y (C1) t", "readings": {"X": [0.0, 1.0]}, "errors": {"EXX:poly1": (1.0,)}}),
     ("uncertainty", lambda out: {"campaign": CAMPAIGN, "method": "guf"}),
@@ -111,11 +120,12 @@ ASKED: list[tuple[str, Callable[[Path], dict[str, Any]]]] = [
 
 #: Take seconds: asked in ``make slow`` alone.
 LONG = {
-    "amend certificate", "compare", "identify all", "issue certificate", "map", "model history", "report", "statistics",
+    "amend certificate", "compare", "identify all", "issue certificate", "map", "map over the stroke", "model history",
+    "monte carlo cloud", "report", "residuals by driver", "statistics",
     "selections side by side", "uncertainty",
 }  # fmt: skip
 #: Have no answer here, and the same words for it on both sides.
-REFUSED = {"identify stepwise", "predict", "selections side by side"}
+REFUSED = {"contributions", "identify stepwise", "predict", "selections side by side", "standards"}
 
 
 @dataclass(frozen=True)
@@ -206,7 +216,7 @@ def test_a_server_answers_as_the_database_does(
 
 @pytest.mark.slow
 def test_every_question_of_the_contract_has_the_same_answer_of_a_server(
-    sides: Sides, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, laid_out_once: object
+    sides: Sides, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Typed answers, texts of refusals, and names of files."""
     assert {name for name, _ in ASKED} | set(NOT_OFFERED) == set(QUESTIONS)

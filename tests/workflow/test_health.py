@@ -23,7 +23,7 @@ from monitor.documents import from_document, to_document
 from monitor.exceptions import InputError, NotFoundError
 from monitor.readers import read_campaign
 from monitor.records import AuditAnchor
-from monitor.reporting.health.records import STATES, Change, MachineHealth
+from monitor.reporting.health.records import STATES, Change, Fleet, MachineHealth, fleet_row
 from monitor.reporting.health.render import health_html, health_pdf
 from monitor.reporting.health.words import in_words
 from monitor.store import Database, import_campaign, machine_history, record_event
@@ -184,6 +184,29 @@ def test_pdf_and_html_say_the_same_and_every_machine_has_a_page(week10: dict) ->
     for words in ("Model against measurement", "Data quality", "Conditions of the week", "Blind spots"):
         assert words in pages[1] + pages[2]
         assert words in page
+
+
+def test_a_step_that_is_no_change_of_the_history_is_not_left_beside_nothing_changed(
+    fleet: Database, week10: dict
+) -> None:
+    """`explain` sees a step between two days of the campaign; the history of the machine may hold it for its days'."""
+    health = stored(fleet, "B-stepped")
+    assert health.model is not None
+    assert "EB0C stepped by" in health.model.answer
+    # An event was recorded between its two days: what the history, which is split there, shows is no answer.
+    assert health.model.unchanged == ()
+    page = "".join(health_html(fleet_of(health), [health]))
+    assert "its history shows no change of" not in page
+    days = dataclasses.replace(health, model=dataclasses.replace(health.model, unchanged=("EB0C",)))
+    assert "its history shows no change of EB0C." in "".join(health_html(fleet_of(days), [days]))
+
+
+def fleet_of(health: MachineHealth) -> Fleet:
+    """The first page of a report of one machine."""
+    return Fleet(
+        "2026-W10", date(2026, 3, 2), date(2026, 3, 8), MADE.replace(tzinfo=None), "software", 0.05,
+        (fleet_row(health),),
+    )  # fmt: skip
 
 
 def test_a_week_without_runs_says_so(fleet: Database, tmp_path: Path) -> None:
@@ -358,8 +381,6 @@ def test_a_drift_is_trusted_no_longer_than_the_history_is_long() -> None:
 def test_sixty_letter_names_thirty_parameters_and_other_alphabets_stay_on_the_page(
     fleet: Database, week10: dict, tmp_path: Path
 ) -> None:
-    from monitor.reporting.health.records import Fleet, fleet_row
-
     one = stored(fleet, "B-stepped")
     name = "Обрабатывающий центр " + "W" * 39
     many = tuple(

@@ -80,6 +80,7 @@ class ModelHealth:
     """Model against measurement; ``runs`` says in words which runs were compared.
 
     ``where`` and ``against`` are None where nothing is missing; ``steps`` begin with the method's own model.
+    ``unchanged`` are parameters that stepped between runs of the campaign and have no change in the machine's history.
     """
 
     campaign: str
@@ -96,3 +97,4 @@ class ModelHealth:
     where: ResidualMap | None
     against: ResidualAgainst | None
     steps: tuple[ErrorStep, ...]
+    unchanged: tuple[str, ...] = field(default=(), metadata=OMITTED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
 
@@ -47,7 +47,7 @@ from monitor.workflow.health.verdict import (
 from monitor.workflow.health.weeks import Week
 from monitor.workflow.history.event_steps import event_steps
 from monitor.workflow.history.forecast import drift_forecast
-from monitor.workflow.history.past import machine_past, splitting_events
+from monitor.workflow.history.past import ParameterPast, machine_past, splitting_events
 from monitor.workflow.history.runs import only_runs
 from monitor.workflow.models import resolve_for
 from monitor.workflow.trend.volumetric import VOLUMETRIC
@@ -141,6 +141,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         judgement = Judgement(limits.get(name), judged.single.get(name), drifts[name])
         parameters.append(parameter_health(parameter, starts, stated, judgement, week))
     of_campaign = [run for run in past.runs if run.campaign == last.campaign]
+    unchanged = _unchanged(parameter_pasts, past.events, of_campaign)
     noted = changes_noted(
         parameter_pasts,
         past.events,
@@ -162,7 +163,7 @@ def machine_health(db: Database, past: MachineWeek, computed: TaskResult) -> Mac
         run=_in_words(last),
         basis="" if stated is None else stated.input_covariance, factor=factor_in_words(stated),
         parameters=tuple(parameters), changes=tuple(noted), conditions=condition_ranges(past.runs_of_week),
-        model=model_health(explanation, results.versions, measured.span), quality=quality,
+        model=model_health(explanation, results.versions, measured.span, unchanged), quality=quality,
         map=stated_map(results.map, limit_um, beyond),
     )  # fmt: skip
 
@@ -228,3 +229,13 @@ def _not_measured(db: Database, past: MachineWeek) -> MachineHealth:
         conditions=(), model=None,
         quality=DataQuality(0, 0, 0, (), (), (), past.remarks, past.refused), map=None,
     )  # fmt: skip
+
+
+def _unchanged(
+    pasts: Mapping[str, ParameterPast], events: Sequence[MachineEvent], runs: Sequence[RecordedRun]
+) -> frozenset[str]:
+    """The parameters whose history shows no change; none where an event was recorded since the ``runs`` began."""
+    first = min(run.local_start for run in runs)
+    if any(event.at.replace(tzinfo=None) >= first for event in events):
+        return frozenset()
+    return frozenset(name for name, past in pasts.items() if not past.search.changes)

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 
 import numpy as np
 
 from monitor.reporting.health.comparison import ErrorStep, MissingEffect, ModelHealth, ReversalValue
-from monitor.workflow.explain.explain_answer import MachineExplanation
+from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
 from monitor.workflow.explain.version_answer import CurveVersion, HistoryAnswer, MachineVersion
 from monitor.workflow.health.runs import Span
 from monitor.workflow.identify.answer import Estimate
 
 
 def model_health(
-    explanation: MachineExplanation | None, versions: HistoryAnswer | None, span: Span
+    explanation: MachineExplanation | None,
+    versions: HistoryAnswer | None,
+    span: Span,
+    unchanged: Set[str],
 ) -> ModelHealth | None:
     """The comparison, which is of the runs of ``span``: their number and days are said with it.
 
     ``versions`` of the model are None where there is one only.
+    ``unchanged`` are the parameters whose history shows no change.
     """
     if explanation is None:
         return None
@@ -51,6 +55,13 @@ def model_health(
         where=explanation.residual_map,
         against=explanation.residual_against,
         steps=tuple(_steps(explanation, () if versions is None else versions.steps)),
+        unchanged=tuple(
+            dict.fromkeys(
+                change.parameter
+                for change in explanation.changes
+                if isinstance(change, ChangedParameter) and change.parameter in unchanged
+            )
+        ),
     )
 
 
