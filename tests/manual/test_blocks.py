@@ -39,6 +39,10 @@ NOT_RUN = {
         "pages.md",
         """$ curl -s -H 'Content-Type: application/json' -d '{"campaign": "five-days"}' http://127.0.0.1:8765/api/v1/compare""",
     ),
+    (
+        "command-line.md",
+        "$ export MONITOR_SERVER=https://monitor.example MONITOR_SERVER_TOKEN_FILE=~/.config/monitor/token",
+    ),
     ("scale.md", "$ pip install 'machine-health-monitor[lake]'"),
     ("tutorial.md", "$ make demo"),
 }
