@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import http.client
-import ipaddress
 import json
 import socket
 import ssl
@@ -26,7 +25,7 @@ from monitor.exceptions import InputError, NotFoundError
 from monitor.web.access import JUDGING, NOT_OFFERED, STAYING
 from monitor.web.note import Note
 from monitor.web.parcel import MEDIA_TYPE, check_targets, packed_question, travelling, unpacked_answer
-from monitor.web.settings import DEFAULT_PORT, UPLOAD_BYTES
+from monitor.web.settings import DEFAULT_PORT, UPLOAD_BYTES, is_loopback
 from monitor.workflow.contract import QUESTIONS
 
 #: How long a server may take to be reached, in s. An answer may take as long as it takes to compute.
@@ -55,12 +54,7 @@ class Address:
     @property
     def is_this_computer(self) -> bool:
         """Whether nothing that is sent leaves the computer."""
-        if self.host == "localhost":
-            return True
-        try:
-            return ipaddress.ip_address(self.host).is_loopback
-        except ValueError:
-            return False
+        return is_loopback(self.host)
 
 
 def address_of_server(text: str) -> Address:

@@ -14,6 +14,16 @@ DEFAULT_PORT = 8765
 UPLOAD_BYTES = 64 * 2**20
 
 
+def is_loopback(host: str) -> bool:
+    """Whether a name or address is that of this computer alone."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
 @dataclass(frozen=True)
 class ServerSettings:
     """The database to serve, the address to listen at, and what protects it.
@@ -63,12 +73,7 @@ class ServerSettings:
     @property
     def is_loopback(self) -> bool:
         """Whether only this computer reaches the server."""
-        if self.host == "localhost":
-            return True
-        try:
-            return ipaddress.ip_address(self.host).is_loopback
-        except ValueError:
-            return False
+        return is_loopback(self.host)
 
     @property
     def is_encrypted(self) -> bool:
