@@ -106,7 +106,8 @@ def test_a_certificate_that_nobody_signed_is_not_called_genuine(
     assert asked.out.endswith("certificate 2026-0001 is NOT confirmed\n")
     Path("signers.txt").write_text("somebody\n")
     refused = typed("verify", "--recompute", 0, db=issued_once.db)
-    assert refused.status == 0  # no document is signed, and none is looked at
+    assert refused.status == 2  # a file that names nobody is no answer to who is trusted
+    assert "signers.txt holds no certificates" in refused.err
 
 
 def test_one_altered_byte_anywhere_is_found(typed: Any, issued_once: Any, tmp_path: Path) -> None:
@@ -169,3 +170,14 @@ def test_an_unknown_key_of_the_laboratory_is_refused(typed: Any, db: Path, labor
         assert words in answer.err
     Path("x.toml").write_bytes(b"\xff\xfe\x00")
     assert typed("certificate", "issue", "cold-cold", "--run", 3, "--laboratory", "x.toml", db=db).status == 2
+
+
+@pytest.mark.parametrize("content", [None, ""])
+def test_signers_that_cannot_be_read_are_refused_though_nothing_is_signed(
+    typed: Any, db: Path, content: str | None
+) -> None:
+    if content is not None:
+        Path("signers.pem").write_text(content, encoding="utf-8")
+    answer = typed("verify", "--recompute", 0, "--trust", "signers.pem", db=db)
+    assert answer.status == 2
+    assert "signers.pem cannot be read" in answer.err or "signers.pem holds no certificates" in answer.err
