@@ -16,7 +16,15 @@ from monitor.store.analyses import (
     stored_analyses,
 )
 from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_anchor, last_entries
-from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
+from monitor.store.backups import (
+    Backup,
+    Restored,
+    list_backups,
+    restore,
+    snapshot,
+    take_backup,
+    take_increment,
+)
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
     CampaignRow,
@@ -115,6 +123,7 @@ __all__ = [
     "Patience",
     "QueryResult",
     "RecordedRun",
+    "Restored",
     "RunRow",
     "SelectionRow",
     "SharedDatabase",
@@ -207,6 +216,7 @@ __all__ = [
     "snapshot",
     "stored_analyses",
     "take_backup",
+    "take_increment",
     "tolerance_types",
     "type_in_use",
     "verify_audit",
