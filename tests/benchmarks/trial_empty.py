@@ -30,10 +30,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from by_path import load
 
-from monitor.discovery.machine.acceptance import ChainAcceptance
-from monitor.discovery.machine.correlation import Correlation
+from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
 from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.fit import Fit, fit
+from monitor.discovery.machine.noise.correlation import Correlation
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.search.evidence import Pool, best_of_families, weigh_beside

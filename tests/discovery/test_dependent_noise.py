@@ -11,9 +11,9 @@ import scipy
 from by_path import load
 
 from monitor.discovery import explain, fit
-from monitor.discovery.machine.correlation import Correlation, Rows, Whitening
+from monitor.discovery.machine.noise.correlation import Correlation, Rows, Whitening
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.discovery.search.evidence import Pool, weigh_beside
 from monitor.discovery.search.sign_flips import p_value_by_flips, signs
 from monitor.effects import parse_effect
