@@ -8,8 +8,9 @@ independent.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +22,9 @@ from monitor.records import Array
 # Correlations of neighbours and shares of the correlated part that are tried; neighbours on this grid differ by less
 # than what 8 runs of 62 probings determine (about 0.05).
 CORRELATIONS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97, 0.99, 0.998)
-SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1)
+# Without the shares between 0.8 and 1 the drift of a random walk over a run was taken for half of what it is, and told
+# as an effect in up to 3 % of empty campaigns (docs/trials-discovery.md).
+SHARES = (1.0, 0.99, 0.97, 0.94, 0.89, 0.8, 0.67, 0.5, 0.33, 0.2, 0.1)
 # More runs than this say nothing more that the grid could tell apart.
 MOST_RUNS = 5
 # Neighbours that resemble each other by less than so many standard deviations of white noise are white.
@@ -31,6 +34,8 @@ FAR = 8
 # Twice the logarithm of the likelihood ratio from which on noise is correlated: 10 % of white campaigns with two
 # parameters. Taking white noise for hardly correlated noise costs next to nothing.
 LIKELIER = 4.6
+# Numbers that are filtered in one piece (32 MB).
+PIECE = 4_000_000
 # Directions of which a filter leaves less than this part (squared) are unknown to it.
 SMALLEST_EIGENVALUE = 1e-9
 
@@ -69,6 +74,65 @@ class Rows:
 
 
 @dataclass(frozen=True)
+class Filters:
+    """The filters of Kalman of C correlations for runs in which the touches ``weighted`` (R, T) were read."""
+
+    correlations: tuple[Correlation, ...]
+    weighted: npt.NDArray[np.bool_]
+
+    @cached_property
+    def _rho(self) -> Array:
+        return np.array([correlation.rho for correlation in self.correlations])
+
+    @cached_property
+    def _recursion(self) -> tuple[Array, Array, Array]:
+        """Gains and reciprocal standard deviations of the innovations, (C, R, T) each and zero where nothing was read,
+        and the logarithm (C, R) of the product of their variances."""
+        rho = self._rho[:, None]
+        share = np.array([correlation.share for correlation in self.correlations])[:, None]
+        gain = np.zeros((len(rho), *self.weighted.shape))
+        variance = np.ones_like(gain)
+        predicted = np.broadcast_to(share, gain.shape[:2])
+        for touch, present in enumerate(self.weighted.T):
+            if touch:
+                predicted = rho**2 * predicted + share * (1.0 - rho**2)
+            total = predicted + (1.0 - share)
+            gain[..., touch] = np.where(present, predicted / total, 0.0)
+            variance[..., touch] = np.where(present, total, 1.0)
+            predicted = predicted * (1.0 - gain[..., touch])
+        return gain, self.weighted / np.sqrt(variance), np.log(variance).sum(axis=2)
+
+    @property
+    def logarithm(self) -> Array:
+        """The logarithms (C, R) of the determinants of the noise covariances of one number a touch."""
+        return self._recursion[2]
+
+    def apply(self, readings: Array) -> Array:
+        """Innovations (C, R, T, k) of readings (R, T, k), divided by their standard deviations."""
+        gain, reciprocal, _ = self._recursion
+        rho = self._rho[:, None, None]
+        white = np.empty((len(rho), *readings.shape))
+        predicted = np.zeros((len(rho), len(readings), readings.shape[2]))
+        for touch in range(readings.shape[1]):
+            innovation = readings[None, :, touch] - predicted
+            white[:, :, touch] = innovation * reciprocal[..., touch, None]
+            predicted = rho * (predicted + innovation * gain[..., touch, None])
+        return white
+
+    def apply_transposed(self, white: Array) -> Array:
+        """The transposed filters, (C, R, T, k), of white numbers (C, R, T, k)."""
+        gain, reciprocal, _ = self._recursion
+        rho = self._rho[:, None, None]
+        result = np.empty(white.shape)
+        ahead = np.zeros((*white.shape[:2], white.shape[3]))
+        for touch in reversed(range(white.shape[2])):
+            scaled, before = white[:, :, touch] * reciprocal[..., touch, None], rho * ahead
+            result[:, :, touch] = scaled + gain[..., touch, None] * before
+            ahead = before - gain[..., touch, None] * before - scaled
+        return result
+
+
+@dataclass(frozen=True)
 class Whitening:
     """The filter that takes a correlation out of numbers (..., R, N) run by run, as a triangle of weights."""
 
@@ -79,25 +143,10 @@ class Whitening:
     def factors(self) -> tuple[Array, Array]:
         """Lower triangles (R, T, T) that make the touches of every run independent, and the logarithm (R,) of the
         determinant of the noise covariance for unit variance."""
-        rho, share = self.correlation.rho, self.correlation.share
-        weighted = self.rows.weighted
-        runs, touches = weighted.shape
-        triangle = np.zeros((runs, touches, touches))
-        level = np.zeros((runs, touches))
-        variance = np.ones((runs, touches))
-        predicted = np.full(runs, share)
-        for touch in range(touches):
-            if touch:
-                predicted = rho**2 * predicted + share * (1.0 - rho**2)
-            total, present = predicted + (1.0 - share), weighted[:, touch]
-            innovation = -rho * level
-            innovation[:, touch] += 1.0
-            triangle[:, touch] = innovation * (present / np.sqrt(total))[:, None]
-            gain = np.where(present, predicted / total, 0.0)
-            level = rho * level + innovation * gain[:, None]
-            variance[:, touch] = np.where(present, total, 1.0)
-            predicted = predicted * (1.0 - gain)
-        return triangle, self.rows.numbers * np.log(variance).sum(axis=1)
+        filters = Filters((self.correlation,), self.rows.weighted)
+        runs, touches = self.rows.weighted.shape
+        unit = np.broadcast_to(np.eye(touches), (runs, touches, touches))
+        return filters.apply(unit)[0], self.rows.numbers * filters.logarithm[0]
 
     def __call__(self, numbers: Array) -> Array:
         """Independent numbers (..., R, N) of equal variance from correlated ones."""
@@ -150,16 +199,24 @@ def deviations(residual: Array, rows: Rows, cells: npt.NDArray[np.int64]) -> Arr
     return result
 
 
-@dataclass(frozen=True)
-class _White:
-    """What one correlation makes of a plan: the ``triangle`` (R, T, T), the span of what is unknown (R, N, p) less the
-    correlation, its decomposition (R, p), (R, p, p), and the part of the criterion that no residual changes."""
+# Every correlation that is tried; the first is white noise.
+GRID = (Correlation(0.0, 0.0), *(Correlation(rho, share) for share in SHARES for rho in CORRELATIONS))
 
-    triangle: Array
-    unknowns: Array
+
+@dataclass(frozen=True)
+class _Whites:
+    """What the ``filters`` of the grid make of a plan: the decomposition (C, R, p), (C, R, p, p) of the filtered span
+    of what is unknown, and the part (C,) of the criterion that no residual changes."""
+
+    filters: Filters
     values: Array
     vectors: Array
-    logarithm: float
+    logarithm: Array
+
+    @property
+    def able(self) -> npt.NDArray[np.bool_]:
+        """Which directions of the span a filter leaves to be estimated (C, R, p)."""
+        return np.asarray(self.values > SMALLEST_EIGENVALUE)
 
 
 @dataclass(frozen=True)
@@ -179,22 +236,22 @@ class NoiseDesign:
         readings, rest = self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
         if self._resemblance(readings) < NOTICED:
             return None
-        criterion = partial(self._criterion, readings, rest)
-        best = min((Correlation(rho, 1.0) for rho in CORRELATIONS), key=criterion)
+        criterion = dict(zip(GRID, self._criteria(readings, rest).tolist(), strict=True))
+        best = min((Correlation(rho, 1.0) for rho in CORRELATIONS), key=criterion.__getitem__)
         # The more independent noise, the more alike has the rest to be.
         start = CORRELATIONS.index(best.rho)
         trials = [
             Correlation(rho, share) for share in SHARES for rho in CORRELATIONS[max(start - 1, 0) :: 2][:4]
         ]
-        best = min((best, *trials), key=criterion)
-        least = criterion(best)
-        if criterion(Correlation(0.0, 0.0)) - least <= LIKELIER:
+        best = min((best, *trials), key=criterion.__getitem__)
+        least = criterion[best]
+        if criterion[GRID[0]] - least <= LIKELIER:
             return None
         # A slow drift under much independent noise: far readings resemble each other as much as neighbours, hardly.
         # Of the slow correlations that are likelier still the slowest counts: a drift that is taken for white noise
         # makes an effect.
-        slow = [Correlation(rho, share) for share in SHARES for rho in CORRELATIONS if rho >= best.rho]
-        return max((best, *(trial for trial in slow if criterion(trial) < least)), key=slowness)
+        slow = [trial for trial in GRID[1:] if trial.rho >= best.rho and criterion[trial] < least]
+        return max((best, *slow), key=slowness)
 
     @cached_property
     def _runs(self) -> npt.NDArray[np.int64]:
@@ -213,10 +270,6 @@ class NoiseDesign:
     def _share(self) -> float:
         """The part of the degrees of freedom that the means over the runs leave."""
         return (len(self.basis) - 1) / len(self.basis) if len(self.basis) > 1 else 1.0
-
-    @cached_property
-    def _whites(self) -> dict[Correlation, _White]:
-        return {}
 
     def _parts(self, numbers: Array) -> tuple[Array, Array]:
         """Columns (R, N, k) as readings (R, T, d k) in their own directions, and what is no reading (R, e, k)."""
@@ -243,31 +296,35 @@ class NoiseDesign:
         deviates = np.cumsum(beyond) / np.sqrt(np.maximum(lags * number, 1.0))
         return float(max(deviates[0], deviates[-1])) if len(lags) else 0.0
 
-    def _criterion(self, readings: Array, rest: Array, correlation: Correlation) -> float:
-        """Minus twice the logarithm of the restricted likelihood, but for a constant."""
-        if correlation not in self._whites:
-            self._whites[correlation] = self._white(correlation)
-        white = self._whites[correlation]
-        residual = _flat(white.triangle @ readings, rest, self.rows.numbers)[..., 0]
-        able = white.values > SMALLEST_EIGENVALUE
-        onto = np.einsum("rij,ri->rj", white.vectors, np.einsum("rnp,rn->rp", white.unknowns, residual))
-        squares = float(
-            np.sum(residual**2) - np.sum(np.where(able, onto**2 / np.where(able, white.values, 1.0), 0.0))
-        )
-        number = self._share * (int(self._weighted.sum()) * self.rows.numbers - int(able.sum()))
-        return self._share * white.logarithm + number * float(np.log(max(squares, 1e-300)))
+    def _criteria(self, readings: Array, rest: Array) -> Array:
+        """Minus twice the logarithm of the restricted likelihood (C,) of the grid, but for a constant."""
+        whites, numbers = self._whites, self.rows.numbers
+        residual = whites.filters.apply(readings)
+        unknowns, unknown_rest = self._own
+        spans = unknowns.reshape(*readings.shape, -1)
+        onto = np.einsum("rtdp,crtd->crp", spans, whites.filters.apply_transposed(residual), optimize=True)
+        onto += np.einsum("rep,re->rp", unknown_rest, rest[..., 0])
+        onto = (np.swapaxes(whites.vectors, 2, 3) @ onto[..., None])[..., 0]
+        able = whites.able
+        fitted = np.sum(np.where(able, onto**2 / np.where(able, whites.values, 1.0), 0.0), axis=(1, 2))
+        squares = np.sum(residual**2, axis=(1, 2, 3)) + float(np.sum(rest**2)) - fitted
+        number = self._share * (int(self._weighted.sum()) * numbers - able.sum(axis=(1, 2)))
+        return np.asarray(self._share * whites.logarithm + number * np.log(np.maximum(squares, 1e-300)))
 
-    def _white(self, correlation: Correlation) -> _White:
-        plain = Rows(self._weighted, self.rows.numbers, None)
-        triangle, determinant = Whitening(plain, correlation).factors
-        unknowns = _flat(triangle @ self._own[0], self._own[1], self.rows.numbers)
-        values, vectors = np.linalg.eigh(np.swapaxes(unknowns, 1, 2) @ unknowns)
+    @cached_property
+    def _whites(self) -> _Whites:
+        at_once = max(1, PIECE // max(self._own[0].size, 1))
+        products = [self._products(GRID[first : first + at_once]) for first in range(0, len(GRID), at_once)]
+        values, vectors = np.linalg.eigh(np.concatenate(products))
         able = values > SMALLEST_EIGENVALUE
-        logarithm = float(determinant.sum() + np.sum(np.log(np.where(able, values, 1.0))))
-        return _White(triangle, unknowns, values, vectors, logarithm)
+        filters = Filters(GRID, self._weighted)
+        logarithm = self.rows.numbers * filters.logarithm.sum(axis=1)
+        logarithm += np.sum(np.log(np.where(able, values, 1.0)), axis=(1, 2))
+        return _Whites(filters, values, vectors, logarithm)
 
-
-def _flat(readings: Array, rest: Array, numbers: int) -> Array:
-    """Readings (R, T, d k) and what is no reading (R, e, k), one after the other (R, N, k)."""
-    runs, touches = readings.shape[:2]
-    return np.concatenate([readings.reshape(runs, touches * numbers, -1), rest], axis=1)
+    def _products(self, correlations: Sequence[Correlation]) -> Array:
+        """The products (C, R, p, p) of the filtered span of what is unknown with itself."""
+        unknowns, rest = self._own
+        white = Filters(tuple(correlations), self._weighted).apply(unknowns)
+        span = white.reshape(*white.shape[:2], -1, rest.shape[-1])
+        return np.asarray(np.swapaxes(span, 2, 3) @ span + np.swapaxes(rest, 1, 2) @ rest)
