@@ -31,7 +31,7 @@ from monitor.store import (
     verify_audit,
     withdraw_campaign,
 )
-from monitor.store.backups.manifest import file_sha256
+from monitor.store.copies.manifest import file_sha256
 
 ARCHIVES = Path(__file__).parents[1] / "archives"
 
