@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from monitor.documents import data_key
+from monitor.documents import Sentence, data_key
 
 Schema = dict[str, Any]
 
@@ -46,7 +46,12 @@ class Schemas:
         """Return the schema of a type, a reference where it is a record."""
         origin, members = typing.get_origin(hint), typing.get_args(hint)
         if origin in (typing.Union, types.UnionType):
-            return {"anyOf": [self.of(member) for member in members]}
+            written = [
+                member for member in members if member is not Sentence
+            ]  # its document is the text beside it
+            return (
+                {"anyOf": [self.of(member) for member in written]} if len(written) > 1 else self.of(*written)
+            )
         if origin is typing.Literal:
             return {"enum": list(members)}
         if origin is np.ndarray:
