@@ -12,7 +12,7 @@ from scipy import stats
 
 from monitor.discovery import Verdict, compare, fit
 from monitor.discovery.machine.compare import lack_of_fit
-from monitor.discovery.machine.correlation import Correlation
+from monitor.discovery.machine.noise.correlation import Correlation
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.search.comparison import split
 from monitor.methods.samba.method import problem_of
