@@ -280,9 +280,9 @@ def _conditions(db: Database, runs: list[RecordedRun]) -> tuple[dict[str, Array]
     for campaign, number, channel, value in _with_marks(
         db, _CHANNELS, sorted({run.campaign_id for run in runs})
     ):
-        row = rows.get((campaign, number))
-        if row is None:
+        if (campaign, number) not in rows:
             continue
+        row = rows[campaign, number]
         means = conditions.setdefault(channel, np.full(len(runs), np.nan))
         means[row] = value if np.isnan(means[row]) else means[row]
     return conditions, frozenset(set(conditions) - of_runs)
