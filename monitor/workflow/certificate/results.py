@@ -144,10 +144,13 @@ def results_of(
             evaluation=_evaluation(evaluated, texts, monte_carlo, method),
             refused=answer.refused,
             residuals=ResidualSummary(
-                "target",
+                "setup" if evaluated.campaign.artefact.setups else "target",
                 tuple(answer.residuals.by_target_um),
                 tuple(answer.residuals.by_target_um.values()),
-                MICROMETRE.to_display(evaluated.campaign.probe.standard_uncertainty),
+                # Several instruments have no one uncertainty to compare all targets with.
+                None
+                if evaluated.campaign.artefact.setups
+                else MICROMETRE.to_display(evaluated.campaign.probe.standard_uncertainty),
             ),
             trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
             validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
@@ -286,7 +289,8 @@ def _how_it_fits(evaluated: StatedUncertainty, texts: Texts) -> str:
         texts.number(round_to_place(value, decimal_of(0.01)))
         for value in (residuals.rms_um, residuals.expected_rms_um)
     )
-    fits = texts("evaluation.fit", rms=rms, expected=expected)
+    of_setups = bool(evaluated.campaign.artefact.setups)
+    fits = texts("evaluation.fit_setups" if of_setups else "evaluation.fit", rms=rms, expected=expected)
     if evaluated.counts_lack_of_fit:
         fits += "; " + texts("evaluation.fit_counted")
     elif residuals.something_is_missing:
