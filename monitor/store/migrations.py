@@ -20,7 +20,7 @@ import duckdb
 
 from monitor import __version__
 from monitor.exceptions import StoreError
-from monitor.store import gathering
+from monitor.store.past import gathering
 from monitor.store.resources import migration_folder
 
 _FILE_NAME = re.compile(r"(\d{4})_[a-z0-9_]+\.sql")
