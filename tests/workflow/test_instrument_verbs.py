@@ -18,7 +18,7 @@ from monitor.records import Campaign, Probings
 from monitor.reporting.certificate.completeness import IncompleteCertificateError
 from monitor.reporting.covariance_source import CovarianceKind
 from monitor.store import Database, import_campaign, load_certificate
-from monitor.uncertainty.row_run import measured_run
+from monitor.uncertainty import measured_run
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.request import CertificateRequest
 from monitor.workflow.uncertainty.evaluation import uncertainty
@@ -108,7 +108,7 @@ def test_a_certificate_names_every_instrument(
     stated.write_text(text.replace("\nprobe =", '\ninstruments = "R 17"\nprobe ='), encoding="utf-8")
     with pdf_unread():
         answer = issue(db, CertificateRequest("r-test", laboratory=stated, out=tmp_path, draft=True))
-    document = load_certificate(db, answer.certificate.number).document
+    document = load_certificate(db, answer.certificate.number).record
     assert [entry["name"] for entry in document["references"]] == ["instrument R-test (r-test)"]
     assert document["references"][0]["certificate"] == "R 17"
     residuals = document["results"][0]["residuals"]
@@ -132,5 +132,5 @@ def test_a_certificate_of_the_campaign_comes_first(
     import_campaign(db, read_campaign(folder))
     with pdf_unread():
         answer = issue(db, CertificateRequest("named", laboratory=LABORATORY, out=tmp_path, draft=True))
-    document = load_certificate(db, answer.certificate.number).document
+    document = load_certificate(db, answer.certificate.number).record
     assert document["references"][0]["certificate"] == "4711"
