@@ -143,15 +143,7 @@ def results_of(
             state=state or texts("record.as_found"),
             evaluation=_evaluation(evaluated, texts, monte_carlo, method),
             refused=answer.refused,
-            residuals=ResidualSummary(
-                "setup" if evaluated.campaign.artefact.setups else "target",
-                tuple(answer.residuals.by_target_um),
-                tuple(answer.residuals.by_target_um.values()),
-                # Several instruments have no one uncertainty to compare all targets with.
-                None
-                if evaluated.campaign.artefact.setups
-                else MICROMETRE.to_display(evaluated.campaign.probe.standard_uncertainty),
-            ),
+            residuals=_residuals(evaluated),
             trials=None if monte_carlo is None or method == "guf" else monte_carlo.trials,
             validation=None if monte_carlo is None else _verdict(monte_carlo, texts),
             descriptions={
@@ -162,6 +154,18 @@ def results_of(
             budget=_budget(answer),
         ),
         texts,
+    )
+
+
+def _residuals(evaluated: StatedUncertainty) -> ResidualSummary:
+    """What the model leaves of the run, by target; of several instruments there is no one uncertainty beside it."""
+    by_target, campaign = evaluated.answer.residuals.by_target_um, evaluated.campaign
+    of_setups = bool(campaign.artefact.setups)
+    return ResidualSummary(
+        "setup" if of_setups else "target",
+        tuple(by_target),
+        tuple(by_target.values()),
+        None if of_setups else MICROMETRE.to_display(campaign.probe.standard_uncertainty),
     )
 
 
