@@ -261,7 +261,7 @@ class Setup:
     ``direction`` and ``tool_direction`` are parallel to the machine's frame at all axes zero. ``length`` (mm) of a bar
     is free where ``length_uncertainty`` is None; ``direction_uncertainty`` (rad) is that of a beam across its
     direction, None where nobody states it. ``along`` is the axis of a straightness, ``side`` that of a level, ``frame``
-    that in which a vector is read; ``known`` names the unknowns that are held at what is stated.
+    that in which a vector is read; ``known`` names the unknowns held as stated; ``certificate`` is the instrument's.
     """
 
     id: str
@@ -280,6 +280,7 @@ class Setup:
     frame: Branch = "work"
     known: tuple[str, ...] = ()
     turn_uncertainty: float | None = None
+    certificate: str | None = None
 
 
 @dataclass(frozen=True)

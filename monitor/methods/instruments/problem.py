@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -15,7 +15,7 @@ from monitor.effects.catalogue import of_drives, of_sight
 from monitor.machine import ChainPose, Orientation, evaluate, orientation
 from monitor.methods.chain.least_squares import Linearisation, Solution, eliminate
 from monitor.methods.chain.problem import ChainProblem
-from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance
+from monitor.methods.instruments.reading import Reading, Rows, Shown, Stance, in_mm
 from monitor.records import Array, Setup
 
 # What points somewhere or is looked at from outside (a mount, a robot) hides more than a machine tool: the tube of a
@@ -108,6 +108,31 @@ class InstrumentProblem(ChainProblem):
         if len(names) == 1:
             return next(iter(names))
         return tuple(f"number {number + 1}" for number in range(self.sigma.shape[1]))
+
+    @cached_property
+    def is_number(self) -> npt.NDArray[np.bool_]:
+        """The entries (n, d) that the kind of a row has."""
+        numbers = np.zeros(self.sigma.shape, dtype=bool)
+        for part in self.parts:
+            numbers[part.at, : len(part.reading.numbers)] = True
+        return numbers
+
+    @cached_property
+    def read_columns(self) -> tuple[str, ...]:
+        """The columns of all kinds that there are."""
+        return tuple(dict.fromkeys(name for part in self.parts for name in part.reading.columns))
+
+    def with_read(self, channels: Mapping[str, Array]) -> Self:
+        """Return the problem with other numbers in the columns of its kinds; frames and centres stay."""
+        parts = []
+        for part in self.parts:
+            measured = part.rows.measured.copy()
+            for index, name in enumerate(part.reading.columns[: measured.shape[1]]):
+                if name in channels:
+                    measured[:, index] = in_mm(name, channels[name][part.at])
+            measured[np.isnan(part.rows.measured)] = np.nan
+            parts.append(replace(part, rows=replace(part.rows, measured=measured)))
+        return replace(self, parts=tuple(parts))
 
     @property
     def largest_error(self) -> float:
