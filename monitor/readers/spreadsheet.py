@@ -24,6 +24,8 @@ from monitor.records import SourceFile
 
 #: Instead of NAME.csv: a workbook of that table, or one workbook with a sheet of its name for every table.
 WORKBOOK = "campaign.xlsx"
+#: A workbook packs to a tenth; what unpacks to a thousand times its size is an attack.
+UNPACKED_BYTES = 512 * 2**20
 _COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
 _POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+([eE][+-]?[0-9]+)?")
 _TRUTHS = {"WAHR": "true", "FALSCH": "false", "TRUE": "true", "FALSE": "false"}
@@ -102,6 +104,13 @@ def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | N
         )  # fmt: skip
         return None
     try:
+        with zipfile.ZipFile(io.BytesIO(content)) as packed:
+            unpacked = sum(member.file_size for member in packed.infolist())
+        if unpacked > UNPACKED_BYTES:
+            faults.add(
+                file, None, None, f"it unpacks to more than {UNPACKED_BYTES // 2**20} MiB; that is no table"
+            )
+            return None
         with warnings.catch_warnings():
             # What openpyxl does not keep (drop-down lists, colours) is not read either.
             warnings.simplefilter("ignore")

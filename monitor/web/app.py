@@ -31,6 +31,7 @@ from monitor.web.pages import (
 )
 from monitor.web.pages import fleet as fleet_page
 from monitor.web.pages import machine as machine_page
+from monitor.web.previews import Previews
 from monitor.web.rendering import refusal_page
 from monitor.web.sessions import Sessions
 from monitor.web.settings import ServerSettings
@@ -67,6 +68,7 @@ def application(db: Database, settings: ServerSettings, working_folder: Path) ->
     app.state.asker = asker
     desk = Desk(asker)
     app.state.desk = desk
+    app.state.previews = Previews()
     app.state.working_folder = working_folder
     app.include_router(static_routes())
     app.include_router(interface(asker, working_folder))

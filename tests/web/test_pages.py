@@ -245,7 +245,10 @@ def test_a_certificate_is_issued_amended_and_withdrawn_by_form(
         # Only a ground that is there may be accepted.
         accepted = {}
         preview = served.client.post("/certificate/new", data={**form, "button": "preview"})
-    assert "nothing was issued" in preview.text
+    assert "nothing was issued, and nothing stored" in preview.text
+    assert served.client.get("/certificate/preview.pdf").content.startswith(b"%PDF")
+    assert served.ask("certificates")[1]["certificates"] == []
+    assert served.ask("verify")[0] == 200
     issued = served.client.post("/certificate/new", data={**form, **accepted, "button": "issue"})
     number = re.findall(r"Certificate (\S+) is issued", issued.text)[0]
     pdf = served.client.get(f"/certificate.pdf?number={number}")
@@ -397,3 +400,41 @@ def test_the_model_page_of_a_curve_has_no_machine(local: Any) -> None:
     text = looked_at(local, "/model?campaign=load-cell")
     assert "load_N:poly2" in text
     assert 'id="scene-run"' not in text
+
+
+def test_a_workbook_of_excel_is_imported_and_refused_at_its_cells(
+    imported: Path, serve: Any, tmp_path: Path
+) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    copy = tmp_path / "copy.duckdb"
+    copy.write_bytes(imported.read_bytes())
+    served = serve(copy, False)
+    folder = EXAMPLES / "nothing-hidden"
+
+    def upload(cell: tuple[int, int] | None, with_toml: bool = True) -> Any:
+        workbook = openpyxl.Workbook()
+        workbook.remove(workbook.active)
+        for name in ("runs", "probings"):
+            sheet = workbook.create_sheet(name)
+            with (folder / f"{name}.csv").open(encoding="utf-8") as stream:
+                for row in csv.reader(stream):
+                    sheet.append(row)
+        if cell is not None:
+            workbook["probings"].cell(*cell, value="much")
+        packed = io.BytesIO()
+        workbook.save(packed)
+        files = [("file", ("campaign.xlsx", packed.getvalue()))]
+        if with_toml:
+            files.append(("file", ("campaign.toml", (folder / "campaign.toml").read_bytes())))
+        return served.client.post("/import", data={"proof": served.proof()}, files=files)
+
+    column = next(csv.reader((folder / "probings.csv").open(encoding="utf-8"))).index("x_mm") + 1
+    refused = upload((7, column))
+    assert refused.status_code == 422
+    assert re.search(r"campaign\.xlsx.*(row|line) 7.*x_mm.*much", refused.text), refused.text[-3000:]
+    alone = upload(None, with_toml=False)
+    assert alone.status_code == 400
+    assert "choose both files together" in alone.text
+    answer = upload(None)
+    assert answer.status_code == 200
+    assert "nothing-hidden: imported" in answer.text

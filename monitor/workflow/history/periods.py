@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError
+from monitor.statistics import control_false_discoveries
 from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_after
 from monitor.store import Database, MachineHistory, followed_by, machine_history
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.series import Series, parameter_series
+
+#: False discovery rate over the parameters of a comparison.
+RATE = 0.05
 
 
 @dataclass(frozen=True)
@@ -58,8 +62,9 @@ class ParameterOfPeriods:
     """A parameter in both periods, None where one has no run: means over the days, their difference (later less
     earlier) with its standard uncertainty by the scatter of the days and its coverage factor ``k`` for 95 %.
 
-    ``differs`` is whether the difference exceeds its uncertainty; None where the days do not say how days differ, or
-    days that follow each other may explain it.
+    ``q_value`` is the false discovery rate at which the parameter is among those that differ, over all parameters of
+    the comparison (Benjamini and Hochberg); ``p_value`` is its own. ``differs`` is whether that rate is at most 5 %;
+    None where the days do not say how days differ, or where it is so for independent days of one scatter only.
     """
 
     unit: str
@@ -68,6 +73,8 @@ class ParameterOfPeriods:
     difference: float | None
     u: float | None
     k: float | None
+    p_value: float | None
+    q_value: float | None
     differs: bool | None
     tolerance: float | None
 
@@ -108,16 +115,17 @@ def periods(db: Database, request: PeriodsRequest) -> PeriodsAnswer:
                 f"{period.until:%Y-%m-%d}"
             )
     days = [len({at.date() for at in history.part(mask).started_at}) for mask in masks]
+    compared = {
+        name: _compared(series, history.campaign[of], request, history.tolerances.get(name))
+        for name, (series, of) in parameter_series(history).items()
+    }
     return PeriodsAnswer(
         machine=request.machine,
         earlier=request.earlier,
         later=request.later,
         runs=(int(masks[0].sum()), int(masks[1].sum())),
         days=(days[0], days[1]),
-        parameters={
-            name: _compared(series, history.campaign[of], request, history.tolerances.get(name))
-            for name, (series, of) in parameter_series(history).items()
-        },
+        parameters=_with_discovery_rates(compared),
         conditions={
             name: ConditionOfPeriods(*(_mean(values[mask]) for mask in masks))
             for name, values in history.conditions.items()
@@ -136,8 +144,8 @@ def _mean(values: npt.NDArray[np.float64]) -> float | None:
 
 def _compared(
     whole: Series, campaigns: npt.NDArray[np.str_], request: PeriodsRequest, tolerance: float | None
-) -> ParameterOfPeriods:
-    """One parameter; its other days help to say how days differ."""
+) -> tuple[ParameterOfPeriods, BeforeAfter | None]:
+    """One parameter, not yet judged among the others; its other days help to say how days differ."""
     steady = whole.steady
     steady_campaigns = campaigns[~whole.warm_up] if len(steady.values) < len(whole.values) else campaigns
     ends = [
@@ -160,16 +168,19 @@ def _compared(
             )  # fmt: skip
         except DataError:
             judged = None
-    return ParameterOfPeriods(
+    parameter = ParameterOfPeriods(
         unit=whole.unit,
         earlier=means[0],
         later=means[1],
         difference=None if means[0] is None or means[1] is None else means[1] - means[0],
         u=None if judged is None else judged.u,
         k=None if judged is None else judged.k,
-        differs=_differs(judged),
+        p_value=None,
+        q_value=None,
+        differs=None,
         tolerance=tolerance,
     )
+    return parameter, judged
 
 
 def _mean_of_days(series: Series) -> float | None:
@@ -179,5 +190,34 @@ def _mean_of_days(series: Series) -> float | None:
     return float((np.bincount(index, series.values) / np.bincount(index)).mean())
 
 
-def _differs(judged: BeforeAfter | None) -> bool | None:
-    return None if judged is None or judged.agree is None else not judged.agree
+def _with_discovery_rates(
+    compared: Mapping[str, tuple[ParameterOfPeriods, BeforeAfter | None]],
+) -> dict[str, ParameterOfPeriods]:
+    """The parameters judged together: of a machine that did not change one comparison in twenty says that any differs,
+    where each by itself would say so of one parameter in twenty."""
+    judged = [before_after for _, before_after in compared.values()]
+    of_days = np.array([np.nan if each is None or not each.decided else each.p_value() for each in judged])
+    of_rivals = np.array([np.nan if each is None else each.p_value_of_rivals() for each in judged])
+    cautious = np.fmax(of_days, np.where(np.isnan(of_days), np.nan, of_rivals))
+    independent = control_false_discoveries(of_days, rate=RATE)
+    discoveries = control_false_discoveries(cautious, rate=RATE)
+    return {
+        name: replace(
+            parameter,
+            p_value=_number(cautious[index]),
+            q_value=_number(discoveries.q_value[index]),
+            differs=_differs(of_days[index], independent.q_value[index], discoveries.q_value[index]),
+        )
+        for index, (name, (parameter, _)) in enumerate(compared.items())
+    }
+
+
+def _differs(p_value: float, of_independent_days: float, q_value: float) -> bool | None:
+    """Whether a parameter differs by its rate; None where only if days are independent, or where nothing is known."""
+    if np.isnan(p_value) or of_independent_days <= RATE < q_value:
+        return None
+    return bool(q_value <= RATE)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
