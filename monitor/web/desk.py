@@ -111,11 +111,7 @@ class Desk:
         ``files`` are paths that the server itself fills in; they are no part of what is asked.
         """
         check_role(user, question)
-        key = (
-            question,
-            json.dumps(document, sort_keys=True, default=str),
-            self.asker.freshness.stamp(question, document),
-        )
+        key = self._key(question, document)
         with self._lock:
             ticket = self._tickets.get(key)
             if ticket is not None and ticket.is_good and not (anew and ticket.is_taken_back):
@@ -127,6 +123,19 @@ class Desk:
             while len(self._tickets) > MOST:
                 del self._tickets[next(iter(self._tickets))]
             return ticket
+
+    def standing(self, question: str, document: Mapping[str, Any]) -> Ticket | None:
+        """Return the ticket of a question that was asked since the last change, None where nobody did; asks nothing."""
+        with self._lock:
+            ticket = self._tickets.get(self._key(question, document))
+        return ticket if ticket is not None and ticket.is_good else None
+
+    def _key(self, question: str, document: Mapping[str, Any]) -> tuple[str, str, Stamp]:
+        return (
+            question,
+            json.dumps(document, sort_keys=True, default=str),
+            self.asker.freshness.stamp(question, document),
+        )
 
     def _answered(
         self,

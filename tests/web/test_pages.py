@@ -19,7 +19,7 @@ import pytest
 
 from monitor.documents import from_document
 from monitor.reporting.certificate.laboratory import read_laboratory
-from monitor.web.charts.machine import machine_traces
+from monitor.web.charts.machine import machine_traces, motion_of
 from monitor.web.charts.residuals import scene_vectors
 from monitor.web.laboratory_form import box_of, groups, laboratory_file, texts_of_file
 from monitor.workflow.explain.residual_vectors import ResidualsAnswer
@@ -83,6 +83,42 @@ def test_what_an_effect_explains_is_what_it_takes_off_the_residual(residuals: di
     rms = np.sqrt(np.mean(explained**2, axis=0))
     assert rms[2] > 5.0 * max(rms[0], rms[1])
     assert np.sqrt(np.mean(remaining**2)) < np.sqrt(np.mean(left**2))
+
+
+@pytest.mark.parametrize(
+    ("effect", "axis", "moved", "along", "words"),
+    [
+        ("EZC1:const@warmup", "C1", ("C1",), ("shift", 2), "C1 shifts along Z and the tool"),
+        ("EB0C:const", "C", ("C",), ("turn", 1), "C turns about Y and the workpiece"),
+        (
+            "EAX:linear",
+            "X",
+            ("X", "B", "C"),
+            ("turn", 0),
+            "X turns about X, and with it B, C and the workpiece",
+        ),
+        ("EYY:linear", "Y", ("Y", "C1"), ("shift", 1), "Y shifts along Y, and with it C1 and the tool"),
+    ],
+)
+def test_an_effect_moves_its_axis_and_what_that_carries(
+    residuals: dict[str, Any],
+    effect: str,
+    axis: str,
+    moved: tuple[str, ...],
+    along: tuple[str, int],
+    words: str,
+) -> None:
+    answer = from_document(ResidualsAnswer, {**residuals, "effect": effect, "effect_axis": axis})
+    motion = motion_of(answer)
+    assert motion is not None
+    assert (motion.axes, motion.words) == (moved, words)
+    for kind in ("shift", "turn"):
+        directions = np.flatnonzero(getattr(motion, kind)).tolist()
+        assert directions == ([along[1]] if kind == along[0] else [])
+    assert (
+        motion_of(from_document(ResidualsAnswer, {**residuals, "effect": "ball:scale", "effect_axis": None}))
+        is None
+    )
 
 
 def test_residuals_by_driver_are_the_residuals_in_groups(local: Any, residuals: dict[str, Any]) -> None:
@@ -428,7 +464,8 @@ def test_a_workbook_of_excel_is_imported_and_refused_at_its_cells(
             files.append(("file", ("campaign.toml", (folder / "campaign.toml").read_bytes())))
         return served.client.post("/import", data={"proof": served.proof()}, files=files)
 
-    column = next(csv.reader((folder / "probings.csv").open(encoding="utf-8"))).index("x_mm") + 1
+    with (folder / "probings.csv").open(encoding="utf-8") as stream:
+        column = next(csv.reader(stream)).index("x_mm") + 1
     refused = upload((7, column))
     assert refused.status_code == 422
     assert re.search(r"campaign\.xlsx.*(row|line) 7.*x_mm.*much", refused.text), refused.text[-3000:]

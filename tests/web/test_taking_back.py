@@ -118,7 +118,7 @@ def test_a_page_says_who_took_it_back_and_offers_to_compute_it(local: Any) -> No
     desk: Desk = local.client.app._app.state.desk
     free = Event()
     busy = [desk._pool.submit(free.wait) for _ in range(2)]
-    address = "/campaign?name=load-cell"
+    address = "/campaign?name=hidden-spindle-growth"
     try:
         assert "waiting for others" in local.client.get(address).text
         ticket: Ticket = next(ticket for ticket in desk.under_way() if ticket.question == "statistics")

@@ -64,7 +64,7 @@ class ParameterOfPeriods:
 
     ``q_value`` is the false discovery rate at which the parameter is among those that differ, over all parameters of
     the comparison (Benjamini and Hochberg); ``p_value`` is its own. ``differs`` is whether that rate is at most 5 %;
-    None where the days do not say how days differ, or where it is so for independent days of one scatter only.
+    None where the days do not say how days differ, or where days that are not independent may explain it by themselves.
     """
 
     unit: str
@@ -193,31 +193,24 @@ def _mean_of_days(series: Series) -> float | None:
 def _with_discovery_rates(
     compared: Mapping[str, tuple[ParameterOfPeriods, BeforeAfter | None]],
 ) -> dict[str, ParameterOfPeriods]:
-    """The parameters judged together: of a machine that did not change one comparison in twenty says that any differs,
-    where each by itself would say so of one parameter in twenty."""
-    judged = [before_after for _, before_after in compared.values()]
-    of_days = np.array([np.nan if each is None or not each.decided else each.p_value() for each in judged])
-    of_rivals = np.array([np.nan if each is None else each.p_value_of_rivals() for each in judged])
-    cautious = np.fmax(of_days, np.where(np.isnan(of_days), np.nan, of_rivals))
-    independent = control_false_discoveries(of_days, rate=RATE)
-    discoveries = control_false_discoveries(cautious, rate=RATE)
-    return {
-        name: replace(
-            parameter,
-            p_value=_number(cautious[index]),
-            q_value=_number(discoveries.q_value[index]),
-            differs=_differs(of_days[index], independent.q_value[index], discoveries.q_value[index]),
-        )
-        for index, (name, (parameter, _)) in enumerate(compared.items())
+    """The parameters judged together, since thirteen of them at 5 % each would often name one that did not change; what
+    is named also has to exceed, by itself, what its days do not exclude."""
+    decided = {
+        name: judged for name, (_, judged) in compared.items() if judged is not None and judged.decided
     }
+    p_values = {name: judged.p_value() for name, judged in decided.items()}
+    rates = control_false_discoveries(list(p_values.values()), rate=RATE).q_value.tolist()
+    q_values = dict(zip(p_values, rates, strict=True))
+    return {
+        name: replace(parameter, p_value=p_values[name], q_value=q_values[name],
+                      differs=_differs(q_values[name], decided[name].p_value_of_rivals()))
+        if name in decided else parameter
+        for name, (parameter, _) in compared.items()
+    }  # fmt: skip
 
 
-def _differs(p_value: float, of_independent_days: float, q_value: float) -> bool | None:
-    """Whether a parameter differs by its rate; None where only if days are independent, or where nothing is known."""
-    if np.isnan(p_value) or of_independent_days <= RATE < q_value:
-        return None
-    return bool(q_value <= RATE)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _differs(q_value: float, p_value_of_rivals: float) -> bool | None:
+    """Whether a parameter differs; None where it does only if its days are independent and of one scatter."""
+    if q_value > RATE:
+        return False
+    return True if p_value_of_rivals <= RATE else None
