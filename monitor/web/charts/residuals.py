@@ -222,11 +222,11 @@ def falling_chart(
     lines = (
         []
         if expected_um is None
-        else [_level(expected_um, "noise floor: what the readings' uncertainty leaves")]
+        else [_level(expected_um, "noise floor")]
     )
     return Chart(
         key="falling",
-        says="RMS of the residual from version to version in µm",
+        says="RMS of the residual from version to version in µm; the noise floor is what the readings' uncertainty leaves",
         traces=traces,
         layout={
             "xaxis": axis("", type="category"), "yaxis": axis("RMS / µm", rangemode="tozero"), "shapes": lines,
