@@ -57,8 +57,8 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
             except duckdb.Error as fault:
                 if "'pytz'" in str(fault):
                     raise InputError(
-                        "a column of this query is a TIMESTAMP WITH TIME ZONE, which is not shown; cast it, as in SELECT "
-                        "CAST(now() AS TIMESTAMP): that is its moment in UTC"
+                        "a column of this query is a TIMESTAMP WITH TIME ZONE, which is not shown; cast it, as in "
+                        "SELECT CAST(now() AS TIMESTAMP): that is its moment in UTC"
                     ) from fault
                 raise InputError(f"the query cannot be answered: {fault}") from fault
             columns = tuple(str(column[0]) for column in cursor.description or ())

@@ -219,14 +219,10 @@ def falling_chart(
                 "marker": {"color": "@teal", "symbol": "square", "size": 10},
             }
         )  # fmt: skip
-    lines = (
-        []
-        if expected_um is None
-        else [_level(expected_um, "noise floor")]
-    )
+    lines = [] if expected_um is None else [_level(expected_um, "noise floor")]
     return Chart(
         key="falling",
-        says="RMS of the residual from version to version in µm; the noise floor is what the readings' uncertainty leaves",
+        says="RMS of the residual by version in µm; the noise floor is what the readings' uncertainty leaves",
         traces=traces,
         layout={
             "xaxis": axis("", type="category"), "yaxis": axis("RMS / µm", rangemode="tozero"), "shapes": lines,

@@ -22,9 +22,13 @@ def test_a_lake_is_not_served(tmp_path: Path) -> None:
         pass
 
 
-@pytest.mark.skipif(importlib.util.find_spec("pytz") is not None, reason="pytz is installed, which shows them")
+@pytest.mark.skipif(
+    importlib.util.find_spec("pytz") is not None, reason="pytz is installed, which shows them"
+)
 def test_a_moment_with_a_time_zone_says_how_to_cast_it() -> None:
     with Database(":memory:") as db:
-        with pytest.raises(InputError, match=r"SELECT CAST\(now\(\) AS TIMESTAMP\): that is its moment in UTC"):
+        with pytest.raises(
+            InputError, match=r"SELECT CAST\(now\(\) AS TIMESTAMP\): that is its moment in UTC"
+        ):
             run_query(db, "SELECT now()")
         assert len(run_query(db, "SELECT CAST(now() AS TIMESTAMP)").rows) == 1
