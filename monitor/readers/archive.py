@@ -48,6 +48,8 @@ def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
             _unpack_zip(file, room)
         else:
             file.content.seek(0)
+            if file.name.lower().endswith(".zip"):
+                raise InputError(f"{file.name} is no zip that can be read; pack the folder again")
             room.write(_safe_path(file.name), file.content)
     campaigns = tuple(sorted(path.parent for path in folder.rglob(CAMPAIGN_FILE)))
     if not campaigns:

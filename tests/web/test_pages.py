@@ -475,3 +475,25 @@ def test_a_workbook_of_excel_is_imported_and_refused_at_its_cells(
     answer = upload(None)
     assert answer.status_code == 200
     assert "nothing-hidden: imported" in answer.text
+
+
+def test_an_address_that_lacks_a_part_is_refused_as_a_page(local: Any) -> None:
+    for address, sentence in (
+        ("/machine", "'name': field required"),
+        ("/?first=abc", "'first': input should be"),
+    ):
+        answer = local.client.get(address)
+        assert answer.status_code == 400
+        assert "text/html" in answer.headers["content-type"]
+        assert sentence in answer.text.replace("&#39;", "'")
+
+
+def test_an_upload_is_refused_without_a_folder_of_the_server(local: Any) -> None:
+    proof = {"proof": local.proof()}
+    files = [("file", ("campaign.toml", (EXAMPLES / "five-days/campaign.toml").read_bytes()))]
+    lacking = local.client.post("/import", data=proof, files=files)
+    assert lacking.status_code == 422
+    assert "the upload was refused" in lacking.text
+    assert "monitor-serve" not in lacking.text and "/tmp" not in lacking.text
+    torn = local.client.post("/import", data=proof, files=[("file", ("c.zip", b"hello"))])
+    assert "c.zip is no zip that can be read; pack the folder again" in torn.text
