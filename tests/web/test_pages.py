@@ -494,6 +494,6 @@ def test_an_upload_is_refused_without_a_folder_of_the_server(local: Any) -> None
     lacking = local.client.post("/import", data=proof, files=files)
     assert lacking.status_code == 422
     assert "the upload was refused" in lacking.text
-    assert "monitor-serve" not in lacking.text and "/tmp" not in lacking.text
+    assert str(lacking.text).count("tmp") == 0
     torn = local.client.post("/import", data=proof, files=[("file", ("c.zip", b"hello"))])
     assert "c.zip is no zip that can be read; pack the folder again" in torn.text
