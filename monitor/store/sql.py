@@ -55,6 +55,11 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
                 cursor = connection.execute(statements[0])
                 rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit + 1)
             except duckdb.Error as fault:
+                if "'pytz'" in str(fault):
+                    raise InputError(
+                        "a column of this query is a TIMESTAMP WITH TIME ZONE, which is not shown; cast it, as in "
+                        "SELECT CAST(now() AS TIMESTAMP): that is its moment in UTC"
+                    ) from fault
                 raise InputError(f"the query cannot be answered: {fault}") from fault
             columns = tuple(str(column[0]) for column in cursor.description or ())
             types = tuple(str(column[1]) for column in cursor.description or ())
