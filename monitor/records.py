@@ -341,15 +341,16 @@ class Probings:
 
 @dataclass(frozen=True)
 class SourceFile:
-    """One imported file, byte for byte."""
+    """One imported file, byte for byte; of one that was archived only the hash, its ``content`` is empty."""
 
     name: str
     content: bytes
+    archived_sha256: str | None = None
 
     @property
     def sha256(self) -> str:
         """The hash of the content, in hexadecimal digits."""
-        return hashlib.sha256(self.content).hexdigest()
+        return self.archived_sha256 or hashlib.sha256(self.content).hexdigest()
 
 
 @dataclass(frozen=True)
