@@ -22,7 +22,7 @@ MOST_PARAMETERS = 10
 #: What is there is within some lines of these: whoever needs more cuts first.
 MOST_LINES, MOST_FILE_LINES, MOST_FILES = 75, 450, 42
 #: Compiled functions, where every call and every tuple costs.
-KERNELS = {"uncertainty/kernel.py"}
+KERNELS = {"uncertainty/runs/kernel.py"}
 
 #: Words that do not say what a name holds, as a whole name.
 VAGUE = {

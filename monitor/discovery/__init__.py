@@ -5,12 +5,12 @@ separated from bad points, balls that moved and steps between runs.
 """
 
 from monitor.discovery.machine.compare import ChainComparison, compare
-from monitor.discovery.machine.cures import Mistake
+from monitor.discovery.machine.evidence.robust import RobustFit, robust_fit
 from monitor.discovery.machine.explain import Explanation, explain
 from monitor.discovery.machine.fit import Fit, fit
 from monitor.discovery.machine.missing import ChainMissing
-from monitor.discovery.machine.mistakes import find_mistakes, find_other_names, is_gross
-from monitor.discovery.machine.robust import RobustFit, robust_fit
+from monitor.discovery.machine.mistakes.cures import Mistake
+from monitor.discovery.machine.mistakes.mistakes import find_mistakes, find_other_names, is_gross
 from monitor.discovery.machine.version_error import VersionError, version_error
 from monitor.records import Verdict
 

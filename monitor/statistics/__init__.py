@@ -3,7 +3,6 @@
 One method, one file. Units are those of the arrays passed in; nothing here knows a database.
 """
 
-from monitor.statistics.backtest import Backtest, backtest
 from monitor.statistics.changes import Change, History, find_changes
 from monitor.statistics.charts.control import (
     ControlChart,
@@ -20,17 +19,18 @@ from monitor.statistics.charts.vector_control import VectorChart, mewma_chart, m
 from monitor.statistics.components import VarianceComponents, variance_components
 from monitor.statistics.conditions import Coefficient, Cycle, Dependence, DependenceUnits, dependence
 from monitor.statistics.fdr import FalseDiscoveries, control_false_discoveries
-from monitor.statistics.forecast import Crossing, Forecast, forecast, predict
-from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
-from monitor.statistics.joint_backtest import JointSeries, LengthBacktest, backtest_longest
-from monitor.statistics.joint_forecast import (
+from monitor.statistics.forecasts.backtest import Backtest, backtest
+from monitor.statistics.forecasts.forecast import Crossing, Forecast, forecast, predict
+from monitor.statistics.forecasts.joint_backtest import JointSeries, LengthBacktest, backtest_longest
+from monitor.statistics.forecasts.joint_forecast import (
     JointLines,
     LengthForecast,
     LengthQuestion,
     forecast_longest,
     residual_correlation,
 )
-from monitor.statistics.longest_vector import ErrorVectors, longest, may_be_longest
+from monitor.statistics.forecasts.longest_vector import ErrorVectors, longest, may_be_longest
+from monitor.statistics.homogeneity import Histogram, Homogeneity, homogeneity, p_value_histogram
 from monitor.statistics.means import (
     AnalysisOfVariance,
     GroupTest,

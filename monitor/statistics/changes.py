@@ -17,8 +17,8 @@ import numpy.typing as npt
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.statistics.checks import as_positive, as_probability, as_vector
-from monitor.statistics.day_evidence import shows_wide_days
-from monitor.statistics.day_steps import day_step_p_value
+from monitor.statistics.days.day_evidence import shows_wide_days
+from monitor.statistics.days.day_steps import day_step_p_value
 from monitor.statistics.scan import Scan, Scanner
 from monitor.statistics.scan_candidates import EDGE, Base, Kind, wave_columns
 from monitor.statistics.sums import label_groups

@@ -16,8 +16,8 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
 from monitor.statistics.checks import as_positive, as_probability, as_vector
+from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
 from monitor.statistics.mixed import MixedFit, fit_with_days
 from monitor.statistics.sums import label_groups
 from monitor.units import DEGREE_CELSIUS, KELVIN, Unit

@@ -13,7 +13,7 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.block_lines import Blocks, block_lines
+from monitor.statistics.days.block_lines import Blocks, block_lines
 from monitor.statistics.tails import chi_square_tail, f_tail, student_tail
 
 

@@ -15,7 +15,8 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.block_lines import (
+from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
+from monitor.statistics.days.block_lines import (
     FEWEST_BLOCKS,
     BlockLines,
     Blocks,
@@ -23,7 +24,6 @@ from monitor.statistics.block_lines import (
     blocks_of_days,
     fits_cycle,
 )
-from monitor.statistics.checks import as_matrix, as_positive, as_probability, as_vector
 from monitor.statistics.mixed import MixedFit, fit_with_days
 from monitor.statistics.monotone import MonotoneTrend, mann_kendall, pairs, theil_sen
 from monitor.statistics.sums import label_groups

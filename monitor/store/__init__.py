@@ -16,7 +16,6 @@ from monitor.store.analyses import (
     stored_analyses,
 )
 from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_anchor, last_entries
-from monitor.store.backup import Backup, list_backups, restore, snapshot, take_backup
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
     CampaignRow,
@@ -37,12 +36,12 @@ from monitor.store.certificates import (
     save_certificate,
 )
 from monitor.store.connection import Database
+from monitor.store.copies.backup import Backup, list_backups, restore, snapshot, take_backup
+from monitor.store.copies.export import export_tables
+from monitor.store.copies.workbook import export_workbook
 from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.database_name import check_database_name
 from monitor.store.events import NOTE, MachineEvent, StoredEvent, list_events, machine_events, record_event
-from monitor.store.export import export_tables
-from monitor.store.fleet import BlockCut, FleetSums, fleet_sums
-from monitor.store.history import MachineHistory, latest_tolerances, machine_history, tolerance_types
 from monitor.store.identifications import (
     identification_by_number,
     identification_numbers,
@@ -60,7 +59,18 @@ from monitor.store.machine_models import (
     not_identified,
     save_machine_model,
 )
-from monitor.store.machine_runs import (
+from monitor.store.models import (
+    StoredModel,
+    last_used_campaign,
+    list_models,
+    load_model,
+    model_history,
+    next_version,
+    save_model,
+)
+from monitor.store.past.fleet import BlockCut, FleetSums, fleet_sums
+from monitor.store.past.history import MachineHistory, latest_tolerances, machine_history, tolerance_types
+from monitor.store.past.machine_runs import (
     MachineDescription,
     RecordedRun,
     campaign_machines,
@@ -71,15 +81,6 @@ from monitor.store.machine_runs import (
     machine_runs,
     parameter_frames,
     probing_counts,
-)
-from monitor.store.models import (
-    StoredModel,
-    last_used_campaign,
-    list_models,
-    load_model,
-    model_history,
-    next_version,
-    save_model,
 )
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
@@ -96,7 +97,6 @@ from monitor.store.turns import Holder, Patience
 from monitor.store.type_tolerances import type_in_use
 from monitor.store.verification import Verification, verify_audit
 from monitor.store.withdrawals import Withdrawal, withdraw_campaign
-from monitor.store.workbook import export_workbook
 
 __all__ = [
     "NOTE",

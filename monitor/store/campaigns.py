@@ -13,13 +13,14 @@ import numpy as np
 from monitor import __version__
 from monitor.exceptions import CampaignError, DataError, Fault
 from monitor.records import Campaign, CurveCampaign, Run, SourceFile
-from monitor.store import audit, campaign_runs, probings, record_json
+from monitor.store import audit, probings, record_json
 from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.curves import METHOD as CURVE
 from monitor.store.curves import curve_by_number, curve_content, insert_curve, is_curve, is_curve_number
 from monitor.store.import_notes import keep_fingerprints, keep_notes, run_fingerprints
+from monitor.store.past import campaign_runs
 
 
 @dataclass(frozen=True)

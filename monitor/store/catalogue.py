@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from monitor.documents import IN_UTC, OMITTED
 from monitor.exceptions import DataError, NotFoundError, did_you_mean
 from monitor.records import Machine
-from monitor.store.campaign_runs import imported_campaigns
 from monitor.store.connection import Database
+from monitor.store.past.campaign_runs import imported_campaigns
 from monitor.store.record_json import machine_record
 
 if TYPE_CHECKING:

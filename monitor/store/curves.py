@@ -11,9 +11,9 @@ from monitor import __version__
 from monitor.exceptions import DataError
 from monitor.records import CurveCampaign, Instrument, SourceFile
 from monitor.store import audit
-from monitor.store.campaign_runs import insert_runs
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
+from monitor.store.past.campaign_runs import insert_runs
 
 METHOD = "curve"
 

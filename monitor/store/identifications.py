@@ -12,10 +12,11 @@ import numpy as np
 
 from monitor import __version__
 from monitor.exceptions import NotFoundError
-from monitor.store import audit, identified_values
+from monitor.store import audit
 from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
+from monitor.store.past import identified_values
 from monitor.store.results import (
     StoredIdentification,
     StoredRun,

@@ -15,15 +15,13 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from importlib import resources
-from importlib.resources.abc import Traversable
-from pathlib import Path
 
 import duckdb
 
 from monitor import __version__
 from monitor.exceptions import StoreError
-from monitor.store import gathering
+from monitor.store.past import gathering
+from monitor.store.resources import migration_folder
 
 _FILE_NAME = re.compile(r"(\d{4})_[a-z0-9_]+\.sql")
 
@@ -42,14 +40,6 @@ COMMENT ON COLUMN schema_migration.sha256 IS 'SHA-256 of its normalised text, he
 COMMENT ON COLUMN schema_migration.software_version IS 'Version of the software that applied it (no unit)';
 COMMENT ON COLUMN schema_migration.applied_at IS 'When it was applied (UTC)';
 """
-
-
-def migration_folder() -> Traversable:
-    """Return the folder of ``0001_*.sql`` and the others: inside ``monitor`` if installed, beside it in a checkout."""
-    try:
-        return resources.files("monitor.migrations")
-    except ModuleNotFoundError:
-        return Path(__file__).resolve().parents[2] / "migrations"
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from monitor.exceptions import MonitorError
 from monitor.store import audit
 from monitor.store.analyses import analysis_content
 from monitor.store.bookkeeping import with_bookkeeping
-from monitor.store.campaign_runs import run_list_faults
 from monitor.store.campaigns import stored_content
 from monitor.store.certificates import certificate_faults
 from monitor.store.connection import Database
@@ -26,6 +25,7 @@ from monitor.store.import_notes import notes_content
 from monitor.store.indexes import index_faults
 from monitor.store.machine_models import machine_model_content
 from monitor.store.models import all_models, model_content, model_key
+from monitor.store.past.campaign_runs import run_list_faults
 from monitor.store.refusals import cleared_content, refusal_content
 from monitor.store.schema import schema_faults
 from monitor.store.selections import selection_content

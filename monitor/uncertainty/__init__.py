@@ -1,12 +1,5 @@
 """Uncertainty after JCGM 102:2011: input covariance, GUM framework, adaptive Monte Carlo, coverage, validation."""
 
-from monitor.uncertainty.adaptive import (
-    MonteCarloOptions,
-    MonteCarloResult,
-    Tolerances,
-    adaptive_monte_carlo,
-    monte_carlo,
-)
 from monitor.uncertainty.covariance import (
     Inputs,
     joined,
@@ -14,7 +7,7 @@ from monitor.uncertainty.covariance import (
     pooled_by_day,
     uncorrelated,
 )
-from monitor.uncertainty.coverage import (
+from monitor.uncertainty.coverage_regions.coverage import (
     Sampled,
     correlated_rectangle_factor,
     ellipsoid_factor,
@@ -24,6 +17,7 @@ from monitor.uncertainty.coverage import (
     sample_rectangle_factor,
     single_factor,
 )
+from monitor.uncertainty.coverage_regions.regions import RegionFactors, region_factors
 from monitor.uncertainty.degrees_of_freedom import effective_dof
 from monitor.uncertainty.framework import FrameworkResult, gum_framework
 from monitor.uncertainty.marginals import (
@@ -35,14 +29,16 @@ from monitor.uncertainty.marginals import (
     StudentT,
     Triangular,
 )
-from monitor.uncertainty.measured_run import MeasuredRun
-from monitor.uncertainty.montecarlo import RunEstimator, run_estimator
-from monitor.uncertainty.parts import BudgetLine, Estimated, OutputContribution
-from monitor.uncertainty.projection import Projection, nearest_correlation
-from monitor.uncertainty.propagation import Model, Summary
-from monitor.uncertainty.regions import RegionFactors, region_factors
-from monitor.uncertainty.row_run import RowRun, measured_run, repeated_readings
-from monitor.uncertainty.sampling import (
+from monitor.uncertainty.monte_carlo.adaptive import (
+    MonteCarloOptions,
+    MonteCarloResult,
+    Tolerances,
+    adaptive_monte_carlo,
+    monte_carlo,
+)
+from monitor.uncertainty.monte_carlo.montecarlo import RunEstimator, run_estimator
+from monitor.uncertainty.monte_carlo.propagation import Model, Summary
+from monitor.uncertainty.monte_carlo.sampling import (
     BlockSampler,
     JointDistribution,
     block_generator,
@@ -50,9 +46,13 @@ from monitor.uncertainty.sampling import (
     normal_inputs,
     t_inputs,
 )
-from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
+from monitor.uncertainty.parts import BudgetLine, Estimated, OutputContribution
+from monitor.uncertainty.projection import Projection, nearest_correlation
+from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.runs.row_run import RowRun, measured_run, repeated_readings
+from monitor.uncertainty.runs.sensitivity import Sensitivity, sensitivity_of
+from monitor.uncertainty.runs.touched_run import TouchedRun
 from monitor.uncertainty.tolerance import numerical_tolerance
-from monitor.uncertainty.touched_run import TouchedRun
 from monitor.uncertainty.validation import Comparison, Validation, validate
 
 __all__ = [

@@ -14,9 +14,9 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.records import Array
 from monitor.uncertainty.covariance import Inputs
+from monitor.uncertainty.coverage_regions.regions import RegionFactors, region_factors
 from monitor.uncertainty.degrees_of_freedom import effective_dof
 from monitor.uncertainty.parts import BudgetLine, OutputContribution, known
-from monitor.uncertainty.regions import RegionFactors, region_factors
 from monitor.uncertainty.roots import checked_covariance, correlation_of, covariance_root
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.machine import COMPONENTS, MOTION, Chain, Joint
 from monitor.records import Array, LinearAxes
-from monitor.uncertainty.measured_run import MeasuredRun
+from monitor.uncertainty.runs.measured_run import MeasuredRun
 
 #: The spacing of the nodes is averaged over so many values: the covariance then is known to some 1e-3 of itself.
 _SPACINGS = 31

@@ -18,7 +18,7 @@ from monitor.machine import LOCATION, MOTION
 from monitor.records import Array, Campaign
 from monitor.sources import Quantity, Source
 from monitor.uncertainty.linear_axes import interpolated
-from monitor.uncertainty.measured_run import MeasuredRun
+from monitor.uncertainty.runs.measured_run import MeasuredRun
 
 #: Angles (rad) and parts of a unit vector that differ by less are one pose and one direction: 1 µrad, half a degree.
 _SAME_ANGLE, _SAME_DIRECTION = 1e-6, 1e-2

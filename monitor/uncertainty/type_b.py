@@ -20,12 +20,12 @@ from monitor.machine import MOTION
 from monitor.records import Array, Campaign
 from monitor.sources import HALF_WIDTHS, Law, Quantity, Sharing, Source
 from monitor.uncertainty.marginals import Arcsine, Marginal, Normal, Rectangular, StudentT, Triangular
-from monitor.uncertainty.measured_run import MeasuredRun
+from monitor.uncertainty.monte_carlo.sampling import JointDistribution
 from monitor.uncertainty.parts import Estimated, OutputContribution
 from monitor.uncertainty.roots import covariance_root
-from monitor.uncertainty.sampling import JointDistribution
+from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.runs.touched_run import TouchedRun
 from monitor.uncertainty.source_rows import Scene, rows_of
-from monitor.uncertainty.touched_run import TouchedRun
 
 _STANDARD = (Quantity.STANDARD_TEMPERATURE, Quantity.STANDARD_EXPANSION)
 #: More independent values than this are drawn in the rank of their covariance, which the normal law alone allows.

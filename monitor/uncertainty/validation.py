@@ -14,8 +14,8 @@ import numpy as np
 
 from monitor.exceptions import DataError
 from monitor.records import ValidationVerdict
-from monitor.uncertainty.adaptive import MonteCarloResult
 from monitor.uncertainty.framework import FrameworkResult
+from monitor.uncertainty.monte_carlo.adaptive import MonteCarloResult
 from monitor.uncertainty.tolerance import numerical_tolerance
 
 #: JCGM 102 8.2: the Monte Carlo tolerance is to be no more than a fifth of that of the comparison.

@@ -23,7 +23,7 @@ import numpy as np
 from monitor.exceptions import DataError
 from monitor.machine import Chain, evaluate
 from monitor.records import Array
-from monitor.uncertainty.coverage import single_factor
+from monitor.uncertainty.coverage_regions.coverage import single_factor
 from monitor.uncertainty.geometric_errors import GeometricErrors, joint_errors
 
 

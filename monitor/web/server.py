@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import ipaddress
 import os
 import ssl
 import sys
 import tempfile
+import threading
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,10 +24,14 @@ from monitor.web.note import Note, posted
 from monitor.web.opening import opened
 from monitor.web.rendering import prepare
 from monitor.web.settings import ServerSettings
+from monitor.workflow.contract import QUESTIONS
 
 #: A page asks some ten short queries, and waits so long behind every computation to go on after each (Python's usual
 #: 5 ms make it twice as slow while two trends are computed).
 _SWITCH_S = 0.0005
+#: So long a server leaves both cores to its first page before it loads the questions that people ask next.
+_HEAD_START_S = 0.5
+_USUAL = ("fleet", "campaigns", "values", "trend", "compare", "explain", "import")
 
 
 class _Server(uvicorn.Server):
@@ -67,6 +74,7 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
                     say(
                         "no note could be written beside the database: other commands have to name this address"
                     )
+                threading.Thread(target=_load_ahead, daemon=True).start()
                 say(
                     f"{settings.database} is served at {_address(scheme, settings.host, port)}/ ; Ctrl-C ends it"
                 )
@@ -76,6 +84,14 @@ def serve(settings: ServerSettings, say: Callable[[str], None]) -> None:
             _Server(config, listens).run()
             beside.close()
             gate.close()
+
+
+def _load_ahead() -> None:
+    """Load what the second page will need, a moment after the first could be asked for."""
+    time.sleep(_HEAD_START_S)
+    importlib.import_module("pandas")
+    for question in _USUAL:
+        QUESTIONS[question].load()
 
 
 def _address(scheme: str, host: str, port: int) -> str:

@@ -6,12 +6,16 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 from monitor.exceptions import MonitorError
 from monitor.reporting.numbers import round_result, written
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.explain.ties import Tie, TieBreak
-from monitor.workflow.fleet.answer import ATTENTION, Attention, FleetTableRow
+from monitor.workflow.fleet.attention import ATTENTION, Attention
+
+if TYPE_CHECKING:
+    from monitor.workflow.fleet.answer import FleetTableRow
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,7 @@ _SOON = Urgency("soon", "▲", "plan", "")
 _LOOK = Urgency("look", "◆", "look", "")
 _GOOD = Urgency("good", "●", "as usual", "")
 _OPEN = Urgency("open", "○", "not judged", "")
-#: The classes of the fleet (``monitor.workflow.fleet.answer.ATTENTION``, the most urgent first) as people read them.
+#: The classes of the fleet (``monitor.workflow.fleet.attention.ATTENTION``, the most urgent first) as people read them.
 URGENCIES = dict(
     zip(
         ATTENTION,

@@ -9,7 +9,7 @@ import numpy as np
 
 from monitor.discovery import explain, fit
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.discovery.search.scan import scan
 from monitor.effects.catalogue import catalogue, drivers_of
 from monitor.methods.samba.method import problem_of

@@ -20,8 +20,8 @@ import pytest
 from scipy import stats
 
 from monitor.store import Database, fleet_sums
-from monitor.store.campaign_runs import gather_runs
-from monitor.store.identified_values import gather_values
+from monitor.store.past.campaign_runs import gather_runs
+from monitor.store.past.identified_values import gather_values
 from monitor.workflow.fleet.ranking import CUT, cell_tests
 from monitor.workflow.trend.request import TrendRequest
 from monitor.workflow.trend.trends import trend

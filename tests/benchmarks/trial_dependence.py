@@ -26,9 +26,9 @@ from monitor.statistics import (
     t_squared_chart,
     welch_anova,
 )
-from monitor.statistics.before_after import OtherDays, before_after
-from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
 from monitor.statistics.changes import _repeated, _Search, _Series
+from monitor.statistics.days.before_after import OtherDays, before_after
+from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
 
 SEED = 20261122
 YEAR = 365.25

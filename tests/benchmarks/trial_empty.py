@@ -30,10 +30,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from by_path import load
 
-from monitor.discovery.machine.acceptance import ChainAcceptance
-from monitor.discovery.machine.correlation import Correlation
+from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
 from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.fit import Fit, fit
+from monitor.discovery.machine.noise.correlation import Correlation
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.search.evidence import Pool, best_of_families, weigh_beside
@@ -137,7 +137,7 @@ def campaigns(options: argparse.Namespace) -> Iterator[tuple[int, str, list[str]
             kinds = [name for _ in range(first, min(first + PORTION, options.seeds)) for name in names]
             noises = []
             for index, name in enumerate(kinds):
-                rng = np.random.default_rng((30000 + first + index // len(names), count))
+                rng = np.random.default_rng((options.first + first + index // len(names), count))
                 sizes = 1e-3 * NOISES[name](rng, plan.run)
                 if name.startswith("rounded"):
                     sizes = np.round(plan.readings + sizes, 3) - plan.readings
@@ -149,6 +149,7 @@ def campaigns(options: argparse.Namespace) -> Iterator[tuple[int, str, list[str]
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--seeds", type=int, default=300, help="campaigns of every noise and plan, at most")
+    parser.add_argument("--first", type=int, default=30000, help="the first seed")
     parser.add_argument("--seconds", type=float, default=600.0, help="processor time")
     parser.add_argument("--runs", type=int, nargs="+", default=[1, 2, 4, 7, 20, 60])
     parser.add_argument("--only", default="", help="noises whose name contains this")

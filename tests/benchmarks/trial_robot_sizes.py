@@ -19,9 +19,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from monitor.discovery import fit
-from monitor.discovery.machine.poses import poses_of_rows, widening
+from monitor.discovery.machine.evidence.poses import poses_of_rows, widening
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.effects import parse_effect
 from monitor.methods.chain.problem import solve_problem

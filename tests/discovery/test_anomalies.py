@@ -7,8 +7,8 @@ import pytest
 from by_path import simulator
 
 from monitor.discovery import Verdict, fit
-from monitor.discovery.machine.anomalies import bad_points, ball_moves
-from monitor.discovery.machine.plan_cells import plan_cells
+from monitor.discovery.machine.noise.plan_cells import plan_cells
+from monitor.discovery.machine.suspects.anomalies import bad_points, ball_moves
 from monitor.methods.samba.method import problem_of
 
 

@@ -5,15 +5,17 @@ All rates are in tests/benchmarks/trial_unknown.py; here a few campaigns and ind
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy
 from by_path import load
 
 from monitor.discovery import explain, fit
-from monitor.discovery.machine.correlation import Correlation, Rows, Whitening
+from monitor.discovery.machine.noise.correlation import Correlation, Rows, Whitening
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.discovery.search.evidence import Pool, weigh_beside
 from monitor.discovery.search.sign_flips import p_value_by_flips, signs
 from monitor.effects import parse_effect
@@ -22,8 +24,6 @@ from monitor.methods.samba.method import problem_of
 
 @pytest.fixture(scope="module")
 def trial():
-    from pathlib import Path
-
     return load("trial_unknown", Path(__file__).resolve().parents[1] / "benchmarks" / "trial_unknown.py")
 
 
@@ -49,6 +49,19 @@ def test_the_correlation_of_neighbours_is_estimated(virtual_campaigns, trial, rh
     assert correlation is not None
     # 150 degrees of freedom a run determine a correlation to some 0.07.
     assert correlation.rho * correlation.share == pytest.approx(rho, abs=0.2)
+
+
+def test_how_far_a_random_walk_drifts_is_estimated():
+    """A walk of 0.25 a reading and independent noise of 0.7: the variance of its drift over a run of 62 readings, as a
+    multiple of the independent variance, in the median of 40 campaigns. With coarse shares half of it was estimated."""
+    empty = load("trial_empty", Path(__file__).resolve().parents[1] / "benchmarks" / "trial_empty.py")
+    plan, drifts = empty.Plan(days=1, each=2), []
+    for seed in range(40):
+        walk = 1e-3 * empty.NOISES["random walk"](np.random.default_rng(seed), plan.run)
+        correlation = plan.fit.noise_design.correlation(plan.noisy(walk).solution.last.residual)
+        share, rho = (0.0, 0.0) if correlation is None else (correlation.share, correlation.rho)
+        drifts.append(2.0 * share * (1.0 - rho**62) / max(1.0 - share, 0.01))
+    assert float(np.median(drifts)) == pytest.approx(62 * (0.25 / 0.7) ** 2, rel=0.3)
 
 
 def test_white_noise_stays_as_it_is(virtual_campaigns):

@@ -11,7 +11,7 @@ from by_path import simulator
 
 from monitor.discovery import fit
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.discovery.machine.version_error import version_error
 from monitor.discovery.search.amplitudes import amplitudes
 from monitor.discovery.search.evidence import Pool, weigh

@@ -11,11 +11,11 @@ import pytest
 from by_path import simulator
 
 from monitor.discovery import Fit, fit
-from monitor.discovery.machine.bad_poses import bad_poses
+from monitor.discovery.machine.evidence.held_out import LeftOutBlocks, pose_blocks
 from monitor.discovery.machine.explain import variants_of_campaign
-from monitor.discovery.machine.held_out import LeftOutBlocks, pose_blocks
-from monitor.discovery.machine.joint_curves import joint_curves
+from monitor.discovery.machine.joints.joint_curves import joint_curves
 from monitor.discovery.machine.surroundings import surroundings_of
+from monitor.discovery.machine.suspects.bad_poses import bad_poses
 from monitor.effects import ChainEffect, parse_effect
 from monitor.effects.shapes import Harmonics
 from monitor.exceptions import CampaignError, DataError, EffectError

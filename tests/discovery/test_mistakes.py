@@ -12,7 +12,7 @@ import pytest
 
 from monitor.discovery import Verdict, find_mistakes, fit, is_gross
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.variants import cycles_of_unknown_pitch, resolvable
+from monitor.discovery.machine.shapes.variants import cycles_of_unknown_pitch, resolvable
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem

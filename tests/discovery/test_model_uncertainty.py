@@ -6,7 +6,7 @@ import pytest
 from monitor.discovery import fit
 from monitor.discovery.machine.compare import lack_of_fit
 from monitor.discovery.machine.model_uncertainty import model_uncertainty
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.effects.catalogue import catalogue
 from monitor.methods.samba.method import problem_of
 from monitor.methods.samba.virtual import ERRORS, GAINS, virtual_campaign

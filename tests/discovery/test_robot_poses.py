@@ -12,9 +12,9 @@ import pytest
 from by_path import simulator
 
 from monitor.discovery import Explanation, explain, fit
-from monitor.discovery.machine.poses import poses_of_rows, widening
+from monitor.discovery.machine.evidence.poses import poses_of_rows, widening
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.effects import parse_effect
 from monitor.exceptions import DataError
 from monitor.methods.tracker.method import METHOD as tracker

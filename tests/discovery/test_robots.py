@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from monitor.discovery import Explanation, Verdict, explain, fit
-from monitor.discovery.machine.held_out import pose_parts
+from monitor.discovery.machine.evidence.held_out import pose_parts
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.version_error import version_error
 from monitor.methods.model import Model

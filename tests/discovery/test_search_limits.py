@@ -9,11 +9,11 @@ import pytest
 from by_path import simulator
 
 from monitor.discovery import explain, fit
-from monitor.discovery.machine.correlation import Correlation, caution
-from monitor.discovery.machine.refine import refine_all
+from monitor.discovery.machine.noise.correlation import Correlation, caution
 from monitor.discovery.machine.rounds import Limit, most_cautious
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.variants import part_of_period, variants_of
+from monitor.discovery.machine.shapes.refine import refine_all
+from monitor.discovery.machine.shapes.variants import part_of_period, variants_of
 from monitor.discovery.search.candidate import Candidate, Variant
 from monitor.discovery.search.evidence import weigh
 from monitor.discovery.search.remainder import Remainders

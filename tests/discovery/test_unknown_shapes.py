@@ -14,10 +14,10 @@ import scipy
 from by_path import load, simulator
 
 from monitor.discovery import explain, fit
-from monitor.discovery.machine.acceptance import ChainAcceptance
+from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
+from monitor.discovery.machine.evidence.held_out import held_out_by_poses, pose_folds
 from monitor.discovery.machine.explain import variants_of_campaign
 from monitor.discovery.machine.fit import fit_those_possible
-from monitor.discovery.machine.held_out import held_out_by_poses, pose_folds
 from monitor.discovery.machine.scene import scene_of
 from monitor.discovery.machine.surroundings import surroundings_of
 from monitor.discovery.search.candidate import Variant

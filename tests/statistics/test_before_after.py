@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from monitor.exceptions import DataError
-from monitor.statistics.before_after import OtherDays, before_after
+from monitor.statistics.days.before_after import OtherDays, before_after
 
 
 def sides(rng, days, runs, component):

@@ -9,7 +9,7 @@ from scipy import signal, stats
 
 from monitor.exceptions import DataError
 from monitor.statistics import backtest, predict, trend
-from monitor.statistics.block_lines import Blocks, block_count, block_lines, block_of
+from monitor.statistics.days.block_lines import Blocks, block_count, block_lines, block_of
 
 
 def first_order(rng, count, n, r):

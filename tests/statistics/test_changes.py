@@ -11,7 +11,7 @@ import pytest
 from monitor.exceptions import DataError
 from monitor.statistics import find_changes
 from monitor.statistics.changes import _Search, _Series
-from monitor.statistics.day_evidence import shows_wide_days
+from monitor.statistics.days.day_evidence import shows_wide_days
 from monitor.statistics.scan import Scanner
 
 PARAMETERS = Path(__file__).resolve().parents[1] / "references" / "campaign-parameters"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from monitor.statistics.day_steps import day_step_p_value
+from monitor.statistics.days.day_steps import day_step_p_value
 
 
 @pytest.mark.parametrize("component", [0.0, 2.0, 8.0])

@@ -16,7 +16,7 @@ from monitor.statistics import (
     residual_correlation,
     trend,
 )
-from monitor.statistics.joint_forecast import _chi_square
+from monitor.statistics.forecasts.joint_forecast import _chi_square
 
 WEEKS = np.arange(30) * 7.0
 

@@ -10,10 +10,10 @@ import pytest
 
 from monitor.records import Campaign
 from monitor.store import Database, import_campaign, migrations, verify_audit, withdraw_campaign
-from monitor.store.campaign_runs import gather_runs, imported_campaigns, run_list_faults, run_rows
-from monitor.store.gathering import gather
-from monitor.store.machine_runs import machine_runs
 from monitor.store.migrations import available
+from monitor.store.past.campaign_runs import gather_runs, imported_campaigns, run_list_faults, run_rows
+from monitor.store.past.gathering import gather
+from monitor.store.past.machine_runs import machine_runs
 
 
 @pytest.fixture

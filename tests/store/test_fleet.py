@@ -19,9 +19,9 @@ from monitor.records import Campaign
 from monitor.statistics import anova, bartlett, pool, trend
 from monitor.statistics.sufficient import GroupSums, cells_from_sums, drift_from_sums
 from monitor.store import Database, FleetSums, fleet_sums, machine_history
-from monitor.store.campaign_runs import gather_runs
 from monitor.store.events import record_event
-from monitor.store.identified_values import gather_values
+from monitor.store.past.campaign_runs import gather_runs
+from monitor.store.past.identified_values import gather_values
 from monitor.workflow.fleet.ranking import CUT
 
 STRD = Path(__file__).resolve().parents[1] / "references" / "nist-strd"

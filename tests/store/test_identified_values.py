@@ -18,9 +18,9 @@ from monitor.store import (
     save_identification,
     verify_audit,
 )
-from monitor.store.gathering import gather
-from monitor.store.identified_values import gather_values, values_of
 from monitor.store.migrations import available
+from monitor.store.past.gathering import gather
+from monitor.store.past.identified_values import gather_values, values_of
 
 
 @pytest.fixture

@@ -20,9 +20,9 @@ from monitor.uncertainty import (
     numerical_tolerance,
     validate,
 )
-from monitor.uncertainty.adaptive import sequence_length
-from monitor.uncertainty.coverage import quantile_standard_error
-from monitor.uncertainty.moments import Moments
+from monitor.uncertainty.coverage_regions.coverage import quantile_standard_error
+from monitor.uncertainty.monte_carlo.adaptive import sequence_length
+from monitor.uncertainty.monte_carlo.moments import Moments
 
 NAMES, UNITS = ("Y1", "Y2", "Y3"), ("mm", "mm", "rad")
 MIX = np.array([[1.0, 0.5, 0.0, 0.0], [0.0, 1.0, -0.3, 0.2], [1e-6, 0.0, 0.0, 2e-6]])

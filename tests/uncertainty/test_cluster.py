@@ -21,10 +21,10 @@ from monitor.uncertainty import (
     run_estimator,
     uncorrelated,
 )
-from monitor.uncertainty.cluster import cluster
-from monitor.uncertainty.engine import MOST_DEATHS, WorkerLostError, in_order
-from monitor.uncertainty.processes import processes
-from monitor.uncertainty.spread import NumberedBlocks, spread
+from monitor.uncertainty.workers.cluster import cluster
+from monitor.uncertainty.workers.engine import MOST_DEATHS, WorkerLostError, in_order
+from monitor.uncertainty.workers.processes import processes
+from monitor.uncertainty.workers.spread import NumberedBlocks, spread
 
 TRIALS = 80_000
 NAMES = ("EC0Y", "EXX", "EYY", "EZZ")

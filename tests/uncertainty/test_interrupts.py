@@ -8,8 +8,8 @@ import threading
 
 import pytest
 
-from monitor.uncertainty import kernel
-from monitor.uncertainty.interrupts import interrupts_kept
+from monitor.uncertainty.runs import kernel
+from monitor.uncertainty.workers.interrupts import interrupts_kept
 
 #: A function of C that calls Python, as the compiler does: an exception in it is printed and forgotten.
 asked_in_a_callback = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))

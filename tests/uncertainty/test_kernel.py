@@ -6,8 +6,8 @@ import pytest
 from monitor.machine import chain_of_axes
 from monitor.records import ChainAxis
 from monitor.uncertainty import sensitivity_of
-from monitor.uncertainty.kernel import LANES, gradient_of
-from monitor.uncertainty.program import compile_program
+from monitor.uncertainty.runs.kernel import LANES, gradient_of
+from monitor.uncertainty.runs.program import compile_program
 
 TOPOLOGIES = [
     "w C B X b Z Y (C1) t",

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from monitor.uncertainty import BudgetLine, Estimated, ellipsoid_factor, region_factors, single_factor
-from monitor.uncertainty.stein import stein_eigenvalues
+from monitor.uncertainty.coverage_regions.stein import stein_eigenvalues
 
 
 def equal(m: int, rho: float) -> np.ndarray:

@@ -23,7 +23,7 @@ from monitor.uncertainty import (
     sensitivity_of,
     uncorrelated,
 )
-from monitor.uncertainty.expansion import expansion_of
+from monitor.uncertainty.runs.expansion import expansion_of
 
 TESTS = Path(__file__).resolve().parents[1]
 

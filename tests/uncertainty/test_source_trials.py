@@ -19,8 +19,8 @@ from monitor.reporting.covariance_source import CovarianceKind
 from monitor.sources import Law, Quantity, Sharing, Source
 from monitor.uncertainty import measured_run, sensitivity_of
 from monitor.uncertainty.covariance import uncorrelated
-from monitor.uncertainty.sampling import BlockSampler
-from monitor.uncertainty.sourced_trials import Moves, moved_estimator
+from monitor.uncertainty.monte_carlo.sampling import BlockSampler
+from monitor.uncertainty.monte_carlo.sourced_trials import Moves, moved_estimator
 from monitor.uncertainty.type_b import source_columns
 from monitor.workflow.campaign_parts import only_run
 from monitor.workflow.uncertainty.sources import contained

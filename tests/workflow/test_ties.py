@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from monitor.discovery.machine.separate import Separation
+from monitor.discovery.machine.separation.separate import Separation
 from monitor.workflow.explain.ties import Tie, TieBreak, ties_of
 
 POSES = Separation(({"C": 0.5},), 0.1, 12.0, (("EXC:harmonic2", "EYC:harmonic2"),))

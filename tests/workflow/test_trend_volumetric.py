@@ -15,8 +15,8 @@ from scipy import optimize
 
 from monitor.cli import main
 from monitor.store import Database, machine_history
-from monitor.store.campaign_runs import gather_runs
-from monitor.store.identified_values import gather_values
+from monitor.store.past.campaign_runs import gather_runs
+from monitor.store.past.identified_values import gather_values
 from monitor.uncertainty.volumetric import grid, middle, volumetric_error
 from monitor.workflow.history.past import machine_past
 from monitor.workflow.identify.identify import identify

@@ -26,8 +26,8 @@ from monitor.store import (
     machine_history,
     record_event,
 )
-from monitor.store.campaign_runs import gather_runs
-from monitor.store.identified_values import gather_values
+from monitor.store.past.campaign_runs import gather_runs
+from monitor.store.past.identified_values import gather_values
 from monitor.workflow.history.changes import search_changes
 from monitor.workflow.history.series import Series
 from monitor.workflow.run_statistics.columns import group_labels

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.plan_cells import plan_cells, readings_a_visit, revisited_cells
+from monitor.discovery.machine.noise.plan_cells import plan_cells, readings_a_visit, revisited_cells
 from monitor.discovery.search.comparison import (
     Comparison,
     LackOfFit,

@@ -12,27 +12,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from monitor.discovery.machine.acceptance import ChainAcceptance
-from monitor.discovery.machine.anomalies import BadPoint, BallMove
 from monitor.discovery.machine.compare import ChainComparison, compare
-from monitor.discovery.machine.cures import Mistake
-from monitor.discovery.machine.curve_findings import with_curves
+from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
-from monitor.discovery.machine.joint_curves import joint_curves
+from monitor.discovery.machine.joints.curve_findings import with_curves
+from monitor.discovery.machine.joints.joint_curves import joint_curves
 from monitor.discovery.machine.missing import ChainMissing, missing_effects
+from monitor.discovery.machine.mistakes.cures import Mistake
 from monitor.discovery.machine.rounds import ChainRound, ChainSearch, Limit, correlation_under
 from monitor.discovery.machine.scene import ChainScene, ChainVariant
-from monitor.discovery.machine.steps import Step, find_steps
-from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
-from monitor.discovery.machine.suspects import Suspects, with_effects
-from monitor.discovery.machine.variants import (
+from monitor.discovery.machine.shapes.variants import (
     cycles_of_unknown_pitch,
     resolvable,
     that_lag,
     variants_of,
     without_part_periods,
 )
-from monitor.discovery.machine.varying import varying_effects
+from monitor.discovery.machine.surroundings import Surroundings, surroundings_of
+from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove
+from monitor.discovery.machine.suspects.steps import Step, find_steps
+from monitor.discovery.machine.suspects.suspects import Suspects, with_effects
+from monitor.discovery.machine.suspects.varying import varying_effects
 from monitor.effects.catalogue import catalogue
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Campaign, Verdict

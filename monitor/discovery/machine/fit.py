@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.machine.correlation import (
+from monitor.discovery.machine.noise.correlation import (
     Correlation,
     NoiseDesign,
     Whitening,
     rows_of,
     turned_into_readings,
 )
-from monitor.discovery.machine.plan_cells import plan_cells
+from monitor.discovery.machine.noise.plan_cells import plan_cells
 from monitor.effects import Basis, Effect
 from monitor.exceptions import DataError
 from monitor.methods.chain.least_squares import Solution, eliminate, project_out

@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.machine.acceptance import LARGEST_RATIO
-from monitor.discovery.machine.curve_findings import is_curve
-from monitor.discovery.machine.curves import Curve, curve_of
-from monitor.discovery.machine.poses import p_value_by_poses, poses_of_rows, widening
-from monitor.discovery.machine.refine import Refined
-from monitor.discovery.machine.rivals import RivalSearch
+from monitor.discovery.machine.evidence.acceptance import LARGEST_RATIO
+from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows, widening
+from monitor.discovery.machine.joints.curve_findings import is_curve
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, MachineEffect, scene_of
-from monitor.discovery.machine.separate import Separation, separating_poses
+from monitor.discovery.machine.separation.rivals import RivalSearch
+from monitor.discovery.machine.separation.separate import Separation, separating_poses
+from monitor.discovery.machine.shapes.curves import Curve, curve_of
+from monitor.discovery.machine.shapes.refine import Refined
+from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.shapes.variants import part_of_period
 from monitor.discovery.machine.surroundings import Surroundings
-from monitor.discovery.machine.tables import ChainScan
-from monitor.discovery.machine.variants import part_of_period
 from monitor.discovery.search.amplitudes import amplitudes, length_of
 from monitor.discovery.search.evidence import weigh_beside
 from monitor.discovery.search.missing import Missing, Rival

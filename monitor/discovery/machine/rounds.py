@@ -8,22 +8,22 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TypeAlias
 
-from monitor.discovery.machine.correlation import Correlation, caution
+from monitor.discovery.machine.evidence.poses import poses_of_rows
 from monitor.discovery.machine.fit import Fit, fit, fit_those_possible
-from monitor.discovery.machine.poses import poses_of_rows
-from monitor.discovery.machine.refine import Refined, refine_all
-from monitor.discovery.machine.robot_search import MOST_EFFECTS as MOST_BESIDE_CURVES
-from monitor.discovery.machine.robot_search import search_beside_curves
+from monitor.discovery.machine.joints.robot_search import MOST_EFFECTS as MOST_BESIDE_CURVES
+from monitor.discovery.machine.joints.robot_search import search_beside_curves
+from monitor.discovery.machine.noise.correlation import Correlation, caution
 from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect, scene_of
 from monitor.discovery.machine.search import search_chain
-from monitor.discovery.machine.suspects import (
+from monitor.discovery.machine.shapes.refine import Refined, refine_all
+from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.machine.suspects.suspects import (
     MOST_BAD_POINTS,
     SuspectNames,
     Suspects,
     find_suspects,
     with_effects,
 )
-from monitor.discovery.machine.tables import ChainScan
 from monitor.discovery.search.rounds import Turns, in_rounds
 from monitor.discovery.search.scan import MOST_EFFECTS
 from monitor.methods.chain.problem import ChainProblem

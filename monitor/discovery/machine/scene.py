@@ -14,14 +14,14 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.held_out import (
+from monitor.discovery.machine.evidence.held_out import (
     LeftOutBlocks,
     PoseFold,
     held_out_by_poses,
     pose_folds,
     pose_parts,
 )
+from monitor.discovery.machine.fit import Fit
 from monitor.discovery.search.candidate import SMALLEST_SHARE, Candidate, Variant
 from monitor.discovery.search.held_out import held_out_rms
 from monitor.discovery.search.remainder import Remainders

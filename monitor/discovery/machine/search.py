@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from monitor.discovery.machine.acceptance import ChainAcceptance
-from monitor.discovery.machine.gears import gear_variants
-from monitor.discovery.machine.joint_curves import all_curves_were_searched
+from monitor.discovery.machine.evidence.acceptance import ChainAcceptance
+from monitor.discovery.machine.joints.joint_curves import all_curves_were_searched
 from monitor.discovery.machine.missing import standing_out
 from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
-from monitor.discovery.machine.tables import ChainScan, with_tables
-from monitor.discovery.machine.unknown_shapes import with_unknown_shapes
-from monitor.discovery.machine.wander import with_base_instead
+from monitor.discovery.machine.shapes.gears import gear_variants
+from monitor.discovery.machine.shapes.tables import ChainScan, with_tables
+from monitor.discovery.machine.shapes.unknown_shapes import with_unknown_shapes
+from monitor.discovery.machine.suspects.wander import with_base_instead
 from monitor.discovery.search.scan import by_error_taken_away, scan
 
 # More orders of gears than this are noise that no order explains.

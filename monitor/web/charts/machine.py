@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from monitor.records import Array
 from monitor.web.charts.chart import Trace
-from monitor.workflow.explain.residual_vectors import AxisPlace, ResidualsAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.explain.residual_vectors import AxisPlace, ResidualsAnswer
 
 #: Points of the arc that says how a rotary axis turns, which leaves a part of the circle open.
 ARC, TURN = 40, np.radians(300.0)

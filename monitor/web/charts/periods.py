@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from monitor.web.charts.chart import Chart, axis
-from monitor.workflow.history.periods import ParameterOfPeriods, PeriodsAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.history.periods import ParameterOfPeriods, PeriodsAnswer
 
 #: Colour and marker of what differs, does not, and is not decided.
 _LOOKS = {

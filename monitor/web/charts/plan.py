@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from monitor.web.charts.chart import Chart, axis
-from monitor.workflow.plan.answer import BallPlanAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.plan.answer import BallPlanAnswer
 
 
 def plan_chart(answer: BallPlanAnswer) -> Chart:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from monitor.reporting.health.comparison import ResidualAgainst
 from monitor.web.charts.chart import Chart, Trace, axis
 from monitor.web.charts.machine import machine_traces
-from monitor.workflow.explain.compare_answer import CompareAnswer, MachinePart
-from monitor.workflow.explain.explain_answer import MachineMissing
-from monitor.workflow.explain.residual_vectors import ResidualsAnswer
-from monitor.workflow.explain.residuals_by_driver import ResidualsByDriverAnswer
-from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
+
+if TYPE_CHECKING:
+    from monitor.reporting.health.comparison import ResidualAgainst
+    from monitor.workflow.explain.compare_answer import CompareAnswer
+    from monitor.workflow.explain.explain_answer import MachineMissing
+    from monitor.workflow.explain.residual_vectors import ResidualsAnswer
+    from monitor.workflow.explain.residuals_by_driver import ResidualsByDriverAnswer
+    from monitor.workflow.explain.version_answer import CurveVersion, MachineVersion
 
 #: Steps of the magnification slider: 1 µm is drawn as so many millimetres.
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100)
@@ -131,6 +133,9 @@ def _means(
 
 def failing_charts(answer: CompareAnswer) -> list[Chart]:
     """Show where the model fails: the RMS by target, axis and run, beside what is expected."""
+    # Loaded where it is met: whoever opens the first page waits for what is loaded before.
+    from monitor.workflow.explain.compare_answer import MachinePart
+
     comparison = answer.comparison
     expected = comparison.expected_rms_um
     charts = []
@@ -189,6 +194,8 @@ def falling_chart(
 ) -> Chart | None:
     """Show the error of each version, on the fitted runs and on held-out ones, down to what the readings' noise leaves
     (``expected_um``); None for curves."""
+    from monitor.workflow.explain.version_answer import MachineVersion
+
     versions = [step for step in steps if isinstance(step, MachineVersion)]
     if not versions:
         return None

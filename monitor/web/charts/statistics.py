@@ -6,13 +6,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from monitor.web.charts.chart import Chart, Trace, axis
-from monitor.workflow.run_statistics.answer import HistogramAnswer, StatisticsAnswer
-from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-from monitor.workflow.uncertainty.cloud import CloudAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.run_statistics.answer import HistogramAnswer, StatisticsAnswer
+    from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+    from monitor.workflow.uncertainty.cloud import CloudAnswer
 
 #: The tests as people know them.
 TESTS = {"bartlett": "Bartlett (equal scatter)", "anova": "ANOVA (equal means)"}

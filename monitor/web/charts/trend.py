@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from monitor.web.charts.chart import DASHES, Chart, Trace, axis, look
 from monitor.web.words import number
-from monitor.workflow.history.values import ValuesAnswer
-from monitor.workflow.trend.answer import ParameterTrend, TrendAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.history.values import ValuesAnswer
+    from monitor.workflow.trend.answer import ParameterTrend, TrendAnswer
 
 #: Expanded uncertainty of a run as it is drawn: k = 2.
 K = 2.0

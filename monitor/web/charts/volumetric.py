@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from monitor.reporting.svg.map_slices import Slice
 from monitor.web.charts.chart import Chart, axis
 from monitor.web.words import number
-from monitor.workflow.volumetric.over_stroke import OverStrokeAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.volumetric.over_stroke import OverStrokeAnswer
 
 #: The scales of lengths: of arrows, and of cells that numbers are written on.
 ARROWS = [[0, "@mid"], [1, "@orange"]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
@@ -13,10 +13,12 @@ from monitor.web.charts.statistics import cloud_chart, correlation_chart, p_valu
 from monitor.web.desk import Ticket
 from monitor.web.forms import whole_number
 from monitor.web.rendering import page
-from monitor.workflow.intake.campaigns import RunsAnswer
-from monitor.workflow.run_statistics.answer import StatisticsAnswer
-from monitor.workflow.uncertainty.answer import UncertaintyAnswer
-from monitor.workflow.uncertainty.cloud import CloudAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.intake.campaigns import RunsAnswer
+    from monitor.workflow.run_statistics.answer import StatisticsAnswer
+    from monitor.workflow.uncertainty.answer import UncertaintyAnswer
+    from monitor.workflow.uncertainty.cloud import CloudAnswer
 
 #: Campaigns of the list: the latest; a machine's own stand on its page.
 MOST_LISTED = 1000
@@ -102,6 +104,9 @@ def _charts(statistics: StatisticsAnswer) -> list[Chart]:
 
 
 def _region(regions: UncertaintyAnswer | CloudAnswer, first: str, second: str) -> Chart:
+    # Loaded where it is met: whoever opens the first page waits for what is loaded before.
+    from monitor.workflow.uncertainty.cloud import CloudAnswer
+
     if isinstance(regions, CloudAnswer):
         return cloud_chart(regions)
     for name in (first, second):

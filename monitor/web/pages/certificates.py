@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
@@ -16,7 +16,9 @@ from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form
 from monitor.web.rendering import page
 from monitor.web.users import User
-from monitor.workflow.certificate.answer import VerificationAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.certificate.answer import VerificationAnswer
 
 
 def routes() -> APIRouter:

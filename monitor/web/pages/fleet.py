@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
@@ -16,9 +17,12 @@ from monitor.web.desk import Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import page
 from monitor.web.words import URGENCIES, Urgency, how_far, since
-from monitor.workflow.fleet.answer import ATTENTION, Attention, FleetAnswer, FleetTableRow
-from monitor.workflow.history.values import ValuesAnswer
-from monitor.workflow.query import TableAnswer
+from monitor.workflow.fleet.attention import ATTENTION, Attention
+
+if TYPE_CHECKING:
+    from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
+    from monitor.workflow.history.values import ValuesAnswer
+    from monitor.workflow.query import TableAnswer
 
 IDENTIFY = "identify all"
 #: Machines of one page.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
@@ -16,7 +17,9 @@ from monitor.web.faults import Refusal, refusal_of
 from monitor.web.forms import Form, read_form
 from monitor.web.rendering import page
 from monitor.web.users import User
-from monitor.workflow.intake.importing import ImportAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.intake.importing import ImportAnswer
 
 
 def routes() -> APIRouter:

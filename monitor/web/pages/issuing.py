@@ -23,7 +23,6 @@ from monitor.web.interface import attachment
 from monitor.web.laboratory_form import box_of, groups, laboratory_file, texts_of_file
 from monitor.web.rendering import page
 from monitor.web.users import User
-from monitor.workflow.certificate.request import METHODS, RULES
 
 #: The largest laboratory's file that fills the form.
 FILE_BYTES = 2**20
@@ -83,6 +82,9 @@ def _from_file(form: Form) -> dict[str, str]:
 
 
 def _shown(request: Request, texts: Mapping[str, str], outcome: _Outcome) -> Response:
+    # Loaded where it is met: whoever opens the first page waits for what is loaded before.
+    from monitor.workflow.certificate.request import METHODS, RULES
+
     campaign = texts.get("campaign", "")
     runs = request.app.state.asker(request.state.user, "runs", {"campaign": campaign}).runs
     return page(
@@ -110,11 +112,11 @@ def _pressed(asker: Asker, user: User, texts: Mapping[str, str], working_folder:
 
 def _document(texts: Mapping[str, str], *, draft: bool) -> dict[str, Any]:
     campaign = texts.get("campaign", "")
-    document: dict[str, Any] = {"campaign": campaign, "method": texts.get("method") or METHODS[0]}
+    document: dict[str, Any] = {"campaign": campaign}
     for name in ("run", "as_left"):
         if texts.get(name):
             document[name] = whole_number(name, texts[name])
-    for name in ("number", "issued_on", "conformity"):
+    for name in ("method", "number", "issued_on", "conformity"):
         if texts.get(name):
             document[name] = texts[name]
     accepted = {kind.value: texts.get(f"accept.{kind}", "") for kind in GroundKind}

@@ -6,7 +6,7 @@ import csv
 import io
 from dataclasses import replace
 from datetime import date, timedelta
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
@@ -18,7 +18,9 @@ from monitor.web.charts.trend import GROUPINGS, trend_chart
 from monitor.web.forms import read_form
 from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
-from monitor.workflow.history.values import ValuesAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.history.values import ValuesAnswer
 
 #: Which runs are shown: all, those of a warm machine, those of one that warms up.
 WARMTHS = ("", "warm", "warming up")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request
 from starlette.concurrency import run_in_threadpool
@@ -24,8 +24,9 @@ from monitor.web.charts.residuals import (
 from monitor.web.desk import Ticket
 from monitor.web.forms import read_form
 from monitor.web.rendering import link, page
-from monitor.workflow.explain.explain_answer import MachineExplanation
-from monitor.workflow.model.answer import ChangeModelAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.model.answer import ChangeModelAnswer
 
 #: So long the script's question for an effect's arrows is held before it has to ask again.
 FETCH_S = 20.0
@@ -40,6 +41,9 @@ def routes() -> APIRouter:
         request: Request, campaign: str, model: str = "", effect: str = "", driver: str = "", note: str = ""
     ) -> Response:
         """Compare a model with a campaign; with an effect tried beside it."""
+        # Loaded where it is met: whoever opens the first page waits for what is loaded before.
+        from monitor.workflow.explain.explain_answer import MachineExplanation
+
         ask, user = request.app.state.asker, request.state.user
         row = next(iter(ask(user, "campaigns", {"campaign": campaign}).campaigns), None)
         if row is None:

@@ -13,7 +13,6 @@ from monitor.exceptions import InputError, MonitorError
 from monitor.web.charts.plan import plan_chart
 from monitor.web.forms import whole_number
 from monitor.web.rendering import page
-from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer
 
 #: A field of the form that asks for the standard uncertainty of a parameter begins so.
 WANTED = "u_"
@@ -26,6 +25,9 @@ def routes() -> APIRouter:
     @router.get("/plan")
     def plan(request: Request, campaign: str, model: str = "", separate: str = "") -> Response:
         """Weigh the plan of a campaign, and the one that the form asks for."""
+        # Loaded where it is met: whoever opens the first page waits for what is loaded before.
+        from monitor.workflow.plan.answer import AnglePlanAnswer, BallPlanAnswer
+
         query = request.query_params
         document: dict[str, Any] = {"campaign": campaign, **({"model": model} if model else {})}
         document |= _size(query) | _wanted(query)

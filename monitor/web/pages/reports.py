@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 from datetime import date
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Request
 from starlette.responses import RedirectResponse, Response
@@ -15,7 +16,9 @@ from monitor.store import CampaignRow
 from monitor.web.desk import Ticket
 from monitor.web.interface import attachment
 from monitor.web.rendering import link, page
-from monitor.workflow.health.request import ReportAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.health.request import ReportAnswer
 
 #: Weeks that are listed, the latest first.
 MOST_WEEKS = 60

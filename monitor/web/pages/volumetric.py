@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
@@ -9,7 +11,9 @@ from monitor.exceptions import MonitorError
 from monitor.web.charts.volumetric import slice_charts, vectors_chart
 from monitor.web.forms import whole_number
 from monitor.web.rendering import page
-from monitor.workflow.intake.campaigns import RunsAnswer
+
+if TYPE_CHECKING:
+    from monitor.workflow.intake.campaigns import RunsAnswer
 
 #: Points along each axis that the page offers.
 POINTS = (3, 5, 7, 9)

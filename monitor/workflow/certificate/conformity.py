@@ -137,7 +137,7 @@ def _process_in_words(
 
 def _guard_factor(rule: str, result: ResultSet, dof: float) -> float:
     """The guard band w in standard uncertainties."""
-    from monitor.uncertainty.coverage import single_factor
+    from monitor.uncertainty.coverage_regions.coverage import single_factor
 
     if rule == "simple":
         return 0.0

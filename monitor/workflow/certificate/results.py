@@ -185,7 +185,7 @@ def _single_factor(evaluated: StatedUncertainty) -> float:
     if frame is not None and frame.k is not None:
         return frame.k
     # An answer of before there was one. Loaded here: what states a stored result waits for no library of formulas.
-    from monitor.uncertainty.coverage import single_factor
+    from monitor.uncertainty.coverage_regions.coverage import single_factor
 
     return single_factor(evaluated.answer.p, evaluated.fewest_dof)
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from monitor.discovery import ChainComparison, ChainMissing, Explanation, Mistake
 from monitor.discovery.machine.fit import Fit
-from monitor.discovery.machine.steps import Step
-from monitor.discovery.machine.suspects import MOST_BAD_POINTS
+from monitor.discovery.machine.suspects.steps import Step
+from monitor.discovery.machine.suspects.suspects import MOST_BAD_POINTS
 from monitor.records import Verdict
 from monitor.reporting.machine_finding import (
     ONE_RUN,

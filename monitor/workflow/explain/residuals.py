@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.discovery import Fit
-from monitor.discovery.machine.plan_cells import plan_cells
+from monitor.discovery.machine.noise.plan_cells import plan_cells
 from monitor.records import Array
 from monitor.units import HOUR, MICROMETRE, MINUTE
 

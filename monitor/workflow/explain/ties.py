@@ -6,9 +6,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import TYPE_CHECKING
 
-from monitor.discovery import ChainMissing
 from monitor.documents import OMITTED
+
+if TYPE_CHECKING:
+    from monitor.discovery import ChainMissing
 
 #: Drivers that follow from where the axes stand.
 OF_POSES = ("", "gravity", "link_weights")

@@ -21,7 +21,8 @@ from monitor.store import (
     tolerance_types,
 )
 from monitor.units import DAYS_PER_YEAR
-from monitor.workflow.fleet.answer import ATTENTION, FleetAnswer, FleetTableRow
+from monitor.workflow.fleet.answer import FleetAnswer, FleetTableRow
+from monitor.workflow.fleet.attention import ATTENTION
 from monitor.workflow.fleet.ranking import CUT, RATE, cell_tests, means_p, ranked
 from monitor.workflow.fleet.request import FleetRequest
 from monitor.workflow.fleet.volumetric import share_of_limit, volumetric_rows

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.records import Array
-from monitor.statistics.block_lines import DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS, Blocks
+from monitor.statistics.days.block_lines import DAYS_AS_BLOCKS, DAYS_OF_BLOCK, MOST_BLOCKS, Blocks
 from monitor.statistics.means import VarianceMoments, brown_forsythe_from_moments
 from monitor.statistics.sufficient import (
     CellDrift,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from monitor.store import Database, latest_maps, latest_tolerances
 from monitor.units import MICROMETRE
-from monitor.workflow.fleet.answer import Attention, FleetTableRow
+from monitor.workflow.fleet.answer import FleetTableRow
+from monitor.workflow.fleet.attention import Attention
 from monitor.workflow.trend.volumetric import VOLUMETRIC
 
 

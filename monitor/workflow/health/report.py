@@ -40,8 +40,8 @@ from monitor.store import (
     save_analysis,
 )
 from monitor.store.catalogue import check_machine
-from monitor.uncertainty.engine import Engine, Here, in_order
-from monitor.uncertainty.processes import processes
+from monitor.uncertainty.workers.engine import Engine, Here, in_order
+from monitor.uncertainty.workers.processes import processes
 from monitor.workflow.certificate.files import why_not
 from monitor.workflow.health.machine import MachineName, MachineWeek, machine_health, read_week
 from monitor.workflow.health.refusals import refused_elsewhere

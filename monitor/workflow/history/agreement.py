@@ -17,7 +17,7 @@ import numpy.typing as npt
 from monitor.documents import OMITTED, WORDED
 from monitor.exceptions import DataError
 from monitor.reporting.lacks import Undecided
-from monitor.statistics.before_after import OtherDays, before_after
+from monitor.statistics.days.before_after import OtherDays, before_after
 from monitor.statistics.normalised_error import K, normalised_error, result_of_runs
 from monitor.store import Database, MachineEvent, MachineHistory, latest_documents
 from monitor.workflow.history.series import day_numbers

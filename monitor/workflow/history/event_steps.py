@@ -15,8 +15,8 @@ import scipy
 
 from monitor.exceptions import DataError
 from monitor.records import Array
-from monitor.statistics.before_after import BeforeAfter, OtherDays, before_after
-from monitor.statistics.rival_scatter import Allowance
+from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_after
+from monitor.statistics.days.rival_scatter import Allowance
 from monitor.store import NOTE, MachineEvent
 from monitor.workflow.history.calendar import days_since_1970
 from monitor.workflow.history.past import ParameterPast

@@ -12,7 +12,7 @@ from datetime import timedelta
 
 from monitor.exceptions import DataError
 from monitor.statistics import Forecast, Trend, forecast
-from monitor.statistics.forecast import Crossing
+from monitor.statistics.forecasts.forecast import Crossing
 from monitor.units import DAYS_PER_YEAR
 from monitor.workflow.history.calendar import date
 from monitor.workflow.history.drift import PieceDrift

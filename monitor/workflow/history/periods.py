@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.exceptions import DataError, InputError
-from monitor.statistics.before_after import BeforeAfter, OtherDays, before_after
+from monitor.statistics.days.before_after import BeforeAfter, OtherDays, before_after
 from monitor.store import Database, MachineHistory, followed_by, machine_history
 from monitor.workflow.history.calendar import SECONDS_PER_DAY
 from monitor.workflow.history.series import Series, parameter_series

@@ -6,7 +6,7 @@ from monitor.exceptions import CampaignError, EffectError, Fault, InputError
 from monitor.methods import campaign_method
 from monitor.readers import line_of_source
 from monitor.records import Campaign
-from monitor.uncertainty.row_run import measured_run
+from monitor.uncertainty.runs.row_run import measured_run
 from monitor.uncertainty.type_b import source_columns
 from monitor.workflow.campaign_parts import only_run
 

@@ -8,14 +8,14 @@ import numpy as np
 
 from monitor.discovery import Fit, fit
 from monitor.discovery.machine.scene import scene_of
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.effects.catalogue import catalogue
 from monitor.machine import Chain
 from monitor.methods.planning.candidates import Choice
 from monitor.methods.planning.search import best_plan
 from monitor.methods.planning.touches import planned_context
 from monitor.records import Array
-from monitor.uncertainty.coverage import rectangle_factor
+from monitor.uncertainty.coverage_regions.coverage import rectangle_factor
 from monitor.units import DEGREE
 from monitor.workflow.plan.answer import BallPlan, BallSubset, PlannedParameter, Pose
 from monitor.workflow.plan.candidates import PlannedCampaign

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from monitor.discovery import fit
-from monitor.discovery.machine.separate import Separation, separating_poses
+from monitor.discovery.machine.separation.separate import Separation, separating_poses
 from monitor.effects import parse_effect
 from monitor.methods import campaign_method
 from monitor.records import Campaign

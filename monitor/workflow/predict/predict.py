@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from monitor.discovery import Fit, fit
-from monitor.discovery.machine.held_out import poses_of
+from monitor.discovery.machine.evidence.held_out import poses_of
 from monitor.exceptions import DataError
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array, Campaign, CurveCampaign, Probings

@@ -12,7 +12,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.problem import ChainProblem
 from monitor.records import Array
 from monitor.store import Database, StoredModel, load_campaign
-from monitor.uncertainty.row_run import repeated_readings
+from monitor.uncertainty.runs.row_run import repeated_readings
 from monitor.workflow.models import as_model
 from monitor.workflow.selections.select import group
 

@@ -10,9 +10,9 @@ from monitor.records import Campaign
 from monitor.reporting.budget import HoldsFor
 from monitor.reporting.covariance_source import CovarianceSource
 from monitor.uncertainty import OutputContribution
-from monitor.uncertainty.measured_run import MeasuredRun
-from monitor.uncertainty.sensitivity import Sensitivity
-from monitor.uncertainty.sourced_trials import Moves, output_moves
+from monitor.uncertainty.monte_carlo.sourced_trials import Moves, output_moves
+from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.runs.sensitivity import Sensitivity
 from monitor.units import Unit
 from monitor.workflow.uncertainty.day_to_day import between_days, components_of, day_to_day
 from monitor.workflow.uncertainty.inputs import holding_for

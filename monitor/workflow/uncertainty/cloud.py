@@ -9,7 +9,11 @@ import numpy as np
 from monitor.exceptions import InputError
 from monitor.records import Array
 from monitor.store import Database
-from monitor.uncertainty.coverage import largest_deviations, mahalanobis_distances, quantile_of
+from monitor.uncertainty.coverage_regions.coverage import (
+    largest_deviations,
+    mahalanobis_distances,
+    quantile_of,
+)
 from monitor.workflow.uncertainty.evaluation import evaluate
 from monitor.workflow.uncertainty.request import COVERAGE, UncertaintyRequest
 

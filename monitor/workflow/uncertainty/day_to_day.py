@@ -11,7 +11,7 @@ from monitor.records import Array, Campaign
 from monitor.reporting.budget import DayToDay
 from monitor.statistics.nested import DayComponents, day_components
 from monitor.uncertainty import Estimated, OutputContribution
-from monitor.uncertainty.measured_run import MeasuredRun
+from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.units import Unit
 from monitor.workflow.uncertainty.inputs import FEWEST_DAYS
 

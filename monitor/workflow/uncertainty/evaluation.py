@@ -12,7 +12,7 @@ import numpy as np
 
 from monitor.discovery import Fit, fit, robust_fit
 from monitor.discovery.machine.model_uncertainty import model_uncertainty
-from monitor.discovery.machine.variants import variants_of
+from monitor.discovery.machine.shapes.variants import variants_of
 from monitor.effects.catalogue import catalogue
 from monitor.exceptions import DataError
 from monitor.methods import campaign_method
@@ -32,10 +32,10 @@ from monitor.uncertainty import (
     joined,
     validate,
 )
-from monitor.uncertainty.measured_run import MeasuredRun
-from monitor.uncertainty.row_run import measured_run
-from monitor.uncertainty.sensitivity import Sensitivity, sensitivity_of
-from monitor.uncertainty.sourced_trials import Moves
+from monitor.uncertainty.monte_carlo.sourced_trials import Moves
+from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.runs.row_run import measured_run
+from monitor.uncertainty.runs.sensitivity import Sensitivity, sensitivity_of
 from monitor.units import Unit
 from monitor.workflow.campaign_parts import runs_before
 from monitor.workflow.measured import machine_campaign

@@ -19,10 +19,10 @@ from monitor.reporting.budget import HoldsFor
 from monitor.reporting.covariance_source import CovarianceKind, CovarianceSource
 from monitor.uncertainty import Inputs, OutputContribution, overall, pooled_by_day, uncorrelated
 from monitor.uncertainty.linear_axes import row_covariances
-from monitor.uncertainty.measured_run import MeasuredRun
-from monitor.uncertainty.row_run import repeated_readings
-from monitor.uncertainty.sensitivity import Sensitivity
-from monitor.uncertainty.touched_run import TouchedRun
+from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.runs.row_run import repeated_readings
+from monitor.uncertainty.runs.sensitivity import Sensitivity
+from monitor.uncertainty.runs.touched_run import TouchedRun
 from monitor.workflow.selections.readings import SelectedReadings
 
 READINGS = "readings"

@@ -9,7 +9,7 @@ from monitor.records import Array, Campaign, LinearAxes
 from monitor.reporting.budget import LengthKind, LengthReference, StatedSource
 from monitor.reporting.covariance_source import CovarianceKind
 from monitor.sources import Quantity, Sharing, Source
-from monitor.uncertainty.measured_run import MeasuredRun
+from monitor.uncertainty.runs.measured_run import MeasuredRun
 from monitor.uncertainty.type_b import SourceColumns, source_columns
 from monitor.units import ONE
 

@@ -10,12 +10,12 @@ from threadpoolctl import threadpool_limits
 
 from monitor.exceptions import InputError
 from monitor.uncertainty import BlockSampler, Inputs
-from monitor.uncertainty.cluster import cluster
-from monitor.uncertainty.measured_run import MeasuredRun
-from monitor.uncertainty.processes import processes
-from monitor.uncertainty.propagation import Model
-from monitor.uncertainty.sourced_trials import Moves, moved_estimator
-from monitor.uncertainty.spread import spread
+from monitor.uncertainty.monte_carlo.propagation import Model
+from monitor.uncertainty.monte_carlo.sourced_trials import Moves, moved_estimator
+from monitor.uncertainty.runs.measured_run import MeasuredRun
+from monitor.uncertainty.workers.cluster import cluster
+from monitor.uncertainty.workers.processes import processes
+from monitor.uncertainty.workers.spread import spread
 from monitor.workflow.uncertainty.request import UncertaintyRequest
 
 # Threads of this process where nothing else was asked for: the trials release the interpreter's lock.

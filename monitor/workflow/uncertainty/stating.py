@@ -14,9 +14,9 @@ from monitor.records import Array, Verdict
 from monitor.reporting.covariance_source import covariance_sentence
 from monitor.reporting.factor_sampling import FactorSampling
 from monitor.reporting.refused import refused_parameters
-from monitor.uncertainty.coverage import joint_coverage, single_factor
+from monitor.uncertainty.coverage_regions.coverage import joint_coverage, single_factor
+from monitor.uncertainty.coverage_regions.regions import region_factors
 from monitor.uncertainty.parts import known
-from monitor.uncertainty.regions import region_factors
 from monitor.uncertainty.validation import Comparison, Validation
 from monitor.units import MICROMETRE
 from monitor.workflow.models import label

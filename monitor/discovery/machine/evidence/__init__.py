@@ -1,0 +1,1 @@
+"""What counts as evidence for an effect of a machine: poses, runs and days, readings that are left out in turn."""

@@ -1,0 +1,200 @@
+"""Whether a finding of a scan of a chain is believed: with every pose as one observation, against how its size
+scatters from run to run, and by the error on runs that took no part in its fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from monitor.discovery.machine.evidence.poses import p_value_by_poses, poses_of_rows
+from monitor.discovery.machine.evidence.run_evidence import p_value_against_runs
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.flexible import FlexibleErrors, error_of
+from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.machine.shapes.variants import with_drivers
+from monitor.discovery.machine.suspects.wander import is_drift_of_machine, tracker_wander
+from monitor.discovery.search.acceptance import Acceptance
+from monitor.discovery.search.amplitudes import amplitudes
+from monitor.discovery.search.evidence import (
+    BEYOND,
+    STANDS_OUT,
+    Evidence,
+    Pool,
+    best_of_families,
+    pool_of,
+    weigh_beside,
+)
+from monitor.discovery.search.memory import Memory
+from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.scan import except_for
+from monitor.discovery.search.scene import family_count
+from monitor.discovery.search.sign_flips import p_value_by_flips
+
+# Readings of one block of a run: some minutes, beyond what neighbours share once their correlation is taken out.
+BLOCK = 15
+# Two effects that all but cancel are each hundreds of times as large as the error that they take away; the effects of
+# the trial of power are at most 32 times as large.
+LARGEST_RATIO = 100.0
+# So many effects within the shape of another are named at most.
+MOST_NAMED = 5
+
+
+def blocks_of_runs(scene: ChainScene) -> npt.NDArray[np.int64]:
+    """The block (M,) of every whitened number: some neighbouring readings of one run."""
+    problem = scene.fit.problem
+    runs, rows = scene.fit.solution.last.residual.shape
+    numbers = problem.sigma.shape[1]
+    count = max(rows // (BLOCK * numbers), 1)
+    return np.asarray(scene.run * count + np.tile(np.arange(rows) * count // rows, runs))
+
+
+class ChainAcceptance(Acceptance[ChainCandidate]):
+    """The rules of a search on a chain; ``drivers`` are those that the recorded columns allow, ``shared`` effects that
+    the scene takes for granted."""
+
+    scene: ChainScene
+
+    def __init__(
+        self, scene: ChainScene, drivers: Sequence[str], rate: float, shared: Sequence[ChainCandidate] = ()
+    ) -> None:
+        super().__init__(scene)
+        self.shared = shared
+        self.drivers = drivers
+        self.rate = rate
+        self._families = family_count(scene)
+        self._poses = poses_of_rows(scene.fit)
+        self._units = (scene.run, blocks_of_runs(scene))
+        self._flexible = FlexibleErrors(scene, drivers)
+        self._wander = tracker_wander(scene)
+        self._weighed: Memory[float] = Memory()
+        self._accepted: Memory[bool] = Memory()
+        self._refined: Memory[ChainCandidate] = Memory()
+        self._pool: Pool[ChainCandidate] | None = None
+        self._flipped: Memory[float | None] = Memory()
+
+    def accepts(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        """Whether an effect stands out with every pose as one observation and from how its size scatters from run to
+        run, is of a plausible size, and lowers the error on runs left out (blocks of poses where there is one run; true
+        where it has few) and that at poses left out of every run."""
+        return self._accepted.answer(others, candidate, lambda: self._is_accepted(others, candidate))
+
+    def _is_accepted(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        limit = self.rate
+        named = [
+            *self._larger_errors(others, candidate),
+            *(shared for shared in self.shared if error_of(shared) != error_of(candidate)),
+        ]
+        if not self._survives(others, candidate, self._flexible.competitors(named)):
+            return False
+        if is_drift_of_machine(candidate) and not self._survives(others, candidate, self._wander):
+            return False
+        if not self._is_plausible(others, candidate):
+            return False
+        if self._poses is not None:
+            by_poses = p_value_by_poses(candidate, self.scene, others, self._poses)
+            if by_poses * self._families > limit:
+                return False
+        if p_value_against_runs(candidate, self.scene, others) * self._families > limit:
+            return False
+        return self.predicts(others, candidate)
+
+    def within_shapes(self, selected: Sequence[ChainCandidate]) -> list[tuple[str, ...]]:
+        """For each selected effect the families that stand out beside all selected ones, but not beside its error in
+        any shape."""
+        pool = pool_of(self.scene)
+        families = {candidate.family for candidate in selected}
+        within: list[list[str]] = [[] for _ in selected]
+        for evidence in best_of_families(weigh_beside(self.scene, pool, selected)):
+            candidate = evidence.candidate
+            if evidence.p_value * self._families > self.rate or candidate.family in families:
+                continue
+            for index, named in enumerate(selected):
+                other_error = error_of(named) != error_of(candidate)
+                if other_error and not self._survives(
+                    selected, candidate, self._flexible.competitors([named])
+                ):
+                    within[index].append(candidate.family)
+                    break
+        return [tuple(names[:MOST_NAMED]) for names in within]
+
+    def _survives(
+        self,
+        others: Sequence[ChainCandidate],
+        candidate: ChainCandidate,
+        competitors: Sequence[ChainCandidate],
+    ) -> bool:
+        """Whether an effect stands out beside others and flexible ``competitors``."""
+        if not competitors:
+            return True
+        beside = self.scene.remainders.beside([*others, *competitors])
+        residual = beside.residual
+        columns = orthonormal(without(beside.basis, candidate.columns))
+        explained = float(np.sum((columns.T @ residual) ** 2))
+        size = columns.shape[1]
+        dof = beside.degrees_of_freedom - size
+        rest = float(residual @ residual) - explained
+        if size == 0 or dof < 1 or rest <= 0.0:
+            return False
+        p_value = float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof)))
+        return p_value * candidate.variant.tries * candidate.variant.odds * self._families <= self.rate
+
+    def _larger_errors(
+        self, others: Sequence[ChainCandidate], candidate: ChainCandidate
+    ) -> list[ChainCandidate]:
+        """The effects of other errors that explain more beside all than a candidate does: of two effects the larger one
+        is named first, and its shape may be the cause of the other, not the other way round."""
+        explained = self._explained(others, candidate)
+        return [
+            other
+            for index, other in enumerate(others)
+            if error_of(other) != error_of(candidate)
+            and self._explained([*except_for(others, index), candidate], other) >= explained
+        ]
+
+    def _explained(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> float:
+        """The sum of squares that a candidate explains beside others."""
+        return self._weighed.answer(
+            others, candidate, lambda: weigh_beside(self.scene, [candidate], others)[0].explained
+        )
+
+    def _is_plausible(self, others: Sequence[ChainCandidate], candidate: ChainCandidate) -> bool:
+        """Whether an effect beside others is no larger than a machine could have, and not many times as large as what
+        it takes of the residual: such a one is nearly cancelled by others."""
+        size = candidate.columns.shape[1]
+        fitted = amplitudes(self.scene, [*others, candidate])
+        peak = float(np.linalg.norm(candidate.raw @ fitted.estimate[-size:], axis=1).max())
+        taken = self.scene.fit.sigma * float(np.sqrt(self._explained(others, candidate)))
+        if peak > LARGEST_RATIO * taken / float(np.sqrt(self.scene.fit.readings)):
+            return False
+        sizes, spread = fitted.estimate[-size:], np.sqrt(np.diag(fitted.covariance)[-size:])
+        sure = np.maximum(np.abs(sizes) - STANDS_OUT * spread, 0.0)
+        return float(np.linalg.norm(sure)) <= BEYOND * candidate.largest
+
+    def stands_among(
+        self, pool: Pool[ChainCandidate], others: Sequence[ChainCandidate], evidence: Evidence[ChainCandidate]
+    ) -> bool:
+        """Whether an effect stands out under sign flips of whole runs, where there are enough of them."""
+        if pool is not self._pool:
+            self._pool, self._flipped = pool, Memory()
+        p_value = self._flipped.answer(
+            others,
+            evidence.candidate,
+            lambda: p_value_by_flips(self.scene, pool, others, evidence, self._units),
+        )
+        return p_value is None or p_value <= self.rate
+
+    def alternatives(self, candidate: ChainCandidate) -> Sequence[ChainCandidate]:
+        """The effect with each driver, or without its own."""
+        return scene_of(self.scene.fit, with_drivers(candidate.effect, self.drivers)).candidates
+
+    def at_best_value(self, selected: Sequence[ChainCandidate], index: int) -> ChainCandidate:
+        """The selected candidate at an index with its time constant, pitch or order at the best value."""
+        return self._refined.answer(
+            except_for(selected, index),
+            selected[index],
+            lambda: refine(self.scene, selected, index).candidate,
+        )

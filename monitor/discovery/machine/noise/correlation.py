@@ -1,0 +1,330 @@
+"""Noise of neighbours: readings of one run that resemble those before them (drift, temperature, a slow probe).
+
+The noise of a reading is an independent part and a part that follows an autoregression of first order along the probing
+sequence. Both are estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) and
+taken out of all rows by the filter of Kalman (Trans. ASME J. Basic Eng. 82 (1960) 35), whose innovations are
+independent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.machine import MOTION
+from monitor.methods.chain.problem import ChainProblem
+from monitor.records import Array
+
+# Correlations of neighbours and shares of the correlated part that are tried; neighbours on this grid differ by less
+# than what 8 runs of 62 probings determine (about 0.05).
+CORRELATIONS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.87, 0.93, 0.97, 0.99, 0.998)
+# Without the shares between 0.8 and 1 the drift of a random walk over a run was taken for half of what it is, and told
+# as an effect in up to 3 % of empty campaigns (docs/trials-discovery.md).
+SHARES = (1.0, 0.99, 0.97, 0.94, 0.89, 0.8, 0.67, 0.5, 0.33, 0.2, 0.1)
+# More runs than this say nothing more that the grid could tell apart.
+MOST_RUNS = 5
+# Neighbours that resemble each other by less than so many standard deviations of white noise are white.
+NOTICED = 1.5
+# A slow drift under independent noise shows in readings so far apart.
+FAR = 8
+# Twice the logarithm of the likelihood ratio from which on noise is correlated: 10 % of white campaigns with two
+# parameters. Taking white noise for hardly correlated noise costs next to nothing.
+LIKELIER = 4.6
+# Numbers that are filtered in one piece (32 MB).
+PIECE = 4_000_000
+# Directions of which a filter leaves less than this part (squared) are unknown to it.
+SMALLEST_EIGENVALUE = 1e-9
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Correlation ``rho`` of the dependent part of two neighbours, and its ``share`` of the variance."""
+
+    rho: float
+    share: float
+
+
+def slowness(correlation: Correlation) -> float:
+    """What a correlation adds to the variance of the mean of many neighbours, as a multiple of that of white noise."""
+    return correlation.share * 2.0 * correlation.rho / (1.0 - correlation.rho)
+
+
+def caution(correlation: Correlation | None) -> tuple[float, float]:
+    """What orders correlations by how much slow change they put down to noise."""
+    return (0.0, 0.0) if correlation is None else (correlation.rho * correlation.share, correlation.rho)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The layout of whitened numbers (R, N): ``weighted`` (R, T) touches of d numbers each, ``turned`` (R, T, d, d)
+    into the directions of the readings (None where they are the readings); what stands behind is no reading."""
+
+    weighted: npt.NDArray[np.bool_]
+    numbers: int
+    turned: Array | None
+
+    @property
+    def count(self) -> int:
+        """How many of the N numbers are of readings."""
+        return int(self.weighted.shape[1]) * self.numbers
+
+
+@dataclass(frozen=True)
+class Filters:
+    """The filters of Kalman of C correlations for runs in which the touches ``weighted`` (R, T) were read."""
+
+    correlations: tuple[Correlation, ...]
+    weighted: npt.NDArray[np.bool_]
+
+    @cached_property
+    def _rho(self) -> Array:
+        return np.array([correlation.rho for correlation in self.correlations])
+
+    @cached_property
+    def _recursion(self) -> tuple[Array, Array, Array]:
+        """Gains and reciprocal standard deviations of the innovations, (C, R, T) each and zero where nothing was read,
+        and the logarithm (C, R) of the product of their variances."""
+        rho = self._rho[:, None]
+        share = np.array([correlation.share for correlation in self.correlations])[:, None]
+        gain = np.zeros((len(rho), *self.weighted.shape))
+        variance = np.ones_like(gain)
+        predicted = np.broadcast_to(share, gain.shape[:2])
+        for touch, present in enumerate(self.weighted.T):
+            if touch:
+                predicted = rho**2 * predicted + share * (1.0 - rho**2)
+            total = predicted + (1.0 - share)
+            gain[..., touch] = np.where(present, predicted / total, 0.0)
+            variance[..., touch] = np.where(present, total, 1.0)
+            predicted = predicted * (1.0 - gain[..., touch])
+        return gain, self.weighted / np.sqrt(variance), np.log(variance).sum(axis=2)
+
+    @property
+    def logarithm(self) -> Array:
+        """The logarithms (C, R) of the determinants of the noise covariances of one number a touch."""
+        return self._recursion[2]
+
+    def apply(self, readings: Array) -> Array:
+        """Innovations (C, R, T, k) of readings (R, T, k), divided by their standard deviations."""
+        gain, reciprocal, _ = self._recursion
+        rho = self._rho[:, None, None]
+        white = np.empty((len(rho), *readings.shape))
+        predicted = np.zeros((len(rho), len(readings), readings.shape[2]))
+        for touch in range(readings.shape[1]):
+            innovation = readings[None, :, touch] - predicted
+            white[:, :, touch] = innovation * reciprocal[..., touch, None]
+            predicted = rho * (predicted + innovation * gain[..., touch, None])
+        return white
+
+    def apply_transposed(self, white: Array) -> Array:
+        """The transposed filters, (C, R, T, k), of white numbers (C, R, T, k)."""
+        gain, reciprocal, _ = self._recursion
+        rho = self._rho[:, None, None]
+        result = np.empty(white.shape)
+        ahead = np.zeros((*white.shape[:2], white.shape[3]))
+        for touch in reversed(range(white.shape[2])):
+            scaled, before = white[:, :, touch] * reciprocal[..., touch, None], rho * ahead
+            result[:, :, touch] = scaled + gain[..., touch, None] * before
+            ahead = before - gain[..., touch, None] * before - scaled
+        return result
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """The filter that takes a correlation out of numbers (..., R, N) run by run, as a triangle of weights."""
+
+    rows: Rows
+    correlation: Correlation
+
+    @cached_property
+    def factors(self) -> tuple[Array, Array]:
+        """Lower triangles (R, T, T) that make the touches of every run independent, and the logarithm (R,) of the
+        determinant of the noise covariance for unit variance."""
+        filters = Filters((self.correlation,), self.rows.weighted)
+        runs, touches = self.rows.weighted.shape
+        unit = np.broadcast_to(np.eye(touches), (runs, touches, touches))
+        return filters.apply(unit)[0], self.rows.numbers * filters.logarithm[0]
+
+    def __call__(self, numbers: Array) -> Array:
+        """Independent numbers (..., R, N) of equal variance from correlated ones."""
+        rows = self.rows
+        touches = rows.weighted.shape[1]
+        readings = numbers[..., : rows.count].reshape(*numbers.shape[:-1], touches, rows.numbers)
+        if rows.turned is not None:
+            readings = (rows.turned @ readings[..., None])[..., 0]
+        white = np.array(numbers)
+        white[..., : rows.count] = (self.factors[0] @ readings).reshape(*numbers.shape[:-1], rows.count)
+        return white
+
+
+def rows_of(problem: ChainProblem) -> Rows:
+    """The layout of the whitened numbers of a problem."""
+    weighted = np.isfinite(problem.sigma)
+    numbers = problem.sigma.shape[1]
+    padded = problem.padded(weighted.astype(float)).reshape(len(problem.runs), -1, numbers)
+    return Rows(np.all(padded > 0.5, axis=-1), numbers, None)
+
+
+def turned_into_readings(problem: ChainProblem, by_error: Array) -> Array | None:
+    """Rotations (R, T, d, d) of a row's numbers into the directions of the measured joints; None where the numbers are
+    no vectors of as many joints."""
+    chain, measured = problem.context.chain, list(problem.measured_joints)
+    if len(measured) != 3 or problem.sigma.shape[1] != 3:
+        return None
+    along = np.array([chain.joints[index].direction for index in measured])
+    moved = problem.observe(np.einsum("nrac,ac->nra", by_error[:, :, measured, MOTION, :3], along))
+    # Directions are at right angles but for errors of microradians.
+    turned = problem.padded(np.swapaxes(moved, 1, 2).reshape(len(moved), -1)[:, :, None])
+    return turned.reshape(len(problem.runs), -1, 3, 3)
+
+
+def deviations(residual: Array, rows: Rows, cells: npt.NDArray[np.int64]) -> Array:
+    """Residuals (R, N) less the mean of their ``cells`` (R, T) of the plan over the runs: what all runs share is an
+    effect and no noise. With one run they stay as they are."""
+    if len(residual) == 1:
+        return residual
+    runs, touches = rows.weighted.shape
+    vectors = residual[:, : rows.count].reshape(runs * touches, rows.numbers)
+    cell, weight = np.where(cells < 0, 0, cells).reshape(-1), rows.weighted.reshape(-1).astype(float)
+    count = np.bincount(cell, weights=weight)
+    mean = (
+        np.stack([np.bincount(cell, weights=weight * column) for column in vectors.T], axis=1)
+        / np.maximum(count, 1.0)[:, None]
+    )
+    result = np.array(residual)
+    result[:, : rows.count] = ((vectors - mean[cell]) * weight[:, None]).reshape(runs, rows.count)
+    return result
+
+
+# Every correlation that is tried; the first is white noise.
+GRID = (Correlation(0.0, 0.0), *(Correlation(rho, share) for share in SHARES for rho in CORRELATIONS))
+
+
+@dataclass(frozen=True)
+class _Whites:
+    """What the ``filters`` of the grid make of a plan: the decomposition (C, R, p), (C, R, p, p) of the filtered span
+    of what is unknown, and the part (C,) of the criterion that no residual changes."""
+
+    filters: Filters
+    values: Array
+    vectors: Array
+    logarithm: Array
+
+    @property
+    def able(self) -> npt.NDArray[np.bool_]:
+        """Which directions of the span a filter leaves to be estimated (C, R, p)."""
+        return np.asarray(self.values > SMALLEST_EIGENVALUE)
+
+
+@dataclass(frozen=True)
+class NoiseDesign:
+    """What the estimate of a correlation needs besides residuals: the ``rows`` with the ``cells`` (R, T) of the plan,
+    and an orthonormal ``basis`` (R, N, p) of what is unknown in every run."""
+
+    rows: Rows
+    cells: npt.NDArray[np.int64]
+    basis: Array
+
+    def correlation(self, residual: Array) -> Correlation | None:
+        """The correlation of residuals (R, N); None where they are white.
+
+        Of several runs only what they do not share counts; their means take their part of the degrees of freedom.
+        """
+        readings, rest = self._parts(deviations(residual, self.rows, self.cells)[self._runs, :, None])
+        if self._resemblance(readings) < NOTICED:
+            return None
+        criterion = dict(zip(GRID, self._criteria(readings, rest).tolist(), strict=True))
+        best = min((Correlation(rho, 1.0) for rho in CORRELATIONS), key=criterion.__getitem__)
+        # The more independent noise, the more alike has the rest to be.
+        start = CORRELATIONS.index(best.rho)
+        trials = [
+            Correlation(rho, share) for share in SHARES for rho in CORRELATIONS[max(start - 1, 0) :: 2][:4]
+        ]
+        best = min((best, *trials), key=criterion.__getitem__)
+        least = criterion[best]
+        if criterion[GRID[0]] - least <= LIKELIER:
+            return None
+        # A slow drift under much independent noise: far readings resemble each other as much as neighbours, hardly.
+        # Of the slow correlations that are likelier still the slowest counts: a drift that is taken for white noise
+        # makes an effect.
+        slow = [trial for trial in GRID[1:] if trial.rho >= best.rho and criterion[trial] < least]
+        return max((best, *slow), key=slowness)
+
+    @cached_property
+    def _runs(self) -> npt.NDArray[np.int64]:
+        runs = len(self.basis)
+        return np.unique(np.linspace(0, runs - 1, min(runs, MOST_RUNS)).astype(np.int64))
+
+    @cached_property
+    def _weighted(self) -> npt.NDArray[np.bool_]:
+        return np.asarray(self.rows.weighted[self._runs])
+
+    @cached_property
+    def _own(self) -> tuple[Array, Array]:
+        return self._parts(self.basis[self._runs])
+
+    @cached_property
+    def _share(self) -> float:
+        """The part of the degrees of freedom that the means over the runs leave."""
+        return (len(self.basis) - 1) / len(self.basis) if len(self.basis) > 1 else 1.0
+
+    def _parts(self, numbers: Array) -> tuple[Array, Array]:
+        """Columns (R, N, k) as readings (R, T, d k) in their own directions, and what is no reading (R, e, k)."""
+        rows = self.rows
+        runs, touches = self._weighted.shape
+        readings = numbers[:, : rows.count].reshape(runs, touches, rows.numbers, -1)
+        if rows.turned is not None:
+            readings = rows.turned[self._runs] @ readings
+        readings = np.where(self._weighted[..., None, None], readings, 0.0)
+        return readings.reshape(runs, touches, -1), numbers[:, rows.count :]
+
+    def _resemblance(self, readings: Array) -> float:
+        """The sum of products of neighbours, and of all readings up to ``FAR`` apart, less what the fit alone makes of
+        white noise, in standard deviations; the larger of the two."""
+        unknowns = self._own[0].reshape(*self._weighted.shape, self.rows.numbers, -1)
+        number = self._share * (int(self._weighted.sum()) * self.rows.numbers - float(np.sum(unknowns**2)))
+        variance = max(float(np.sum(readings**2)) / max(number, 1.0), 1e-300)
+        lags = np.arange(1, min(FAR, readings.shape[1] - 1) + 1)
+        beyond = [
+            float(np.sum(readings[:, lag:] * readings[:, :-lag])) / variance
+            + self._share * float(np.sum(unknowns[:, lag:] * unknowns[:, :-lag]))
+            for lag in lags
+        ]
+        deviates = np.cumsum(beyond) / np.sqrt(np.maximum(lags * number, 1.0))
+        return float(max(deviates[0], deviates[-1])) if len(lags) else 0.0
+
+    def _criteria(self, readings: Array, rest: Array) -> Array:
+        """Minus twice the logarithm of the restricted likelihood (C,) of the grid, but for a constant."""
+        whites, numbers = self._whites, self.rows.numbers
+        residual = whites.filters.apply(readings)
+        unknowns, unknown_rest = self._own
+        spans = unknowns.reshape(*readings.shape, -1)
+        onto = np.einsum("rtdp,crtd->crp", spans, whites.filters.apply_transposed(residual), optimize=True)
+        onto += np.einsum("rep,re->rp", unknown_rest, rest[..., 0])
+        onto = (np.swapaxes(whites.vectors, 2, 3) @ onto[..., None])[..., 0]
+        able = whites.able
+        fitted = np.sum(np.where(able, onto**2 / np.where(able, whites.values, 1.0), 0.0), axis=(1, 2))
+        squares = np.sum(residual**2, axis=(1, 2, 3)) + float(np.sum(rest**2)) - fitted
+        number = self._share * (int(self._weighted.sum()) * numbers - able.sum(axis=(1, 2)))
+        return np.asarray(self._share * whites.logarithm + number * np.log(np.maximum(squares, 1e-300)))
+
+    @cached_property
+    def _whites(self) -> _Whites:
+        at_once = max(1, PIECE // max(self._own[0].size, 1))
+        products = [self._products(GRID[first : first + at_once]) for first in range(0, len(GRID), at_once)]
+        values, vectors = np.linalg.eigh(np.concatenate(products))
+        able = values > SMALLEST_EIGENVALUE
+        filters = Filters(GRID, self._weighted)
+        logarithm = self.rows.numbers * filters.logarithm.sum(axis=1)
+        logarithm += np.sum(np.log(np.where(able, values, 1.0)), axis=(1, 2))
+        return _Whites(filters, values, vectors, logarithm)
+
+    def _products(self, correlations: Sequence[Correlation]) -> Array:
+        """The products (C, R, p, p) of the filtered span of what is unknown with itself."""
+        unknowns, rest = self._own
+        white = Filters(tuple(correlations), self._weighted).apply(unknowns)
+        span = white.reshape(*white.shape[:2], -1, rest.shape[-1])
+        return np.asarray(np.swapaxes(span, 2, 3) @ span + np.swapaxes(rest, 1, 2) @ rest)

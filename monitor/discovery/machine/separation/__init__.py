@@ -1,0 +1,1 @@
+"""Effects that a plan cannot tell apart: rivals, distances between effects, poses that would separate them."""

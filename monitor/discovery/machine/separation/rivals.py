@@ -1,0 +1,84 @@
+"""The effects of a chain that the data do not rule out beside those that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, scene_of
+from monitor.discovery.machine.shapes.refine import refine
+from monitor.discovery.machine.shapes.variants import bends_of, part_of_period, with_drivers
+from monitor.discovery.search.evidence import Evidence, best_of_families, weigh_beside
+from monitor.discovery.search.projection import without
+from monitor.discovery.search.rivals import coincides
+from monitor.discovery.search.scan import except_for
+from monitor.effects import ChainEffect
+from monitor.effects.shapes import Cyclic, Harmonic
+from monitor.records import Array
+
+# A time constant between two of the grid may lose so much there; rivals are compared at their best value.
+GRID_LOSS = 12.0
+# Orders of a gear closer than this are the same: less than a turn of the joint shows no more.
+ONE_ORDER = 2.0
+
+
+@dataclass(frozen=True)
+class RivalSearch:
+    """The search for rivals of the ``selected`` effects, which are at their best values; ``drivers`` are those that the
+    recorded columns allow."""
+
+    scene: ChainScene
+    selected: Sequence[ChainCandidate]
+    drivers: Sequence[str]
+
+    def rivals(self, index: int, least: float, coefficients: Array) -> list[tuple[ChainCandidate, bool]]:
+        """Effects as likely as ``least`` instead of that at an index, and whether they coincide with it; these
+        first."""
+        others = except_for(self.selected, index)
+        basis = self.scene.remainders.beside(others).basis
+        remainder = without(basis, self.selected[index].columns) @ coefficients
+        rivals = []
+        for evidence in best_of_families(weigh_beside(self.scene, self._pool(index), others)):
+            if evidence.likelihood >= least - GRID_LOSS:
+                best = self._at_best_value(index, evidence)
+                if best.likelihood >= least:
+                    rivals.append((best.candidate, coincides(basis, best.candidate, remainder[:, None])))
+        return sorted(rivals, key=lambda pair: not pair[1])
+
+    def _pool(self, index: int) -> list[ChainCandidate]:
+        """The candidates that may be rivals: all that were searched, and the effect with each driver."""
+        candidate = self.selected[index]
+        families = {other.family for other in self.selected}
+        pool = [
+            rival
+            for rival in self.scene.candidates
+            if rival.family not in families and np.any(rival.columns) and not _same_cycle(rival, candidate)
+        ]
+        families |= {rival.family for rival in pool}
+        variants = with_drivers(candidate.effect, self.drivers)
+        if part_of_period(candidate.effect, self.scene.fit.problem.context) is not None:
+            variants += bends_of(candidate.effect)
+        driven = scene_of(self.scene.fit, variants).candidates
+        return pool + [rival for rival in driven if rival.family not in families and np.any(rival.columns)]
+
+    def _at_best_value(self, index: int, evidence: Evidence[ChainCandidate]) -> Evidence[ChainCandidate]:
+        """Evidence for a rival of the effect at an index with its searched value at its best."""
+        if evidence.candidate.variant.tries == 1:
+            return evidence
+        trial = [*self.selected[:index], evidence.candidate, *self.selected[index + 1 :]]
+        best = refine(self.scene, trial, index).candidate
+        return weigh_beside(self.scene, [best], except_for(self.selected, index))[0]
+
+
+def _same_cycle(rival: ChainCandidate, candidate: ChainCandidate) -> bool:
+    """Whether a rival is the search for the pitch, or has all but the order, that a candidate has."""
+    effect, other = candidate.effect, rival.effect
+    if not isinstance(effect, ChainEffect):
+        return False
+    if isinstance(other, ChainEffect) and effect.term == other.term:
+        orders = [part.shape.order for part in (effect, other) if isinstance(part.shape, Harmonic)]
+        if len(orders) == 2 and max(orders) > 3 and abs(orders[0] - orders[1]) < ONE_ORDER:
+            return True
+    return isinstance(effect.shape, Cyclic) and rival.family == f"{effect.term.symbol}:cyclic"

@@ -1,0 +1,222 @@
+"""Poses that would separate effects which this plan cannot.
+
+T-optimal (Atkinson and Fedorov, Biometrika 62 (1975) 57): the poses are selected, one after the other, for which
+what the best of the rivals still leaves of the effect, everything else free, is largest. Only poses that the
+machine reaches are offered, and only where they decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.discovery.machine.fit import Fit
+from monitor.discovery.machine.scene import MachineEffect
+from monitor.discovery.machine.separation.distances import PlanRows, pairs_of, select_poses
+from monitor.effects import ChainEffect, Context
+from monitor.effects.drivers import Always
+from monitor.effects.drivers.gravity import Gravity
+from monitor.exceptions import DataError
+from monitor.machine import Chain, Joint, evaluate, touching_positions
+from monitor.methods.chain.touch import TouchProblem
+from monitor.records import Array
+
+# The grid of rotary positions; finer ones change the choice, not what it achieves.
+STEP_RAD = np.pi / 6.0
+# A spindle is oriented to any angle: quarters of a turn for its base parameters, eighths for its harmonics.
+QUARTERS, EIGHTHS = 4, 8
+# Effects of a group that are separated from each other, the most convincing ones.
+MOST_EFFECTS = 6
+# Linear axes without a stroke in the machine file may go this much further than they went.
+STRETCH = 1.25
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Positions of the rotary axes (name to rad) to add, and how many standard deviations apart the two closest of
+    the effects are ``before`` and ``after`` that, over all runs of the campaign. ``together`` are pairs that no pose
+    separates; they do not count."""
+
+    poses: tuple[dict[str, float], ...]
+    before: float
+    after: float
+    together: tuple[tuple[str, str], ...] = ()
+
+
+NO_POSES = Separation((), 0.0, 0.0)
+
+
+def _grid(chain: Chain, visited: Array, strokes: Mapping[str, tuple[float, float]], spindle: int) -> Array:
+    """Rotary positions (P, J) to select from, ``spindle`` ones of the spindle; linear axes at zero."""
+    values = [
+        _positions(joint, visited[:, index], strokes, spindle) for index, joint in enumerate(chain.joints)
+    ]
+    return np.array(list(product(*values)))
+
+
+def _positions(
+    joint: Joint, visited: Array, strokes: Mapping[str, tuple[float, float]], spindle: int
+) -> Array:
+    """The positions of one joint on the grid."""
+    if not joint.turns:
+        return np.zeros(1)
+    if joint.kind == "spindle":
+        return np.linspace(0.0, 2.0 * np.pi, spindle, endpoint=False)
+    low, high = strokes.get(joint.name, (visited.min(), visited.max()))
+    low, high = (low, high) if high - low < 2.0 * np.pi else (low, low + 2.0 * np.pi - STEP_RAD)
+    if high <= low:
+        return np.array([low])
+    return np.linspace(low, high, max(int((high - low) / STEP_RAD) + 1, 2))
+
+
+@dataclass(frozen=True)
+class _Touches:
+    """Touches at new poses: positions (n, J), the pose (n,), the target (n,) and its nominal position (n, 3)."""
+
+    positions: Array
+    pose: npt.NDArray[np.int64]
+    target: npt.NDArray[np.str_]
+    nominal: Array
+
+    def among(self, rows: npt.NDArray[np.bool_]) -> _Touches:
+        """Some of the touches."""
+        return _Touches(self.positions[rows], self.pose[rows], self.target[rows], self.nominal[rows])
+
+    def context(self, present: Context) -> Context:
+        """The context of these touches, everything else as in the present plan."""
+        count = len(self.positions)
+        columns = {
+            name: np.full(count, float(np.nanmean(values))) for name, values in present.columns.items()
+        }
+        return replace(
+            present,
+            positions=self.positions,
+            expected=None,
+            run=self.pose,
+            sequence=np.arange(count),
+            time=np.zeros(count),
+            day_time=np.full(count, float(np.mean(present.day_time))),
+            run_time=np.full(count, 0.5),
+            target=self.target,
+            nominal=self.nominal,
+            columns=columns,
+        )
+
+
+def separating_poses(
+    fit: Fit,
+    effect: MachineEffect,
+    coefficients: Array,
+    rivals: Sequence[MachineEffect],
+    strokes: Mapping[str, tuple[float, float]] | None = None,
+) -> Separation:
+    """Select poses that separate an effect of the given coefficients from its rivals, and these from each other.
+
+    ``strokes`` gives the range of axes in mm or rad where the machine file has one. No poses are offered where
+    effects differ by their driver (other times and temperatures separate those), where no pose decides, or where
+    the method is not one of touching balls.
+    """
+    problem, context = fit.problem, fit.problem.context
+    plain = [rival for rival in rivals if _is_plain(rival)]
+    if not isinstance(problem, TouchProblem) or not plain or not _is_plain(effect):
+        return NO_POSES
+    group = [member for member in (effect, *plain) if isinstance(member, ChainEffect)][:MOST_EFFECTS]
+    turned = any(member.joint.kind == "spindle" for member in group)
+    grid = _grid(context.chain, context.positions, strokes or {}, EIGHTHS if turned else QUARTERS)
+    tip = problem.own_of(fit.solution.local)[0, -3:]
+    touches = _reachable_touches(problem, grid, tip, strokes or {})
+    if touches is None:
+        return NO_POSES
+    new = touches.context(context)
+    first = context.run == problem.runs[0]
+    present = _rows(fit, group, np.flatnonzero(first))
+    pairs = pairs_of(present, _rows_of_new(fit, new, tip, group), new.run, coefficients)
+    selection = select_poses(pairs, len(problem.runs))
+    together = tuple((group[first].text, group[second].text) for first, second in selection.alike)
+    turning = [(index, joint.name) for index, joint in enumerate(context.chain.joints) if joint.turns]
+    numbers = np.unique(new.run)
+    poses = tuple(
+        {name: float(grid[numbers[pose], index]) for index, name in turning} for pose in selection.poses
+    )
+    return Separation(poses, selection.before, selection.after, together)
+
+
+def _is_plain(effect: MachineEffect) -> bool:
+    """Whether an effect is one of the chain that depends on where the axes stand alone, and on no other driver."""
+    return isinstance(effect, ChainEffect) and isinstance(effect.driver, (Always, Gravity))
+
+
+def _reachable_touches(
+    problem: TouchProblem, grid: Array, tip: Array, strokes: Mapping[str, tuple[float, float]]
+) -> _Touches | None:
+    """Touches of all balls at those poses of a grid where the machine reaches every ball; None where they cannot be
+    computed."""
+    context, chain = problem.context, problem.context.chain
+    first = context.run == problem.runs[0]
+    balls = [target for target in problem.targets if int(np.sum(context.target[first] == target)) >= 3]
+    pose = np.repeat(np.arange(len(grid)), len(balls))
+    centres = {str(t): context.nominal[np.flatnonzero(context.target == t)[0]] for t in balls}
+    targets = list(balls) * len(grid)
+    nominal = np.array([centres[target] for target in targets])
+    errors = np.zeros((len(nominal), len(chain.joints), 2, 6))
+    try:
+        positions = touching_positions(chain, np.repeat(grid, len(balls), axis=0), errors, nominal, tip)
+    except DataError:
+        return None
+    reachable = _reachable(chain, positions, context.positions, strokes)
+    good = np.array([reachable[pose == index].all() for index in range(len(grid))])
+    return _Touches(positions, pose, np.array(targets), nominal).among(good[pose])
+
+
+def _reachable(
+    chain: Chain, positions: Array, visited: Array, strokes: Mapping[str, tuple[float, float]]
+) -> Array:
+    """Mark the positions (n, J) that the linear axes reach (n,)."""
+    inside = np.ones(len(positions), dtype=bool)
+    for index, joint in enumerate(chain.joints):
+        if joint.turns:
+            continue
+        low, high = visited[:, index].min(), visited[:, index].max()
+        middle, half = (low + high) / 2.0, (high - low) / 2.0 * STRETCH
+        low, high = strokes.get(joint.name, (middle - half, middle + half))
+        inside &= (positions[:, index] >= low) & (positions[:, index] <= high)
+    return inside
+
+
+def _rows(fit: Fit, effects: Sequence[ChainEffect], rows: npt.NDArray[np.int64]) -> PlanRows:
+    """Whitened rows (N, p) of the first run, calibrated lengths included."""
+    last = fit.solution.last.local[0]
+    columns = []
+    for effect in effects:
+        raw = effect.basis(fit.problem.context).displacement(fit.by_error)[rows]
+        white = (raw / fit.problem.sigma[rows][..., None]).reshape(3 * len(rows), -1)
+        padded = np.zeros((len(last), white.shape[1]))
+        padded[: len(white)] = white
+        columns.append(padded)
+    return PlanRows(last, columns)
+
+
+def _rows_of_new(fit: Fit, new: Context, tip: Array, effects: Sequence[ChainEffect]) -> PlanRows:
+    """Whitened rows (n, 3, p) of touches at new poses."""
+    problem = fit.problem
+    names = problem.local_names
+    sigma = float(np.mean(problem.sigma[~fit.left_out]))
+    errors = np.zeros((len(new), len(new.chain.joints), 2, 6))
+    pose = evaluate(new.chain, new.positions, errors, new.nominal, tip, jacobian=True)
+    assert pose.by_error is not None
+    nuisance = np.zeros((len(new), 3, len(names)))
+    start = 0
+    for base_effect in problem.base:
+        moved = base_effect.basis(new).displacement(pose.by_error)
+        nuisance[:, :, start : start + moved.shape[-1]] = moved
+        start += moved.shape[-1]
+    for row, target in enumerate(new.target):
+        for axis in range(3):
+            nuisance[row, axis, names.index(f"ball {target} {'xyz'[axis]}")] = -1.0
+    nuisance[:, :, -3:] = pose.by_tip
+    columns = [effect.basis(new).displacement(pose.by_error) / sigma for effect in effects]
+    return PlanRows(nuisance / sigma, columns)

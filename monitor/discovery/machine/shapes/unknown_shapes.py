@@ -1,0 +1,258 @@
+"""An error whose shape the catalogue does not have: what was found of it becomes one effect of free shape.
+
+Where the flexible competitor of an error says more than its shapes of the catalogue, a few parts of it are selected,
+one after the other, at the price of each and of the choice (Schwarz's criterion extended for many candidates: Chen and
+Chen, Biometrika 95 (2008) 759). The free shape leads if it says more at its price and lowers the error
+at left-out poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from monitor.discovery.machine.compare import lack_of_fit
+from monitor.discovery.machine.scene import ChainCandidate, ChainScene, ChainVariant, scene_of
+from monitor.discovery.machine.shapes.flexible import error_of
+from monitor.discovery.machine.shapes.slight_shapes import slight_shape
+from monitor.discovery.machine.shapes.tables import ChainScan
+from monitor.discovery.search.candidate import Variant
+from monitor.discovery.search.comparison import LACK_OF_FIT_LEVEL
+from monitor.discovery.search.evidence import weigh_beside
+from monitor.discovery.search.projection import orthonormal, without
+from monitor.discovery.search.rivals import UNDECIDED
+from monitor.discovery.search.scan import WORTH_EXCHANGING, ScanResult, findings_of
+from monitor.discovery.search.scene import family_count
+from monitor.effects import ChainEffect, parse_effect
+from monitor.effects.drivers import Always
+from monitor.effects.shapes.free import Free
+from monitor.machine import COMPONENTS, MOTION
+from monitor.records import Array
+
+# The shape of the catalogue is not the whole where its competitor says more at this level: one finding in a thousand.
+LEVEL = 1e-3
+# More parts than this of one shape are beyond what a plan can separate.
+MOST_PARTS = 8
+# The price of the choice of a part: the logarithm of the size of a basis, 30 to 50 parts.
+PRICE = float(np.log(45.0))
+
+
+def _is_of_shape(candidate: ChainCandidate) -> bool:
+    """Whether a candidate is an error motion of an axis that follows no driver."""
+    effect = candidate.effect
+    return (
+        isinstance(effect, ChainEffect)
+        and isinstance(effect.driver, Always)
+        and effect.term.stage == MOTION
+        and not isinstance(effect.shape, Free)
+    )
+
+
+def with_unknown_shapes(scene: ChainScene, result: ChainScan) -> tuple[ChainScene, ChainScan]:
+    """The result with one effect of free shape instead of those of the catalogue, for every error whose shape they are
+    not."""
+    selected = result.candidates
+    if not selected and not _lacks_something(scene):
+        selected = _slight(scene)
+        if not selected:
+            return scene, result
+        scene = _with_candidate(scene, selected[0])
+    scene, selected = _with_free(scene, selected)
+    if not selected or any(_is_free(shape) for shape in selected) or _leaves_something(scene, selected):
+        alone = _alone(scene, selected)
+        if alone is not None:
+            selected, scene = [alone], _with_candidate(scene, alone)
+    if len(selected) == len(result.findings) and all(
+        _is_among(shape, result.candidates) for shape in selected
+    ):
+        return scene, result
+    return scene, ScanResult(findings_of(scene, selected))
+
+
+def _with_free(scene: ChainScene, selected: list[ChainCandidate]) -> tuple[ChainScene, list[ChainCandidate]]:
+    """The selected effects with one of free shape for each error whose shapes of the catalogue are not the whole."""
+    for symbol in dict.fromkeys(map(error_of, filter(_is_of_shape, selected))):
+        mine = [shape for shape in filter(_is_of_shape, selected) if error_of(shape) == symbol]
+        others = [shape for shape in selected if not _is_among(shape, mine)]
+        free = _free(scene, symbol, mine, others)
+        if free is not None:
+            selected = [*others, free]
+            scene = _with_candidate(scene, free)
+    return scene, selected
+
+
+def _is_among(candidate: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
+    """Whether a candidate is the same object as one of the others: their columns are arrays, which do not compare."""
+    return any(candidate is other for other in others)
+
+
+def _lacks_something(scene: ChainScene) -> bool:
+    """Whether the runs agree on what the model leaves, although no effect of the catalogue stands out."""
+    test, _ = lack_of_fit(scene.fit)
+    return test is not None and test.p_value < LACK_OF_FIT_LEVEL
+
+
+def _leaves_something(scene: ChainScene, selected: Sequence[ChainCandidate]) -> bool:
+    """Whether some candidate stands out beside selected effects: a scan that ends so was led astray by one of them."""
+    pool = [candidate for candidate in scene.candidates if candidate.visible]
+    weighed = weigh_beside(scene, pool, selected)
+    return bool(weighed) and weighed[0].p_value * family_count(scene) < LEVEL
+
+
+def _is_free(candidate: ChainCandidate) -> bool:
+    effect = candidate.effect
+    return isinstance(effect, ChainEffect) and isinstance(effect.shape, Free)
+
+
+def _slight(scene: ChainScene) -> list[ChainCandidate]:
+    """One part of an error of free shape that stands out, and predicts poses and runs that were left out, if any."""
+    shapes: dict[str, list[ChainCandidate]] = {}
+    # Over a part of a turn flexure and refraction bend as any shape does.
+    turning = not scene.fit.problem.needs_whole_periods
+    for shape in filter(_is_of_shape, scene.candidates):
+        effect = shape.effect
+        if isinstance(effect, ChainEffect) and effect.joint.turns and not turning:
+            continue
+        shapes.setdefault(error_of(shape), []).append(shape)
+    if not shapes:
+        return []
+    part = slight_shape(scene, [_in_any_shape(symbol, of[0]) for symbol, of in shapes.items()])
+    if part is None:
+        return []
+    free = _of_parts(scene, part[0], [part[1]], shapes[part[0]], [])
+    before, after = scene.held_out_error(scene.columns([])), scene.held_out_error(scene.columns([free]))
+    predicts = before is None or after is None or after < before
+    return [free] if predicts and _predicts(scene, free, []) else []
+
+
+def _alone(scene: ChainScene, selected: Sequence[ChainCandidate]) -> ChainCandidate | None:
+    """One error of free shape that says more at its price than all selected effects together; None where none does.
+
+    The entry of the catalogue that comes nearest to an unknown shape may be one of another error.
+    """
+    chain = scene.fit.problem.context.chain
+    best, worth = None, _priced(scene, selected) + (WORTH_EXCHANGING if selected else UNDECIDED)
+    for joint in chain.joints:
+        for component in COMPONENTS:
+            symbol = f"E{component}{joint.name}"
+            shapes = [
+                shape for shape in scene.candidates if _is_of_shape(shape) and error_of(shape) == symbol
+            ]
+            if not shapes:
+                continue
+            whole = _whole(scene, symbol, shapes[0])
+            parts = _parts(scene, whole, [])
+            if parts:
+                free = _of_parts(scene, symbol, parts, shapes, [])
+                score = _priced(scene, [free])
+                if score > worth and _predicts(scene, free, []):
+                    best, worth = free, score
+    return best
+
+
+def _priced(scene: ChainScene, selected: Sequence[ChainCandidate]) -> float:
+    """The score of effects together, free shapes at the price of the choice of their parts."""
+    number = sum(shape.columns.shape[1] for shape in selected if _is_free(shape))
+    return float(_score(scene, selected, []) - 2.0 * number * PRICE)
+
+
+def _with_candidate(scene: ChainScene, candidate: ChainCandidate) -> ChainScene:
+    return ChainScene(scene.fit, scene.shared, (*scene.candidates, candidate), scene.refused)
+
+
+def _free(
+    scene: ChainScene, symbol: str, mine: Sequence[ChainCandidate], others: Sequence[ChainCandidate]
+) -> ChainCandidate | None:
+    """The effect of free shape that says more than the shapes of one error beside others; None where none does."""
+    whole = _whole(scene, symbol, mine[0])
+    if not _says_more(scene, whole, [*others, *mine]):
+        return None
+    parts = _parts(scene, whole, others)
+    if not parts:
+        return None
+    free = _of_parts(scene, symbol, parts, mine, others)
+    price = 2.0 * len(parts) * PRICE
+    worth = _score(scene, [free], others) - price > _score(scene, mine, others) + WORTH_EXCHANGING
+    return free if worth and _predicts(scene, free, others) else None
+
+
+def _whole(scene: ChainScene, symbol: str, shape: ChainCandidate) -> ChainCandidate:
+    """The whole flexible basis of the error of which a candidate is a shape."""
+    return scene_of(scene.fit, [_in_any_shape(symbol, shape)]).candidates[0]
+
+
+def _in_any_shape(symbol: str, shape: ChainCandidate) -> ChainVariant:
+    """The error of which a candidate is a shape, in any shape, under its symbol."""
+    effect = shape.effect
+    assert isinstance(effect, ChainEffect)
+    return Variant(symbol, replace(effect, shape=Free(), shape_text="free"))
+
+
+def _of_parts(
+    scene: ChainScene,
+    symbol: str,
+    parts: Sequence[int],
+    shapes: Sequence[ChainCandidate],
+    others: Sequence[ChainCandidate],
+) -> ChainCandidate:
+    """The effect of some parts, from 0, of a flexible basis; nearest to it is the best of ``shapes``."""
+    name = f"{symbol}:free({','.join(str(part + 1) for part in sorted(parts))})"
+    nearest = max(weigh_beside(scene, shapes, others), key=lambda evidence: evidence.explained).candidate
+    effect = parse_effect(name, scene.fit.problem.context.chain)
+    variant = Variant(f"{symbol}:free", effect, 1, 1.0, nearest.family)
+    return scene_of(scene.fit, [variant]).candidates[0]
+
+
+def _says_more(scene: ChainScene, whole: ChainCandidate, selected: Sequence[ChainCandidate]) -> bool:
+    """Whether an error in any shape explains more than chance of what the selected effects leave."""
+    beside = scene.remainders.beside(selected)
+    basis, residual = beside.basis, beside.residual
+    columns = orthonormal(without(basis, whole.columns))
+    explained, size = float(np.sum((columns.T @ residual) ** 2)), columns.shape[1]
+    dof = scene.degrees_of_freedom - basis.shape[1] - size
+    rest = float(residual @ residual) - explained
+    if size == 0 or dof < 1 or rest <= 0.0:
+        return False
+    return float(scipy.special.fdtrc(size, dof, explained / size / (rest / dof))) < LEVEL
+
+
+def _parts(scene: ChainScene, whole: ChainCandidate, others: Sequence[ChainCandidate]) -> list[int]:
+    """The parts of a flexible basis, from 0, that are worth their price beside others, selected one after the other."""
+    beside = scene.remainders.beside(others)
+    basis, residual = beside.basis, beside.residual
+    columns = without(basis, whole.columns)
+    before: Array = np.linalg.norm(whole.columns, axis=0)
+    dof = scene.degrees_of_freedom - basis.shape[1]
+    price = float(np.log(dof)) + 2.0 * PRICE
+    parts: list[int] = []
+    while len(parts) < MOST_PARTS:
+        length = np.linalg.norm(columns, axis=0)
+        able = length > 1e-2 * np.maximum(before, 1e-300)
+        explained = np.where(able, (columns.T @ residual) ** 2 / np.where(able, length, 1.0) ** 2, 0.0)
+        best = int(np.argmax(explained))
+        total = float(residual @ residual)
+        if dof * np.log(total / max(total - float(explained[best]), 1e-300)) < price:
+            break
+        parts.append(best)
+        direction = (columns[:, best] / length[best])[:, None]
+        residual = without(direction, residual[:, None])[:, 0]
+        columns = without(direction, columns)
+    return parts
+
+
+def _score(scene: ChainScene, selected: Sequence[ChainCandidate], others: Sequence[ChainCandidate]) -> float:
+    """The score of effects together beside others, one after the other."""
+    return sum(
+        weigh_beside(scene, [candidate], [*others, *selected[:index]])[0].score
+        for index, candidate in enumerate(selected)
+    )
+
+
+def _predicts(scene: ChainScene, free: ChainCandidate, others: Sequence[ChainCandidate]) -> bool:
+    """Whether a free shape beside others lowers the error at poses left out of every run; true with too few poses."""
+    before = scene.held_out_error_by_poses(scene.columns(others))
+    after = scene.held_out_error_by_poses(scene.columns([*others, free]))
+    return before is None or after is None or after < before

@@ -1,0 +1,220 @@
+"""Bad single points and balls that came loose: reported as what they are, not as a law of physics.
+
+Both are seen as a deviation of one run from the others at the same row of the plan, so an effect that the
+model lacks in every run does not raise an alarm. A point is bad where the vector of its own deviation is too
+long; a ball has moved where all its later touches in that run are shifted by the same vector.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from monitor.discovery.machine.fit import Fit
+from monitor.discovery.machine.noise.plan_cells import plan_cells
+from monitor.methods.chain.gross import off_reading
+from monitor.methods.chain.least_squares import eliminate
+from monitor.records import Array
+
+# A ball that moved needs this many touches before and after, else it is a bad point.
+TOUCHES_EACH_SIDE = 2
+# Directions that a touch leaves unchecked (the run's own unknowns follow it) have eigenvalues of rounding.
+CHECKED = 1e-6
+
+
+@dataclass(frozen=True)
+class BadPoint:
+    """A probing that contradicts the same one of the other runs; ``size`` mm along the machine's ``axis``. ``rows`` are
+    those of a pose that is bad as a whole."""
+
+    row: int
+    run: int
+    sequence: int
+    target: str
+    axis: str
+    size: float
+    p_value: float
+    chi_square: float = 0.0
+    rows: tuple[int, ...] = ()
+
+    @property
+    def all_rows(self) -> tuple[int, ...]:
+        """The rows that are left out with it."""
+        return self.rows or (self.row,)
+
+
+@dataclass(frozen=True)
+class BallMove:
+    """A ball that stands elsewhere from a probing on; ``shift`` (3,) mm in the frame of the last work axis."""
+
+    target: str
+    run: int
+    sequence: int
+    shift: tuple[float, float, float]
+    p_value: float
+    chi_square: float = 0.0
+
+    @property
+    def size(self) -> float:
+        """Length of the shift in mm."""
+        return float(np.linalg.norm(self.shift))
+
+
+@dataclass(frozen=True)
+class _Deviations:
+    """Deviation (n, d) of every probing from the other runs', in standard uncertainties, and its spread."""
+
+    vectors: Array
+    inflation: Array  # (n,): variance of a deviation over that of a residual
+    rows: tuple[npt.NDArray[np.int64], ...]  # rows of every run
+    bases: Array  # (R, N, p)
+    scale: Array  # (n,): standard deviation of a coordinate in standard uncertainties
+
+    def of_run(self, run: int) -> Array:
+        """The span of the unknowns of a run, row by row (m, d, p)."""
+        rows, numbers = len(self.rows[run]), self.vectors.shape[1]
+        return self.bases[run, : numbers * rows].reshape(rows, numbers, -1)
+
+
+def _deviations(fit: Fit) -> _Deviations:
+    problem = fit.problem
+    white = np.where(fit.left_out[:, None], 0.0, fit.vectors / fit.problem.sigma)
+    cells = plan_cells(problem)
+    weighted = ~fit.left_out
+    count = np.bincount(cells, weights=weighted)
+    total = np.stack([np.bincount(cells, weights=white[:, axis]) for axis in range(white.shape[1])], axis=1)
+    others = count[cells] - 1
+    enough = weighted & (others >= 2)
+    mean = (total[cells] - white) / np.where(enough, others, 1)[:, None]
+    vectors = np.where(enough[:, None], white - mean, white)
+    inflation = np.where(enough, 1.0 + 1.0 / np.where(enough, others, 1), 1.0)
+    rows = tuple(np.flatnonzero(problem.context.run == run) for run in problem.runs)
+    bases = eliminate(fit.solution.last.local).basis
+    # A few bad points must not hide themselves: the scale is taken from the median. A run that is noisier than
+    # the others as a whole has no bad points for that.
+    # Rows of several instruments differ in how many numbers they have.
+    usual = scipy.stats.chi2.median(np.maximum(np.isfinite(problem.sigma).sum(axis=1), 1))
+    squares = np.sum(vectors**2, axis=1) / inflation / usual
+    share = max(fit.degrees_of_freedom / (fit.readings + 1e-300), 1e-6)
+    scale = np.full(len(weighted), np.median(squares[weighted]) / share)
+    for members in rows:
+        if weighted[members].any():
+            of_run = np.median(squares[members][weighted[members]]) / share
+            scale[members] = np.maximum(scale[members], of_run)
+    scale = np.sqrt(scale)
+    return _Deviations(vectors, inflation, rows, bases, scale)
+
+
+def _statistic(onto: Array, gram: Array) -> tuple[Array, npt.NDArray[np.int64], Array]:
+    """Explained squares (n,), ranks (n,) and coefficients (n, d) of columns with products ``onto`` (n, d) and
+    ``gram`` (n, d, d)."""
+    values, vectors = np.linalg.eigh(gram)
+    keep = values > CHECKED
+    along = np.einsum("nij,ni->nj", vectors, onto) * keep
+    inverse = np.where(keep, 1.0 / np.where(keep, values, 1.0), 0.0)
+    return (
+        np.sum(along**2 * inverse, axis=1),
+        keep.sum(axis=1),
+        np.einsum("nij,nj->ni", vectors, along * inverse),
+    )
+
+
+def bad_points(fit: Fit, *, alpha: float = 0.01) -> list[BadPoint]:
+    """The worst point of every run that is too far off, at a false-alarm probability ``alpha`` a campaign."""
+    deviations = _deviations(fit)
+    context = fit.problem.context
+    tests = int((~fit.left_out).sum())
+    points = []
+    for run, rows in enumerate(deviations.rows):
+        basis = deviations.of_run(run)
+        gram = np.eye(basis.shape[1]) - basis @ np.swapaxes(basis, 1, 2)
+        is_read = np.isfinite(fit.problem.sigma[rows])
+        gram = gram * is_read[:, :, None] * is_read[:, None, :]
+        square, rank, sizes = _statistic(deviations.vectors[rows], gram)
+        checked = (rank > 0) & ~fit.left_out[rows]
+        if not checked.any():
+            continue
+        # The worst by its chi-square: p-values of wrecks underflow and would tie.
+        chi_square = np.where(
+            checked, square / deviations.inflation[rows] / deviations.scale[rows] ** 2, -1.0
+        )
+        worst = int(chi_square.argmax())
+        p = float(scipy.special.chdtrc(rank[worst], chi_square[worst]))
+        row, size = int(rows[worst]), sizes[worst]
+        if p * tests <= alpha:
+            # A number that was not read has no weight, and its size is rounding.
+            sigma = fit.problem.sigma[row]
+            axis, off = off_reading(
+                fit.problem, fit.by_error, row, size * np.where(np.isfinite(sigma), sigma, 0.0)
+            )
+            points.append(
+                BadPoint(
+                    row=row,
+                    run=int(context.run[row]),
+                    sequence=int(context.sequence[row]),
+                    target=str(context.target[row]),
+                    axis=axis,
+                    size=off,
+                    p_value=min(1.0, p * tests),
+                    chi_square=float(chi_square[worst]),
+                )
+            )
+    return points
+
+
+def ball_moves(fit: Fit, *, alpha: float = 0.01) -> list[BallMove]:
+    """For every run the ball that moved in it, if any, at a false-alarm probability ``alpha`` a campaign."""
+    deviations = _deviations(fit)
+    context = fit.problem.context
+    moves = []
+    tests = 0
+    for run, rows in enumerate(deviations.rows):
+        best: BallMove | None = None
+        for target in np.intersect1d(context.target[rows], fit.problem.movable):
+            touches = np.flatnonzero((context.target[rows] == target) & ~fit.left_out[rows])
+            tests += max(len(touches) - 2 * TOUCHES_EACH_SIDE + 1, 0)
+            move = _ball_move(fit, deviations, run, touches)
+            if move is not None and (best is None or move.chi_square > best.chi_square):
+                best = move
+        if best is not None:
+            moves.append(best)
+    return [
+        replace(move, p_value=min(1.0, move.p_value * tests))
+        for move in moves
+        if move.p_value * tests <= alpha
+    ]
+
+
+def _ball_move(
+    fit: Fit, deviations: _Deviations, run: int, touches: npt.NDArray[np.int64]
+) -> BallMove | None:
+    """The likeliest move of the ball that is touched in these rows of a run; its p-value is that of one test."""
+    context, rows, basis = fit.problem.context, deviations.rows[run], deviations.of_run(run)
+    first = np.arange(TOUCHES_EACH_SIDE, len(touches) - TOUCHES_EACH_SIDE + 1)
+    if len(first) == 0:
+        return None
+    # Sums over all touches from each one on.
+    shared = np.cumsum(basis[touches][::-1], axis=0)[::-1][first]
+    onto = np.cumsum(deviations.vectors[rows[touches]][::-1], axis=0)[::-1][first]
+    count = len(touches) - first
+    gram = count[:, None, None] * np.eye(3) - shared @ np.swapaxes(shared, 1, 2)
+    inflation = np.cumsum(deviations.inflation[rows[touches]][::-1])[::-1][first] / count
+    square, rank, shifts = _statistic(onto, gram)
+    chi_square = np.where(rank > 0, square / inflation / deviations.scale[rows[0]] ** 2, -1.0)
+    best = int(chi_square.argmax())
+    if chi_square[best] <= 0:
+        return None
+    row = int(rows[touches[first[best]]])
+    # The tip followed the ball, so the vector from where the ball was to the tip is its shift.
+    x, y, z = (float(part) for part in shifts[best] * fit.problem.sigma[row])
+    return BallMove(
+        target=str(context.target[row]),
+        run=int(context.run[row]),
+        sequence=int(context.sequence[row]),
+        shift=(x, y, z),
+        p_value=float(scipy.special.chdtrc(rank[best], chi_square[best])),
+        chi_square=float(chi_square[best]),
+    )

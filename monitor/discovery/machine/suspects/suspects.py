@@ -1,0 +1,137 @@
+"""Suspects of single runs: bad points, balls that moved in a run, effects with another size in every run.
+
+Each of them can be mistaken for another: an effect that varies makes probings deviate from the other runs', a bad
+point makes sizes scatter. So whatever explains most is taken first, and the rest is judged with it taken out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.discovery.machine.evidence.poses import poses_of_rows
+from monitor.discovery.machine.fit import Fit, fit
+from monitor.discovery.machine.scene import ChainScene, ChainVariant, MachineEffect
+from monitor.discovery.machine.shapes.variants import each_run
+from monitor.discovery.machine.suspects.anomalies import BadPoint, BallMove, bad_points, ball_moves
+from monitor.discovery.machine.suspects.bad_poses import bad_poses
+from monitor.discovery.machine.suspects.varying import most_varying
+from monitor.effects import parse_effect
+from monitor.exceptions import DataError
+from monitor.methods.chain.problem import ChainProblem
+
+MOST_BAD_POINTS = 40
+# More effects that vary, each with a coefficient a run, than this are beyond what a plan can separate.
+MOST_VARYING = 2
+
+SuspectNames: TypeAlias = tuple[frozenset[int], frozenset[tuple[str, int]], tuple[MachineEffect, ...]]
+
+
+def with_effects(problem: ChainProblem, effects: Sequence[MachineEffect]) -> ChainProblem:
+    """The problem with further effects in common."""
+    return replace(problem, added=(*problem.added, *effects))
+
+
+@dataclass(frozen=True)
+class Suspects:
+    """Bad points by row, moves by ball and run, and effects (without driver) that vary from run to run."""
+
+    bad: dict[int, BadPoint] = field(default_factory=dict)
+    moves: dict[tuple[str, int], BallMove] = field(default_factory=dict)
+    varying: tuple[MachineEffect, ...] = ()
+
+    @property
+    def any(self) -> bool:
+        """Whether there is any."""
+        return bool(self.bad or self.moves or self.varying)
+
+    def with_single(self, suspects: Sequence[BadPoint | BallMove]) -> Suspects:
+        """The suspects with the most certain further ones of every run and target.
+
+        What one of them does to its run and, through the mean, to its ball in the other runs is seen only once
+        it is taken out.
+        """
+        bad, moves = dict(self.bad), dict(self.moves)
+        runs: set[int] = set()
+        targets: set[str] = set()
+        for suspect in suspects:
+            if suspect.run in runs or suspect.target in targets:
+                continue
+            runs.add(suspect.run)
+            targets.add(suspect.target)
+            if isinstance(suspect, BallMove):
+                moves[(suspect.target, suspect.run)] = suspect
+            else:
+                bad[suspect.row] = suspect
+        return replace(self, bad=bad, moves=moves)
+
+    def same_as(self, other: Suspects) -> bool:
+        """Whether both name the same ones."""
+        return self.names == other.names
+
+    @property
+    def names(self) -> SuspectNames:
+        """What they are, without how far off."""
+        return frozenset(self.bad), frozenset(self.moves), self.varying
+
+    def left_out(self, problem: ChainProblem) -> npt.NDArray[np.bool_]:
+        """Marks (n,) the bad points."""
+        out = np.zeros(len(problem.context), dtype=bool)
+        out[[row for point in self.bad.values() for row in point.all_rows]] = True
+        return out
+
+    def move_effects(self, problem: ChainProblem) -> list[MachineEffect]:
+        """The moves as effects."""
+        return [
+            parse_effect(
+                f"ball:{move.target}:moved(run {move.run}, sequence {move.sequence})", problem.context.chain
+            )
+            for move in self.moves.values()
+        ]
+
+    def effects(self, problem: ChainProblem) -> list[MachineEffect]:
+        """Moves and varying effects, each with coefficients of its runs."""
+        varying = [variant.effect for effect in self.varying if (variant := each_run(effect)) is not None]
+        return [*self.move_effects(problem), *varying]
+
+
+def find_suspects(
+    under: Fit,
+    problem: ChainProblem,
+    selected: Sequence[MachineEffect],
+    earlier: Suspects,
+    variants: Sequence[ChainVariant],
+    scene: ChainScene | None = None,
+) -> Suspects:
+    """The suspects under a model with the ``selected`` effects, the most certain first; ``earlier`` ones remain.
+
+    ``under`` is the fit with the selected effects and the earlier suspects, ``variants`` the effects that may vary,
+    ``scene`` that of ``under`` with all of them where it is known.
+    """
+    if poses_of_rows(under) is not None and len(under.problem.runs) == 1:
+        return replace(earlier, bad={**earlier.bad, **{point.row: point for point in bad_poses(under)}})
+    suspects = earlier
+    current = under
+    while len(suspects.bad) < MOST_BAD_POINTS:
+        before = suspects
+        single: list[BadPoint | BallMove] = [*bad_points(current), *ball_moves(current)]
+        single.sort(key=lambda suspect: -suspect.chi_square)
+        varying = most_varying(current, variants, scene) if len(suspects.varying) < MOST_VARYING else None
+        if varying is not None and (not single or varying.gain > single[0].chi_square):
+            suspects = replace(suspects, varying=(*suspects.varying, varying.effect))
+        elif not single:
+            break
+        else:
+            suspects = suspects.with_single(single)
+        effects = [*suspects.effects(problem), *selected]
+        try:
+            current = fit(with_effects(problem, effects), suspects.left_out(problem), current)
+        except (DataError, np.linalg.LinAlgError):
+            # What cannot be fitted is no suspect; those before it remain.
+            return before
+        scene = None
+    return suspects

@@ -1,0 +1,1 @@
+"""Tests of differences between days that hold whatever makes days differ."""

@@ -1,0 +1,1 @@
+"""Forecasts of parameters and of the longest error vector, and their backtests."""

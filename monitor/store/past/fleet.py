@@ -1,0 +1,208 @@
+"""Sums over the whole fleet: for every machine and parameter what Bartlett, ANOVA and a drift need.
+
+The values never leave the database. Those of a group, the runs of a campaign or of one of its days, stand in one list
+of ``identified_values``: its mean and variance cost a look at each value and no search for the group that it belongs
+to, which is most of the time of a GROUP BY over ``parameter_value``. They are taken about an origin of their own
+machine and parameter (a value of its first campaign): a sum of squares about zero would lose the digits that all
+values share. The groups are then summed by machine and parameter. Use ``fleet_sums`` for many machines; for one
+machine ``machine_history`` reads its rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.exceptions import NotFoundError
+from monitor.records import Array
+from monitor.store.connection import Database
+from monitor.store.past import fleet_queries as queries
+
+
+@dataclass(frozen=True)
+class BlockCut:
+    """How histories are cut into blocks of equal time: a group each up to ``whole`` groups, then so many blocks, or one
+    for ``each`` so many groups, ``most`` at most."""
+
+    whole: int
+    each: int
+    most: int
+
+
+@dataclass(frozen=True)
+class RepeatedSums:
+    """Sums over the groups of two runs and more of c cells, all (c,): runs, values and squares as in ``FleetSums``.
+
+    Of the variances s² of groups of n runs: ``s2`` and ``s2_runs`` are sums of s² and n s², ``s4`` and ``s4_runs``
+    those
+    of s⁴ and n s⁴, and ``s4_dof`` those of s⁴, n s⁴ and n² s⁴ by n - 1.
+    """
+
+    runs: Array
+    offset: Array
+    squares: Array
+    s2: Array
+    s2_runs: Array
+    s4: Array
+    s4_runs: Array
+    s4_dof: tuple[Array, Array, Array]
+
+
+@dataclass(frozen=True)
+class FleetBlocks:
+    """Blocks of the history of c cells, all (c, b): groups (0: none), mean days since ``epoch_d``, mean value less
+    origin."""
+
+    groups: Array
+    t: Array
+    m: Array
+
+
+@dataclass(frozen=True)
+class FleetSums:
+    """Sufficient statistics of c cells, one a machine and parameter; every array is (c,), in display units.
+
+    Groups are campaigns, or the days of a campaign with several. ``origin`` is what the sums are about:
+    ``offset`` of all values, ``squares`` the sum over the groups of n_j times the squared offset of their mean,
+    ``within`` the sum of squares within the groups. ``repeated`` groups have two runs or more, the smallest
+    of their variances is ``least_variance``; ``log_variances`` sums (n_j - 1) ln s_j² and ``inverse_dof``
+    1 / (n_j - 1) over them. ``sum_t`` to ``sum_tm`` are sums over the groups of t, t², m, m² and t m, with t in days
+    since ``epoch_d`` and m the mean of the group less the origin. ``last_d`` is when the machine's last day began
+    (days since 1970), ``latest`` the mean of that day less the origin, ``latest_runs`` its runs; NaN, NaN and 0 where
+    the parameter was refused there. ``since_d`` is the last recorded event before that day (days since 1970, NaN:
+    none); groups before it are left out.
+    """
+
+    machine: npt.NDArray[np.str_]
+    parameter: npt.NDArray[np.str_]
+    unit: npt.NDArray[np.str_]
+    origin: Array
+    groups: Array
+    runs: Array
+    offset: Array
+    squares: Array
+    within: Array
+    repeated: Array
+    least_variance: Array
+    log_variances: Array
+    inverse_dof: Array
+    epoch_d: float
+    sum_t: Array
+    sum_tt: Array
+    sum_m: Array
+    sum_mm: Array
+    sum_tm: Array
+    last_d: Array
+    latest: Array
+    latest_runs: Array
+    since_d: Array
+    repeated_sums: RepeatedSums
+    blocks: FleetBlocks
+
+
+def fleet_sums(
+    db: Database, model: str | None = None, version: int | None = None, *, cut: BlockCut
+) -> FleetSums:
+    """Sums of all machines and parameters, of the latest identification of every campaign under one model.
+
+    Of each machine since its last recorded event, where runs followed it (a day counts whole, by its first run).
+    Without ``model`` that which each machine is followed by, the method's own where none was chosen. A parameter that
+    a machine refused both in its first campaign and on its last day has zero for its origin and loses
+    2 lg(mean / scatter) of 16 digits. Sums of several threads differ in the last bits from one time to the next.
+    ``cut`` says how the history of a machine is cut into blocks. Raises NotFoundError where nothing was identified.
+    """
+    with db.reading():
+        epoch_d, columns, of_blocks = _summed(db, model, version, cut)
+    return _sums(columns, _blocks(of_blocks, columns), epoch_d)
+
+
+def _summed(
+    db: Database, model: str | None, version: int | None, cut: BlockCut
+) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """First day, columns of all cells and of their blocks, by way of tables that live as long as the connection."""
+    for statement in (queries.MACHINES, queries.HEADINGS, queries.MODELS, queries.OWN):
+        db.execute(statement)
+    db.set_variables({"model": model, "version": version})
+    db.execute(queries.CHOSEN)
+    ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")
+    if epoch_d is None:
+        under = "" if model is None else f" with model {model}"
+        raise NotFoundError(f"no campaign was identified{under} yet; type `monitor identify`")
+    for statement in (queries.GROUPS, queries.SINCE, queries.ENDED, queries.LATEST, queries.ORIGINS):
+        db.execute(statement)
+    db.set_variables({"whole": cut.whole, "each": cut.each, "most": cut.most, "epoch_d": epoch_d})
+    db.execute(queries.BLOCKS)
+    db.execute(queries.PARTS)
+    columns, of_blocks = (
+        {name: np.ma.getdata(column) for name, column in db.arrays(query).items()}
+        for query in (queries.TOGETHER, queries.OF_BLOCKS)
+    )
+    for name in queries.TABLES:
+        db.execute(f"DROP TABLE IF EXISTS fleet_{name}")
+    return epoch_d, columns, of_blocks
+
+
+def _blocks(
+    columns: Mapping[str, npt.NDArray[np.generic]], cells: Mapping[str, npt.NDArray[np.generic]]
+) -> FleetBlocks:
+    """A row of blocks for each cell, in the order of ``cells``, in display units."""
+    order = np.argsort(cells["cell"])
+    rows = order[np.searchsorted(cells["cell"], columns["cell"], sorter=order)]
+    block = columns["block"].astype(np.intp)
+    shape = (len(order), int(block.max()) + 1)
+    groups, t, m = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    groups[rows, block], t[rows, block], m[rows, block] = columns["k"], columns["t"], columns["m"]
+    return FleetBlocks(groups, t, m / np.asarray(cells["factor"], dtype=np.float64)[:, np.newaxis])
+
+
+def _sums(columns: Mapping[str, npt.NDArray[np.generic]], blocks: FleetBlocks, epoch_d: float) -> FleetSums:
+    number = {
+        name: np.asarray(column, dtype=np.float64)
+        for name, column in columns.items()
+        if name not in ("machine", "parameter", "unit")
+    }
+    f = number["factor"]
+    # ln s² of the groups becomes that of the display unit; their degrees of freedom are runs less groups.
+    shift = 2.0 * np.log(f) * (number["n"] - number["k"])
+    return FleetSums(
+        machine=columns["machine"].astype(np.str_),
+        parameter=columns["parameter"].astype(np.str_),
+        unit=columns["unit"].astype(np.str_),
+        origin=number["origin"] / f,
+        groups=number["k"],
+        runs=number["n"],
+        offset=number["s"] / f,
+        squares=number["q"] / f**2,
+        within=number["ss"] / f**2,
+        repeated=number["repeated"],
+        least_variance=number["least"] / f**2,
+        log_variances=number["logs"] - shift,
+        inverse_dof=number["inverse"],
+        epoch_d=epoch_d,
+        sum_t=number["t"],
+        sum_tt=number["tt"],
+        sum_m=number["m"] / f,
+        sum_mm=number["mm"] / f**2,
+        sum_tm=number["tm"] / f,
+        last_d=number["last_d"],
+        latest=number["latest"] / f,
+        latest_runs=number["latest_n"],
+        since_d=number["since_d"],
+        repeated_sums=RepeatedSums(
+            runs=number["runs_rep"],
+            offset=number["offset_rep"] / f,
+            squares=number["squares_rep"] / f**2,
+            s2=number["s2"] / f**2,
+            s2_runs=number["s2_runs"] / f**2,
+            s4=number["s4"] / f**4,
+            s4_runs=number["s4_runs"] / f**4,
+            s4_dof=(
+                number["s4_dof"] / f**4, number["s4_dof_runs"] / f**4, number["s4_dof_runs_squared"] / f**4
+            ),
+        ),
+        blocks=blocks,
+    )  # fmt: skip

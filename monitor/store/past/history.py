@@ -1,0 +1,301 @@
+"""The history of one machine: every run of every campaign with its parameters and conditions, in order of time.
+
+Arrays for the statistics; people read the same numbers in the view ``v_parameters``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.records import Array
+from monitor.store.catalogue import campaigns_of_machine
+from monitor.store.connection import Database
+from monitor.store.past.identified_values import IdentifiedValues, values_of
+from monitor.store.past.machine_runs import RecordedRun, runs_of_campaigns
+from monitor.store.type_tolerances import types_in_use
+
+# Only numbers are looked through for the whole fleet; a key, alone in its condition, finds the heads, which are long.
+_IDENTIFICATIONS = """
+SELECT identification_id
+FROM identification JOIN (SELECT unnest(CAST(? AS INTEGER[])) AS campaign_id) USING (campaign_id)
+"""
+
+_HEADS = """
+SELECT model, model_version, method, campaign_id, run_count, identification_id, parameters, units, display_factors
+FROM identification WHERE identification_id IN ({marks})
+"""
+
+_LATEST = """
+SELECT c.machine, arg_max(c.campaign_id, (r.latest, c.campaign_id)) AS campaign_id
+FROM campaign AS c
+LEFT JOIN (SELECT campaign_id, max(started_at) AS latest FROM run GROUP BY campaign_id) AS r USING (campaign_id)
+GROUP BY c.machine
+"""
+
+_TOLERANCES = """
+SELECT machine, parameter, CAST(machine_description -> 'tolerances' ->> parameter AS DOUBLE) AS tolerance
+FROM (
+    SELECT machine, machine_description, unnest(json_keys(machine_description, '$.tolerances')) AS parameter
+    FROM imported_campaign WHERE campaign_id IN ({latest})
+)
+ORDER BY ALL
+"""
+
+_CHANNELS = """
+SELECT campaign_id, run, e.key AS channel, avg(e.value) AS value
+FROM (SELECT campaign_id, run, unnest(map_entries(channels)) AS e FROM probing WHERE campaign_id IN ({marks}))
+WHERE e.value IS NOT NULL
+GROUP BY ALL ORDER BY ALL
+"""
+
+
+@dataclass(frozen=True)
+class _Identified:
+    """The head of an identification: its number, of how many runs it is, and its parameters."""
+
+    runs: int
+    number: int
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    factors: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class MachineHistory:
+    """The n runs and p parameters of one machine, in display units (µm, µrad, µm/m), runs in order of time.
+
+    ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
+    are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
+    the recorded channels, in the unit that the name ends in, NaN where not recorded. ``tolerances`` are those of the
+    machine's latest campaign. ``unidentified`` names the campaigns, in order of import, of which no identification
+    under the model holds every run; ``campaigns`` are the number and name of all that count, in the same order.
+    """
+
+    machine: str
+    campaigns: Mapping[int, str]
+    campaign: npt.NDArray[np.str_]
+    method: npt.NDArray[np.str_]
+    run: npt.NDArray[np.int64]
+    started_at: tuple[datetime, ...]
+    day: npt.NDArray[np.int64]
+    warm_up: npt.NDArray[np.bool_]
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+    u: Array
+    conditions: Mapping[str, Array]
+    tolerances: Mapping[str, float]
+    unidentified: tuple[str, ...]
+
+    @cached_property
+    def seconds(self) -> Array:
+        """Start of each run in seconds since 1970 (n,)."""
+        return np.array([at.timestamp() for at in self.started_at])
+
+    def part(self, mask: npt.NDArray[np.bool_]) -> MachineHistory:
+        """The runs of a mask (n,), with all parameters, tolerances and campaigns."""
+        if mask.all():
+            return self
+        return replace(
+            self,
+            campaign=self.campaign[mask],
+            method=self.method[mask],
+            run=self.run[mask],
+            started_at=tuple(at for at, selected in zip(self.started_at, mask, strict=True) if selected),
+            day=self.day[mask],
+            warm_up=self.warm_up[mask],
+            values=self.values[mask],
+            u=self.u[mask],
+            conditions={name: values[mask] for name, values in self.conditions.items()},
+        )
+
+
+def machine_history(
+    db: Database,
+    machine: str,
+    *,
+    model: str | None = None,
+    version: int | None = None,
+    parameter: str | None = None,
+    since: datetime | None = None,
+    followed_by: Mapping[str, tuple[str, int]] = MappingProxyType({}),
+) -> MachineHistory:
+    """All identified runs of a machine under one model, from ``since`` on.
+
+    Without ``model`` that of the run's method in ``followed_by`` (name and version), else any version of the method's
+    own. May hold no run. Raises NotFoundError for a machine that is not there.
+    """
+    campaigns = campaigns_of_machine(db, machine)
+    identified = _identified(db, list(campaigns), None if model is None else (model, version), followed_by)
+    recorded = runs_of_campaigns(db, campaigns)
+    runs = [
+        run
+        for run in recorded
+        if run.campaign_id in identified and (since is None or run.started_at >= since)
+    ]
+    rows = {(identified[run.campaign_id].number, run.run): row for row, run in enumerate(runs)}
+    names, units, values, u = _values(db, identified.values(), rows, parameter)
+    latest = max(recorded, key=lambda run: (run.started_at, run.campaign_id), default=None)
+    return MachineHistory(
+        machine=machine,
+        campaigns={number: name for number, (name, _) in campaigns.items()},
+        campaign=np.array([run.campaign for run in runs], dtype=np.str_),
+        method=np.array([run.method for run in runs], dtype=np.str_),
+        run=np.array([run.run for run in runs], dtype=np.int64),
+        started_at=tuple(run.started_at for run in runs),
+        day=np.array([run.day for run in runs], dtype=np.int64),
+        warm_up=np.array([run.warm_up for run in runs], dtype=np.bool_),
+        parameters=names,
+        units=units,
+        values=values,
+        u=u,
+        conditions=_conditions(db, runs),
+        tolerances=_tolerances_of(db, max(campaigns, default=0) if latest is None else latest.campaign_id),
+        unidentified=_unidentified(campaigns, recorded, identified),
+    )
+
+
+def _unidentified(
+    campaigns: Mapping[int, tuple[str, str]],
+    recorded: Iterable[RecordedRun],
+    identified: Mapping[int, _Identified],
+) -> tuple[str, ...]:
+    """Return the names of the campaigns of which no identification holds every run."""
+    counts = Counter(run.campaign_id for run in recorded)
+    return tuple(
+        name
+        for number, (name, _) in campaigns.items()
+        if counts[number] > (identified[number].runs if number in identified else 0)
+    )
+
+
+def _identified(
+    db: Database,
+    campaigns: list[int],
+    model: tuple[str, int | None] | None,
+    followed_by: Mapping[str, tuple[str, int]],
+) -> dict[int, _Identified]:
+    """Of each campaign the identification with the most runs, the later of two: what load_identification takes."""
+    if not campaigns:
+        return {}
+    numbers = [number for (number,) in db.rows(_IDENTIFICATIONS, [campaigns])]
+    identified: dict[int, _Identified] = {}
+    for of_model, of_version, method, campaign, *head in _with_marks(db, _HEADS, numbers):
+        name, version = model or followed_by.get(method) or (method, None)
+        if of_model != name or version not in (None, of_version):
+            continue
+        run_count, number, *lists = head
+        current = identified.get(campaign)
+        if current is None or (run_count, number) > (current.runs, current.number):
+            identified[campaign] = _Identified(run_count, number, *map(tuple, lists))
+    return identified
+
+
+def _with_marks(db: Database, sql: str, numbers: list[int]) -> list[tuple[Any, ...]]:
+    """The rows of a query with ``numbers`` among its marks: constants, for which a key is looked up."""
+    return db.rows(sql.format(marks=", ".join("?" * len(numbers))), numbers) if numbers else []
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Values and u (r, k) of k parameters in r runs; ``rows`` (r,) are those of the history, -1 for a run before it."""
+
+    unit_of: Mapping[str, str]
+    rows: npt.NDArray[np.int64]
+    values: Array
+    u: Array
+
+
+def _blocks(
+    db: Database,
+    identified: Iterable[_Identified],
+    rows: Mapping[tuple[int, int], int],
+    parameter: str | None,
+) -> Iterator[_Block]:
+    """Identifications under one version of a model have the same parameters: they are taken together."""
+    numbers = {number for number, _ in rows}
+    heads = sorted((head for head in identified if head.number in numbers), key=lambda head: head.number)
+    stored = values_of(db, [head.number for head in heads]) if heads else {}
+    alike: dict[tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]], list[IdentifiedValues]] = {}
+    for head in heads:
+        alike.setdefault((head.parameters, head.units, head.factors), []).append(stored[head.number])
+    for (names, units, factors), parts in alike.items():
+        values = np.concatenate([part.value for part in parts]) / np.array(factors)
+        u = np.concatenate([part.u for part in parts]) / np.array(factors)
+        # A parameter that was refused everywhere is none of the history.
+        estimated = np.isfinite(values).any(axis=0)
+        columns = [j for j, name in enumerate(names) if estimated[j] and parameter in (None, name)]
+        numbered = [(part.number, run) for part in parts for run in part.runs.tolist()]
+        row = np.array([rows.get(number, -1) for number in numbered])
+        yield _Block({names[j]: units[j] for j in columns}, row, values[:, columns], u[:, columns])
+
+
+def _values(
+    db: Database,
+    identified: Iterable[_Identified],
+    rows: Mapping[tuple[int, int], int],
+    parameter: str | None,
+) -> tuple[tuple[str, ...], tuple[str, ...], Array, Array]:
+    """Names, units, values and u (n, p) of the parameters that any run has; ``rows`` by identification and run."""
+    blocks = list(_blocks(db, identified, rows, parameter))
+    unit_of: dict[str, str] = {}
+    for block in blocks:
+        unit_of = {**block.unit_of, **unit_of}
+    names = tuple(sorted(unit_of))
+    values = np.full((len(rows), len(names)), np.nan)
+    uncertainties = np.full_like(values, np.nan)
+    for block in blocks:
+        recorded = block.rows >= 0
+        columns = np.array([names.index(name) for name in block.unit_of], dtype=np.int64)
+        target = np.ix_(block.rows[recorded], columns)
+        values[target] = block.values[recorded]
+        uncertainties[target] = np.where(np.isnan(block.values[recorded]), np.nan, block.u[recorded])
+    return names, tuple(unit_of[name] for name in names), values, uncertainties
+
+
+def _conditions(db: Database, runs: list[RecordedRun]) -> dict[str, Array]:
+    """Conditions of the runs and means of their channels, each (n,)."""
+    conditions: dict[str, Array] = {}
+    for row, run in enumerate(runs):
+        for name, value in run.conditions.items():
+            conditions.setdefault(name, np.full(len(runs), np.nan))[row] = value
+    rows = {(run.campaign_id, run.run): row for row, run in enumerate(runs)}
+    for campaign, number, channel, value in _with_marks(
+        db, _CHANNELS, sorted({run.campaign_id for run in runs})
+    ):
+        if (campaign, number) in rows:
+            conditions.setdefault(channel, np.full(len(runs), np.nan))[rows[campaign, number]] = value
+    return conditions
+
+
+def latest_tolerances(db: Database) -> dict[tuple[str, str], float]:
+    """Limits of the absolute value by machine and parameter, in display units, as each latest campaign states them."""
+    latest = f"SELECT campaign_id FROM ({_LATEST})"
+    rows = db.rows(_TOLERANCES.format(latest=latest))
+    stated = {(machine, parameter): float(limit) for machine, parameter, limit in rows}
+    for machine, of_type in types_in_use(db, latest).items():
+        stated |= {(machine, parameter): limit for parameter, limit in of_type.limits.items()}
+    return stated
+
+
+def tolerance_types(db: Database) -> dict[str, str]:
+    """The machine type by machine, of those whose latest campaign states no tolerances and whose type has some."""
+    types = types_in_use(db, f"SELECT campaign_id FROM ({_LATEST})")
+    return {machine: types[machine].name for machine in sorted(types)}
+
+
+def _tolerances_of(db: Database, campaign: int) -> dict[str, float]:
+    rows = db.rows(_TOLERANCES.format(latest="?"), [campaign])
+    stated = {parameter: float(limit) for _, parameter, limit in rows}
+    for of_type in types_in_use(db, "?", [campaign]).values():
+        stated |= of_type.limits
+    return stated

@@ -1,0 +1,1 @@
+"""Coverage factors and regions for one and for many quantities."""

@@ -1,0 +1,1 @@
+"""Propagation of distributions by Monte Carlo: joint distributions, blocks of trials, the adaptive procedure."""

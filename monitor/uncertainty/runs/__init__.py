@@ -1,0 +1,1 @@
+"""One run as a measurement model: its inputs, its compiled program, its sensitivity."""

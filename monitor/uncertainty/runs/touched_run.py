@@ -1,0 +1,91 @@
+"""One run of touched balls as a measurement model: readings and calibrated distances go in.
+
+The inputs are the readings of the linear axes at every probing, in the order of the probings, and the lengths of the
+calibrated distances. Rotary readings are set values and no inputs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.methods.chain.touch import TouchProblem
+from monitor.records import Array
+from monitor.uncertainty.runs.measured_run import MeasuredRun
+
+
+@dataclass(frozen=True)
+class TouchedRun(MeasuredRun):
+    """One run of touched balls: the inputs are the readings of the linear axes and the calibrated distances."""
+
+    problem: TouchProblem
+
+    @cached_property
+    def linear(self) -> npt.NDArray[np.int64]:
+        """The places of the linear axes in the chain."""
+        joints = self.problem.context.chain.joints
+        return np.array([i for i, joint in enumerate(joints) if not joint.turns], dtype=np.int64)
+
+    @cached_property
+    def signs(self) -> Array:
+        """What turns a reading of each linear axis into its displacement."""
+        return np.array([float(self.problem.context.chain.joints[i].sign) for i in self.linear])
+
+    @cached_property
+    def reading_names(self) -> tuple[str, ...]:
+        """``X 1``: reading of axis X at sequence number 1."""
+        joints = self.problem.context.chain.joints
+        return tuple(f"{joints[a].name} {s}" for s in self.problem.context.sequence for a in self.linear)
+
+    @property
+    def stated(self) -> Array:
+        """The probe's, for every linear axis."""
+        sigma = self.problem.sigma
+        return np.repeat(np.sqrt(np.mean(sigma**2, axis=1)), len(self.linear))
+
+    @property
+    def calibrated(self) -> tuple[tuple[str, ...], str, Array]:
+        """``S1-S2``: the distance of two targets."""
+        distances = self.problem.distances
+        return self.problem.extra_names, "mm", np.array([d.standard_uncertainty for d in distances])
+
+    @cached_property
+    def inputs(self) -> Array:
+        """The inputs (N,) as measured, in mm."""
+        readings = self.problem.context.positions[:, self.linear] * self.signs
+        return np.concatenate([readings.ravel(), [d.length[0] for d in self.problem.distances]])
+
+    def repeated(self, inputs: Array) -> TouchProblem:
+        """The touch problem whose runs are the trials ``inputs`` (N, B)."""
+        context = self.problem.context
+        trials = inputs.shape[1]
+        count = self.probings
+        readings = inputs[: count * len(self.linear)].T.reshape(trials * count, len(self.linear))
+        positions = np.tile(context.positions, (trials, 1))
+        positions[:, self.linear] = readings * self.signs
+        several = context.taken(np.tile(np.arange(count), trials))
+        lengths = inputs[count * len(self.linear) :]
+        return replace(
+            self.problem,
+            context=replace(several, positions=positions, run=np.repeat(np.arange(trials), count)),
+            sigma=np.tile(self.problem.sigma, (trials, 1)),
+            distances=tuple(
+                replace(distance, length=lengths[i]) for i, distance in enumerate(self.problem.distances)
+            ),
+        )
+
+
+def touch_run(problem: TouchProblem, run: int, common: Array) -> TouchedRun:
+    """One ``run`` of touched balls, with the common unknowns held at ``common`` (c,)."""
+    index = int(np.flatnonzero(problem.runs == run)[0])
+    rows = problem.context.run == run
+    single = replace(
+        problem,
+        context=problem.context.taken(np.flatnonzero(rows)),
+        sigma=problem.sigma[rows],
+        distances=tuple(replace(d, length=d.length[[index]]) for d in problem.distances),
+    )
+    return TouchedRun(single, common)

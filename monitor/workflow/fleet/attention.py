@@ -1,0 +1,22 @@
+"""The classes of attention of the fleet: pages name them without loading what computes the fleet."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Attention(StrEnum):
+    """Why a parameter needs attention, the most urgent first; the last is of a limit of the volumetric error."""
+
+    OUT = "out of tolerance"
+    DRIFTS_OUT = "drifts out of tolerance within a year"
+    STANDS_OUT = "the latest day stands out"
+    DRIFTS = "drifts"
+    DAYS_DIFFER = "days differ much more than runs"
+    AS_USUAL = "as usual"
+    ONE_DAY = "one day only, nothing to compare it with"
+    UNJUDGED = "limit not judged: no map is stored (monitor map CAMPAIGN)"
+
+
+#: The classes by their number.
+ATTENTION = tuple(Attention)
