@@ -58,8 +58,8 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
                 cursor = connection.execute(statements[0])
                 columns = tuple(str(column[0]) for column in cursor.description or ())
                 types = tuple(str(column[1]) for column in cursor.description or ())
-                if any(_ZONED in kind for kind in types):
-                    cursor = connection.execute(_with_zones_as_text(statements[0].query, columns, types))
+                zoned = _with_zones_as_text(statements[0].query, columns, types)
+                cursor = cursor if zoned is None else connection.execute(zoned)
                 rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit + 1)
             except duckdb.Error as fault:
                 raise InputError(f"the query cannot be answered: {fault}") from fault
@@ -67,23 +67,25 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
     return QueryResult(columns, types, tuple(map(tuple, rows[:limit])), truncated)
 
 
-def _with_zones_as_text(query: str, columns: Sequence[str], types: Sequence[str]) -> str:
+def _with_zones_as_text(query: str, columns: Sequence[str], types: Sequence[str]) -> str | None:
     """Return a query of the same rows whose moments with a zone are texts: DuckDB's Python needs pytz for them.
 
-    Raises InputError where one stands inside a list or structure.
+    None where there are none. Raises InputError where one stands inside a list or structure.
     """
+    if not any(_ZONED in kind for kind in types):
+        return None
     for name, kind in zip(columns, types, strict=True):
         if _ZONED in kind and kind != _ZONED:
             raise InputError(
                 f"the column {name} holds moments with a time zone inside a {kind}; write them as text or without a "
                 "zone, such as CAST(moment AS TIMESTAMP)"
             )
-    places = [f"column{number}" for number in range(len(columns))]
+    aliases = [f"column{number}" for number in range(len(columns))]
     listed = ", ".join(
-        f"CAST({place} AS VARCHAR)" if kind == _ZONED else place
-        for place, kind in zip(places, types, strict=True)
+        f"CAST({alias} AS VARCHAR)" if kind == _ZONED else alias
+        for alias, kind in zip(aliases, types, strict=True)
     )
-    return f"SELECT {listed} FROM (\n{query.rstrip().rstrip(';')}\n) AS asked({', '.join(places)})"
+    return f"SELECT {listed} FROM (\n{query.rstrip().rstrip(';')}\n) AS asked({', '.join(aliases)})"
 
 
 def campaign_readings(db: Database, campaign: str) -> QueryResult:
