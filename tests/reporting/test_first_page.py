@@ -137,7 +137,19 @@ def test_a_quiet_week_says_so() -> None:
             "Mend what its page names and measure again (next check now: the last run could not be evaluated).",
         ),
         (machine("M", "may be out of tolerance"), "since", "Not known: this is not stated run by run."),
-        (AWAY, "worst", "None: no machine that was measured needs attention."),
+        (AWAY, "worst", "Not known: no machine was measured this week."),
+        (AWAY, "why", "No machine was measured this week, so nothing is known of its state."),
+        (
+            GOOD,
+            "why",
+            "No parameter is out of its tolerance, none changed, and the models explain the measurements.",
+        ),
+        (
+            machine("M", "no change seen"),
+            "why",
+            "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain "
+            "the measurements.",
+        ),
         (AWAY, "fine", "No machine could be stated to be fine."),
         (machine("M", "no change seen"), "unjudged", "Not against every tolerance: M."),
     ],

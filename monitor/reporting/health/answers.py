@@ -28,7 +28,11 @@ _NAMED = 6
 #: A drift is spoken of below this probability of seeing it where there is none.
 _DRIFT_P = 0.05
 _QUIET = "No parameter is out of its tolerance, none changed, and the models explain the measurements."
-
+_QUIET_IN_PART = (
+    "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain the "
+    "measurements."
+)
+_UNMEASURED = "No machine was measured this week, so nothing is known of its state."
 _NOTICED = "No parameter is out of its tolerance, but weekly looks noticed a change: see below the table."
 
 
@@ -55,7 +59,13 @@ def answers(fleet: Fleet) -> tuple[Answer, ...]:
 
 
 def _quiet(fleet: Fleet) -> str:
-    return _NOTICED if fleet.noticed else _QUIET
+    """Why no machine is the worst; only of what was measured, and only of tolerances that are stated."""
+    states = {row.state for row in fleet.rows}
+    if fleet.noticed:
+        return _NOTICED
+    if not states & set(FINE):
+        return _UNMEASURED
+    return _QUIET_IN_PART if State.NO_CHANGE_SEEN in states else _QUIET
 
 
 def concern(health: MachineHealth) -> ParameterHealth | None:
@@ -221,6 +231,8 @@ def to_do(health: MachineHealth) -> str:
 
 def _worst(fleet: Fleet) -> str:
     urgent = [row for row in fleet.rows if row.state in URGENT]
+    if all(row.state is State.NOT_MEASURED for row in fleet.rows):
+        return "Not known: no machine was measured this week."
     if not urgent:
         return "None: no machine that was measured needs attention."
     first, *others = urgent
