@@ -1,7 +1,6 @@
 """What a calibration campaign is: frozen records in internal units (mm, rad, s, °C).
 
-Readers make them, the store keeps them, the methods read them. Recorded conditions and channels keep the
-unit that their name ends in (``ambient_degC``, ``warm_up_min``).
+Recorded conditions and channels keep the unit that their name ends in (``ambient_degC``, ``warm_up_min``).
 """
 
 from __future__ import annotations

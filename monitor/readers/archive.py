@@ -55,8 +55,8 @@ def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
     if not campaigns:
         if any(file.name.lower().endswith(WORKBOOK) for file in files):
             raise InputError(
-                f"a workbook of Excel holds the tables of a campaign, and {CAMPAIGN_FILES[0]} says of which machine and "
-                "method they are: choose both files together (docs/campaign-format.md)"
+                f"a workbook of Excel holds the tables of a campaign, and {CAMPAIGN_FILES[0]} says of which machine "
+                "and method they are: choose both files together (docs/campaign-format.md)"
             )
         raise InputError(
             f"no folder of the upload has a {CAMPAIGN_FILES[0]} or a {CAMPAIGN_FILES[1]}; choose the folder of a "
