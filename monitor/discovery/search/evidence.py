@@ -91,8 +91,8 @@ class Pool(Generic[CandidateT]):
             grams[size] = np.empty((len(rows), size, size))
             # Candidate by candidate: all columns once more would be fetched from the system page by page.
             for gram, first in zip(grams[size], rows[:, 0], strict=True):
-                own = slice(first, first + size)
-                part = self.rows[own] / self.lengths[own, None]
+                columns = slice(first, first + size)
+                part = self.rows[columns] / self.lengths[columns, None]
                 gram[...] = part @ part.T
         return grams
 
