@@ -93,7 +93,7 @@ def data_key(field: dataclasses.Field[Any]) -> str:
 
 
 def _plain(value: object) -> Any:
-    if isinstance(value, Sentence):
+    if isinstance(value, (Sentence, Path)):
         return str(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return _plain_record(value)
@@ -109,8 +109,6 @@ def _plain(value: object) -> Any:
         return [_plain(element) for element in value]
     if isinstance(value, date):
         return value.isoformat()
-    if isinstance(value, Path):
-        return str(value)
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -68,6 +68,11 @@ class Schemas:
             return {"enum": [member.value for member in hint]}
         return dict(_SCALARS.get(hint, {}))
 
+    def _of_alternatives(self, members: tuple[Any, ...]) -> Schema:
+        """The schema of a union; the document of a sentence is the text that stands beside it."""
+        written = [self.of(member) for member in members if member is not Sentence]
+        return {"anyOf": written} if len(written) > 1 else written[0]
+
     def _of_fixed_length(self, members: tuple[Any, ...]) -> Schema:
         """The schema of a pair or triple; tools that know no prefixItems understand one of members of one type."""
         if len(set(members)) == 1:
