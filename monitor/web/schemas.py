@@ -46,12 +46,7 @@ class Schemas:
         """Return the schema of a type, a reference where it is a record."""
         origin, members = typing.get_origin(hint), typing.get_args(hint)
         if origin in (typing.Union, types.UnionType):
-            written = [
-                member for member in members if member is not Sentence
-            ]  # its document is the text beside it
-            return (
-                {"anyOf": [self.of(member) for member in written]} if len(written) > 1 else self.of(*written)
-            )
+            return self._of_alternatives(members)
         if origin is typing.Literal:
             return {"enum": list(members)}
         if origin is np.ndarray:
