@@ -9,6 +9,7 @@ from typing import Literal
 
 from monitor.documents import OMITTED
 from monitor.exceptions import InputError
+from monitor.reporting import messages
 from monitor.store import (
     AuditEntry,
     Database,
@@ -79,10 +80,7 @@ def verify(db: Database, request: VerifyRequest) -> VerifyAnswer:
             anchored = anchored_entry(db, request.anchor)
             entry = None if anchored is None else anchored.entry
             if anchored is None:
-                faults.append(
-                    f"no entry of the audit has the hash {request.anchor.strip()}, which was kept elsewhere: the "
-                    "database was rewritten since, put back to an earlier state, or it is another database"
-                )
+                faults.append(messages.anchor_unknown(request.anchor.strip()))
     # Computed outside: nobody waits for a fit.
     recomputed, different = recompute(db, verification.last_sha256, request.recompute)
     faults += different
@@ -180,7 +178,7 @@ def backup(db: Database, request: BackupRequest) -> BackupAnswer:
         file=request.target,
         sha256=copy.sha256,
         rows=rows,
-        message=f"{request.target}: {len(copy.tables)} tables, {rows} rows, checked; its manifest lies beside it",
+        message=messages.backup_made(request.target, len(copy.tables), rows),
     )
 
 
@@ -205,7 +203,7 @@ def restore_backup(request: RestoreRequest) -> RestoreAnswer:
     """Make a database from a backup. Raises StoreError where the backup is not what its manifest says."""
     source = restore(request.source, request.target)
     moment = source.made_at[:19].replace("T", " ")
-    return RestoreAnswer(request.target, source.sha256, f"{request.target} is the backup of {moment} UTC")
+    return RestoreAnswer(request.target, source.sha256, messages.backup_restored(request.target, moment))
 
 
 @dataclass(frozen=True)
