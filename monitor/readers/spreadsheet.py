@@ -11,7 +11,7 @@ import io
 import re
 import warnings
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date, datetime
 from pathlib import Path
@@ -94,15 +94,8 @@ def _written(rows: Iterable[Sequence[str]]) -> str:
     return stream.getvalue()
 
 
-def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | None:
-    try:
-        from openpyxl import load_workbook
-    except ImportError:
-        faults.add(
-            file, None, None,
-            "workbooks need openpyxl: pip install 'machine-health-monitor[excel]', or save the table as CSV",
-        )  # fmt: skip
-        return None
+def _workbook(file: str, content: bytes, faults: Faults, load_workbook: Callable[..., Any]) -> Any | None:
+    """Return a workbook by openpyxl's ``load_workbook``; None, with a fault, for any other file."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as packed:
             unpacked = sum(member.file_size for member in packed.infolist())
@@ -114,11 +107,25 @@ def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | N
         with warnings.catch_warnings():
             # What openpyxl does not keep (drop-down lists, colours) is not read either.
             warnings.simplefilter("ignore")
-            book = load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+            return load_workbook(io.BytesIO(content), read_only=True, data_only=True)
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, SyntaxError) as error:
         faults.add(
             file, None, None, f"this is no workbook of Excel (.xlsx) that can be read: {str(error)[:100]}"
         )
+        return None
+
+
+def _sheet_text(file: str, content: bytes, stem: str, faults: Faults) -> str | None:
+    try:
+        from openpyxl import load_workbook
+    except ImportError:
+        faults.add(
+            file, None, None,
+            "workbooks need openpyxl: pip install 'machine-health-monitor[excel]', or save the table as CSV",
+        )  # fmt: skip
+        return None
+    book = _workbook(file, content, faults, load_workbook)
+    if book is None:
         return None
     names = {name.casefold(): name for name in book.sheetnames}
     sheet = names.get(stem, None if file == WORKBOOK else book.sheetnames[0])

@@ -190,7 +190,7 @@ function pointAt(effect, redraw) {
     }
     status.textContent = answer === null ? effect + " cannot be tried in this model"
       : "Orange: what " + effect + " explains. Blue: what the model leaves. Where the arrows agree, it explains the residual." +
-        (answer.motion ? " " + answer.motion.words + "; the motion is drawn far larger than it is." : "");
+        (answer.motion ? " " + answer.motion.sentence + "; the motion is drawn far larger than it is." : "");
     if (answer !== null) {
       scene.effect = answer;
       redraw();

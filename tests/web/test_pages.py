@@ -111,7 +111,7 @@ def test_an_effect_moves_its_axis_and_what_that_carries(
     answer = from_document(ResidualsAnswer, {**residuals, "effect": effect, "effect_axis": axis})
     motion = motion_of(answer)
     assert motion is not None
-    assert (motion.axes, motion.words) == (moved, words)
+    assert (motion.axes, motion.sentence) == (moved, words)
     for kind in ("shift", "turn"):
         directions = np.flatnonzero(getattr(motion, kind)).tolist()
         assert directions == ([along[1]] if kind == along[0] else [])
