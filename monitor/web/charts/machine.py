@@ -58,7 +58,7 @@ def machine_traces(residuals: ResidualsAnswer) -> list[Trace]:
 @dataclass(frozen=True)
 class Motion:
     """How the drawing moves where an axis has an error: the ``axes`` that move with it, the ``shift`` in mm and the
-    ``turn`` in rad about ``about``, both far larger than the error, and a ``sentence`` that says it."""
+    ``turn`` in rad about ``about``, both far larger than the error, and what that is in a ``sentence``."""
 
     axes: tuple[str, ...]
     shift: tuple[float, ...]
@@ -80,24 +80,24 @@ def motion_of(residuals: ResidualsAnswer) -> Motion | None:
     places = np.array(residuals.place_mm)
     span = max(float(np.ptp(places, axis=0).max()), 1.0)
     first = names.index(residuals.effect_axis)
-    faulty_axis = residuals.machine[first]
-    moved = [axis.name for axis in residuals.machine[first:] if axis.carries == faulty_axis.carries]
+    moving = residuals.machine[first]
+    moved = [axis.name for axis in residuals.machine[first:] if axis.carries == moving.carries]
     turns, along = divmod("XYZABC".index(term[1]), 3)
     unit = np.eye(3)[along]
-    others = [name for name in moved if name != faulty_axis.name]
+    others = [name for name in moved if name != moving.name]
     carried = (
-        f", and with it {', '.join(others)} and the {faulty_axis.carries}"
+        f", and with it {', '.join(others)} and the {moving.carries}"
         if others
-        else f" and the {faulty_axis.carries}"
+        else f" and the {moving.carries}"
     )
     return Motion(
         axes=tuple(moved),
         shift=tuple((SHIFT * span * unit).tolist()) if not turns else (0.0, 0.0, 0.0),
         turn=tuple((SWING * unit).tolist()) if turns else (0.0, 0.0, 0.0),
         about=tuple((places.min(axis=0) + places.max(axis=0)) / 2.0)
-        if faulty_axis.kind != "rotary"
-        else faulty_axis.at_mm,
-        sentence=f"{faulty_axis.name} {'turns about' if turns else 'shifts along'} {'XYZ'[along]}{carried}",
+        if moving.kind != "rotary"
+        else moving.at_mm,
+        sentence=f"{moving.name} {'turns about' if turns else 'shifts along'} {'XYZ'[along]}{carried}",
     )
 
 
