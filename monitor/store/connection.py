@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import duckdb
 
 from monitor.exceptions import StoreError
+from monitor.stopping import checkpoint
 from monitor.store import bound_values, migrations
 from monitor.store.bound_values import Parameters
 from monitor.store.database_name import check_database_name
@@ -103,6 +104,7 @@ class Database:
     @contextmanager
     def _used(self) -> Iterator[duckdb.DuckDBPyConnection]:
         """Yield the connection to one thread at a time; faults of the file in words, Ctrl-C as what it is."""
+        checkpoint()
         with self._lock:
             if self._connection is None:
                 raise StoreError(f"{self.path} is closed")

@@ -41,30 +41,41 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
     Raises InputError for anything else, and for what DuckDB does not understand, with its own words.
     """
     with db.connected() as connection:
-        try:
-            statements = connection.extract_statements(text)
-        except duckdb.Error as fault:
-            raise InputError(f"this is no SQL that DuckDB understands: {fault}") from fault
-        if len(statements) != 1:
-            count = f"these are {len(statements)}" if statements else "there is none"
-            raise InputError(f"type one query, such as SELECT * FROM v_machines; {count}")
-        # EXPLAIN ANALYZE would run what it explains.
-        if statements[0].type != duckdb.StatementType.SELECT:
-            raise InputError(
-                "a query may only read: begin it with SELECT, WITH, FROM, SHOW, DESCRIBE or SUMMARIZE"
-            )
+        statement = _only_query(connection, text)
         with _reading(connection):
             try:
-                cursor = connection.execute(statements[0])
+                cursor = connection.execute(statement)
                 columns = tuple(str(column[0]) for column in cursor.description or ())
                 types = tuple(str(column[1]) for column in cursor.description or ())
-                zoned = _with_zones_as_text(statements[0].query, columns, types)
+                zoned = _with_zones_as_text(statement.query, columns, types)
                 cursor = cursor if zoned is None else connection.execute(zoned)
                 rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit + 1)
             except duckdb.Error as fault:
+                if "'pytz'" in str(fault):
+                    raise InputError(
+                        "a column of this query is a TIMESTAMP WITH TIME ZONE, which is not shown; cast it, as in "
+                        "SELECT CAST(now() AS TIMESTAMP): that is its moment in UTC"
+                    ) from fault
                 raise InputError(f"the query cannot be answered: {fault}") from fault
     truncated = limit is not None and len(rows) > limit
     return QueryResult(columns, types, tuple(map(tuple, rows[:limit])), truncated)
+
+
+def _only_query(connection: duckdb.DuckDBPyConnection, text: str) -> duckdb.Statement:
+    """Return the one statement of a text that only reads. Raises InputError for any other text."""
+    try:
+        statements = connection.extract_statements(text)
+    except duckdb.Error as fault:
+        raise InputError(f"this is no SQL that DuckDB understands: {fault}") from fault
+    if len(statements) != 1:
+        count = f"these are {len(statements)}" if statements else "there is none"
+        raise InputError(f"type one query, such as SELECT * FROM v_machines; {count}")
+    # EXPLAIN ANALYZE would run what it explains.
+    if statements[0].type != duckdb.StatementType.SELECT:
+        raise InputError(
+            "a query may only read: begin it with SELECT, WITH, FROM, SHOW, DESCRIBE or SUMMARIZE"
+        )
+    return statements[0]
 
 
 def _with_zones_as_text(query: str, columns: Sequence[str], types: Sequence[str]) -> str | None:

@@ -109,7 +109,7 @@ def _out(health: MachineHealth) -> str:
 
 
 def _not_evaluated(health: MachineHealth) -> str:
-    return "; ".join(health.quality.remarks[:1])
+    return "; ".join(map(str, health.quality.remarks[:1]))
 
 
 def _unexplained(health: MachineHealth) -> str:
@@ -124,12 +124,12 @@ def _unexplained(health: MachineHealth) -> str:
 
 
 def _changed(health: MachineHealth) -> str:
-    what = "; ".join(
-        change.what for change in health.changes if change.this_week and change.kind is ChangeKind.CHANGE
-    )
+    changes = [change for change in health.changes if change.this_week and change.kind is ChangeKind.CHANGE]
     parameter = concern(health)
-    name = f" ({plain_name(parameter.name)})" if parameter is not None and parameter.name in what else ""
-    return f"{what}{name}"
+    name = ""
+    if parameter is not None and any(change.at in parameter.changed_at for change in changes):
+        name = f" ({plain_name(parameter.name)})"
+    return "; ".join(str(change.what) for change in changes) + name
 
 
 def _suspect(health: MachineHealth) -> str:
@@ -221,7 +221,11 @@ def to_do(health: MachineHealth) -> str:
             if missing
             else "look at its page for where the model fails, and measure again"
         )
-    when = "now" if health.next_check == "now" else f"(next check {health.next_check})"
+    when = (
+        "now"
+        if health.state in ALARMS and health.state is not State.NOT_EVALUATED
+        else f"(next check {health.next_check})"
+    )
     return _sentence(f"{action} {when}")
 
 
