@@ -104,7 +104,7 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
     runs, numbers, deviations, lines = zip(*parser.rows, strict=True)
     columns = {
         "run": [str(run) for run in runs],
-        "target": [str(number) for number in numbers],
+        "target number": [str(number) for number in numbers],
         "position": [parser.targets[number - 1] for number in numbers],
         "deviation": list(deviations),
     }
@@ -159,7 +159,7 @@ def _complete(parser: _Parser, name: str, faults: Faults) -> None:
 
 EXPORT = ExportFormat(
     "laser rtl",
-    "laser interferometer, text with sections; columns position, deviation, run, target",
+    "laser interferometer, text with sections; columns position, deviation, run, target number",
     read,
     suffixes=(".rtl", ".rta", ".rts"),
 )

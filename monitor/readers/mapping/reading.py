@@ -266,7 +266,9 @@ def _probings_table(parts: Sequence[_Part]) -> tuple[CsvTable, list[tuple[int, i
             if with_setups:
                 columns[probings_file.SETUP] += [part.entry.setup or ""] * count
             for name in names:
-                columns[name] += part.rows.cells.get(name, [""] * count)
+                # Rows that name no target are readings of their setup, as in a campaign without that column.
+                empty = (part.entry.setup or "") if name == TARGET else ""
+                columns[name] += part.rows.cells.get(name, [empty] * count)
             places += [(index, row) for row in range(count)]
     lines = range(2, len(places) + 2)
     return CsvTable(probings_file.FILE, dict(columns), lines, ()), places

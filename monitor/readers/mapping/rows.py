@@ -74,7 +74,10 @@ def rows_of(entry: Entry, file: str, export: Export, wanted: Wanted, faults: Fau
     sources = _sources(entry, file, export, wanted)
     cells: dict[str, Sequence[str]] = {}
     origins: dict[str, Origin] = {}
-    for name, source in sources.items():
+    first = [axis.column for axis in wanted.axes] + list(wanted.columns)
+    for name, source in sorted(
+        sources.items(), key=lambda pair: (pair[0] not in first, pair[0] in wanted.columns)
+    ):
         filled = _filled(entry, file, export, name, source)
         if filled is not None:
             cells[name], origins[name] = filled
