@@ -36,8 +36,11 @@ from monitor.store.certificates import (
     save_certificate,
 )
 from monitor.store.connection import Database
-from monitor.store.copies.backup import Backup, list_backups, restore, snapshot, take_backup
+from monitor.store.copies.backup import snapshot, take_backup
 from monitor.store.copies.export import export_tables
+from monitor.store.copies.increment import take_increment
+from monitor.store.copies.manifest import Backup, list_backups
+from monitor.store.copies.restoring import Restored, restore
 from monitor.store.copies.workbook import export_workbook
 from monitor.store.curves import curve_names, is_curve, load_curve
 from monitor.store.database_name import check_database_name
@@ -115,6 +118,7 @@ __all__ = [
     "Patience",
     "QueryResult",
     "RecordedRun",
+    "Restored",
     "RunRow",
     "SelectionRow",
     "SharedDatabase",
@@ -207,6 +211,7 @@ __all__ = [
     "snapshot",
     "stored_analyses",
     "take_backup",
+    "take_increment",
     "tolerance_types",
     "type_in_use",
     "verify_audit",

@@ -89,8 +89,8 @@ STAYING: Mapping[str, str] = {
     "cluster": "the server computes on its own computer",
     "folder": "a campaign folder that is not imported is looked at by the command line on its computer",
 }
-#: Fields that would spend processes of the server, or make it speak to another address.
-NOT_TAKEN = frozenset({"cluster", "workers"})
+#: Fields that would spend processes of the server, make it speak to another address, or mean files that lie beside one.
+NOT_TAKEN = frozenset({"cluster", "incremental", "workers"})
 #: Questions judged by the tolerances by machine type of the configuration of whoever asks.
 JUDGING = frozenset({"fleet", "report", "trend"})
 

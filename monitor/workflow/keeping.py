@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
@@ -19,6 +20,7 @@ from monitor.store import (
     last_entries,
     restore,
     take_backup,
+    take_increment,
     verify_audit,
 )
 from monitor.workflow.recomputed import recompute
@@ -152,60 +154,109 @@ def audit(db: Database, request: AuditRequest) -> AuditAnswer:
 
 @dataclass(frozen=True)
 class BackupRequest:
-    """The new file that the database is copied to."""
+    """The new file that the database is copied to.
+
+    ``incremental``: only what was stored since the newest backup in the same folder, without which it is no backup.
+    """
 
     target: Path
+    incremental: bool = False
 
 
 @dataclass(frozen=True)
 class BackupAnswer:
-    """The copy with its hash, and how many rows it has in all tables."""
+    """The copy with its hash, and how many rows it has in all tables.
+
+    ``first_entry`` and ``last_entry`` are the entries of the audit that it holds, ``follows`` is the name of the backup
+    that an incremental one follows.
+    """
 
     file: Path
     sha256: str
     rows: int
     message: str
+    first_entry: int
+    last_entry: int
+    follows: str | None = None
 
 
 def backup(db: Database, request: BackupRequest) -> BackupAnswer:
-    """Copy everything into a second file. Raises StoreError where it exists or cannot be written.
+    """Copy everything, or what is new, into a second file. Raises StoreError where it exists or cannot be written.
 
     Raises InputError for a lake, too.
     """
     _refuse_lake(db, "copied")
     with db.reading():
-        copy = take_backup(db, request.target)
+        copy = (take_increment if request.incremental else take_backup)(db, request.target)
     rows = sum(count for count, _ in copy.tables.values())
+    span = copy.span
+    assert span is not None  # of those made by this version
+    entries = f"entries {span.first_entry} to {span.last_entry} of the audit"
+    what = f"{len(copy.tables)} tables, {rows} rows"
+    if span.previous is not None:
+        what = f"{entries}, {rows} rows" if span.last_entry >= span.first_entry else "nothing new"
+        what += f" since {span.previous}, which has to stay beside it"
     return BackupAnswer(
         file=request.target,
         sha256=copy.sha256,
         rows=rows,
-        message=f"{request.target}: {len(copy.tables)} tables, {rows} rows, checked; its manifest lies beside it",
+        message=f"{request.target}: {what}, checked; its manifest lies beside it",
+        first_entry=span.first_entry,
+        last_entry=span.last_entry,
+        follows=span.previous,
     )
 
 
 @dataclass(frozen=True)
 class RestoreRequest:
-    """A backup, and the new database that is made from it."""
+    """A backup or a folder of backups, and the new database that is made; ``at`` is the moment whose state is wanted.
+
+    Raises InputError for a moment without its offset from UTC.
+    """
 
     source: Path
     target: Path
+    at: datetime | None = None
+
+    def __post_init__(self) -> None:
+        if self.at is not None and self.at.utcoffset() is None:
+            raise InputError(f"--at {self.at}: name its offset from UTC")
 
 
 @dataclass(frozen=True)
 class RestoreAnswer:
-    """The restored database with its hash."""
+    """The restored database; ``sha256`` is the hash of the backup that it was made from, the last of ``backups``.
+
+    ``last_entry`` is the last entry of its audit and ``faults`` are what its verification found; None and nothing where
+    it is a full backup byte for byte.
+    """
 
     file: Path
     sha256: str
     message: str
+    backups: tuple[str, ...]
+    last_entry: int | None = None
+    faults: tuple[str, ...] = ()
 
 
 def restore_backup(request: RestoreRequest) -> RestoreAnswer:
     """Make a database from a backup. Raises StoreError where the backup is not what its manifest says."""
-    source = restore(request.source, request.target)
-    moment = source.made_at[:19].replace("T", " ")
-    return RestoreAnswer(request.target, source.sha256, f"{request.target} is the backup of {moment} UTC")
+    restored = restore(request.source, request.target, request.at)
+    made_at = restored.backup.made_at[:19].replace("T", " ")
+    message = f"{request.target} is the backup of {made_at} UTC"
+    if request.at is not None:
+        message = f"{request.target} is the database as it was at {request.at:%Y-%m-%d %H:%M:%S%z}"
+    if restored.last_entry is not None:
+        message += f", up to entry {restored.last_entry} of the audit, from {', '.join(restored.files)}"
+        message += "; it was verified" if not restored.faults else "; its verification found:"
+    return RestoreAnswer(
+        request.target,
+        restored.backup.sha256,
+        message,
+        restored.files,
+        restored.last_entry,
+        restored.faults,
+    )
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,32 @@ def test_a_backup_is_restored_to_the_same_answers(typed: Any, db: Path, tmp_path
     assert typed("verify", db=back).status == 0
 
 
+def test_an_incremental_backup_and_a_moment_as_typed(typed: Any, db: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "backups"
+    folder.mkdir()
+    refused = typed("backup", folder / "first.duckdb", "--incremental", db=db)
+    assert (refused.status, refused.out) == (2, "")
+    assert "make a full one there first: `monitor backup FILE`" in refused.err
+    assert typed("backup", folder / "first.duckdb", db=db).status == 0
+    before = typed("audit", "--last", 1000, "--json", db=db).document["entries"]
+    assert typed("event", "HU40-T", "a crash", "--at", "2026-03-05", db=db).status == 0
+    said = typed("backup", folder / "second.duckdb", "--incremental", db=db).out
+    assert f"entries {len(before) + 1} to {len(before) + 1} of the audit, 2 rows since first.duckdb" in said
+    at = before[0]["made_at"]
+    early = typed("restore", folder, "--at", at, "--json", db=tmp_path / "early.duckdb")
+    assert (early.status, early.document["last_entry"], early.document["faults"]) == (0, len(before), [])
+    again = typed("restore", folder / "second.duckdb", db=tmp_path / "again.duckdb")
+    assert (
+        f"up to entry {len(before) + 1} of the audit, from first.duckdb, second.duckdb; it was verified"
+        in again.out
+    )
+    assert typed("event", "HU40-T", "--json", db=tmp_path / "again.duckdb").document["events"] != []
+    for wrong in (["--at", "yesterday"], ["--at", "2999-01-01"], ["--at", "1999-01-01"]):
+        answer = typed("restore", folder, *wrong, db=tmp_path / "wrong.duckdb")
+        assert (answer.status, answer.out) == (2, "")
+        assert answer.err.startswith("monitor: --at ")
+
+
 def test_a_damaged_backup_is_not_restored(typed: Any, db: Path) -> None:
     assert typed("backup", "copy.duckdb", db=db).status == 0
     damaged = bytearray(Path("copy.duckdb").read_bytes())

@@ -31,7 +31,7 @@ from monitor.store import (
     load_identification,
     save_identification,
 )
-from monitor.store.lake.copying import OTHERWISE, SOURCES
+from monitor.store.entries import OTHERWISE, SOURCES
 from monitor.store.lake.reading import LakeDatabase
 from monitor.workflow.fleet import FleetRequest, fleet
 from monitor.workflow.identify.identify import identify

@@ -26,7 +26,7 @@ from monitor.store import (
 def test_restored_backup_is_the_database(filled: Database, campaign: Campaign, tmp_path: Path) -> None:
     made = take_backup(filled, tmp_path / "it's.duckdb")
     assert made.tables["probing"][0] == 6
-    assert restore(tmp_path / "it's.duckdb", tmp_path / "back.duckdb") == made
+    assert restore(tmp_path / "it's.duckdb", tmp_path / "back.duckdb").backup == made
     with Database(tmp_path / "back.duckdb") as db:
         assert verify_audit(db).ok
         assert verify_audit(db).last_sha256 == verify_audit(filled).last_sha256

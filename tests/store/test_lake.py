@@ -26,8 +26,8 @@ from monitor.store import (
     save_model,
     withdraw_campaign,
 )
+from monitor.store.entries import OTHERWISE, SOURCES
 from monitor.store.lake import publication
-from monitor.store.lake.copying import OTHERWISE, SOURCES
 from monitor.store.lake.publication import Published, publish
 from monitor.store.lake.reading import LakeDatabase
 from monitor.store.lake.schema import LAKE_TABLES, OWN_BITS

@@ -1,1 +1,1 @@
-"""What leaves the database as files: tables, workbooks, backups."""
+"""What leaves the database as files, and comes back: tables, workbooks, backups (``manifest`` says what each holds)."""

@@ -6,46 +6,14 @@ The numbers get the plant's above them, names that another plant had first get `
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import duckdb
 
+from monitor.store.entries import rows_recorded
 from monitor.store.lake.attaching import LAKE, literal
 from monitor.store.lake.schema import LARGEST_OWN, OWN_BITS
 from monitor.store.opening import busy
 from monitor.store.turns import Holder, Patience, holder_in, writer_at_work
-
-
-@dataclass(frozen=True)
-class _Source:
-    """Which rows of a table an entry of the audit records: those whose ``column`` is the number of its ``subject``."""
-
-    subject: str
-    column: str
-
-
-#: Tables of which an import, and an identification, adds the rows.
-_WITH_CAMPAIGN = "imported_campaign source_file run campaign_runs probing curve curve_row"
-_WITH_IDENTIFICATION = (
-    "identification identified_run identified_values parameter_value parameter_frame residual"
-)
-#: Every table of a plant and what its rows belong to. Those that belong to nothing are published otherwise, below.
-SOURCES: dict[str, _Source] = {
-    **dict.fromkeys(_WITH_CAMPAIGN.split(), _Source("campaign", "campaign_id")),
-    **dict.fromkeys(_WITH_IDENTIFICATION.split(), _Source("identification", "identification_id")),
-    "import_note": _Source("import notes", "campaign_id"),
-    "withdrawn_campaign": _Source("withdrawn campaign", "campaign_id"),
-    "analysis": _Source("analysis", "analysis_id"),
-    "event": _Source("event", "event_id"),
-    "selection": _Source("selection", "selection_id"),
-    "machine_model": _Source("machine model", "choice_id"),
-    "refused_import": _Source("refused import", "refusal_id"),
-    "refusal_cleared": _Source("cleared refusal", "refusal_id"),
-    "certificate": _Source("certificate", "entry"),
-    "audit": _Source("entry", "entry"),
-}
-#: Tables with rows that no entry names (``run_fingerprint`` may come later than its campaign), or of the schema itself.
-OTHERWISE = ("model", "registered_machine", "run_fingerprint", "schema_migration")
 
 _NUMBERED = frozenset(
     ("analysis_id", "campaign_id", "choice_id", "event_id", "identification_id", "refusal_id", "registration",
@@ -60,25 +28,6 @@ _NAMED = {
     "parent": "model",
     "replaced_by": "certificate",
 }
-
-#: The rows that the entries from first to last of a plant's audit record.
-PORTION_OF_ENTRIES = """
-CREATE OR REPLACE TEMP TABLE portion AS
-WITH entries AS (
-    SELECT entry, subject, key, row_number() OVER (PARTITION BY subject, key ORDER BY entry) AS nth FROM origin.audit
-), campaigns AS (
-    SELECT campaign_id, campaign, row_number() OVER (PARTITION BY campaign ORDER BY campaign_id) AS nth
-    FROM origin.imported_campaign
-), next AS (SELECT * FROM entries WHERE entry BETWEEN $first AND $last)
-SELECT 'campaign' AS subject, key, campaign_id AS number
-FROM next JOIN campaigns ON campaign = key AND campaigns.nth = next.nth WHERE subject = 'campaign'
-UNION ALL SELECT subject, key, NULL FROM next WHERE subject = 'model'
-UNION ALL SELECT subject, key, CAST(regexp_extract(key, ' entry ([0-9]+)$', 1) AS INTEGER)
-FROM next WHERE subject = 'certificate'
-UNION ALL SELECT subject, key, CAST(key AS INTEGER) FROM next WHERE subject NOT IN ('campaign', 'model', 'certificate')
-UNION ALL SELECT 'entry', '', entry FROM next
-"""
-
 
 _BASE_MODELS = "(SELECT model FROM origin.model WHERE version = 1 AND parent IS NULL)"
 
@@ -114,29 +63,12 @@ def statements(connection: duckdb.DuckDBPyConnection, plant_no: int, renamed: se
     ).fetchall():
         columns.setdefault(table, []).append(column)
     offset = plant_no << OWN_BITS
-    spans = {
-        subject: (low, high)
-        for subject, low, high in connection.execute(
-            "SELECT subject, min(number), max(number) FROM portion GROUP BY subject"
-        ).fetchall()
-    }
-    for table, source in SOURCES.items():
-        if source.subject not in spans:
-            continue
-        low, high = spans[source.subject]
-        # The span lets blocks of other numbers be left out unread.
-        where = (
-            f"t.{source.column} BETWEEN {low} AND {high} AND t.{source.column} IN "
-            f"(SELECT number FROM portion WHERE subject = {literal(source.subject)})"
-        )
-        yield _insert(table, columns[table], offset, renamed, where)
-    if "model" in spans:
-        where = (
-            "t.model || ' version ' || t.version IN (SELECT key FROM portion WHERE subject = 'model') "
-            f"AND t.model NOT IN {_BASE_MODELS}"
-        )
-        yield _insert("model", columns["model"], offset, renamed, where)
-    if "campaign" not in spans:
+    recorded = rows_recorded(connection)
+    for table, where in recorded.items():
+        # The methods' own models are shared.
+        shared = f" AND t.model NOT IN {_BASE_MODELS}" if table == "model" else ""
+        yield _insert(table, columns[table], offset, renamed, where + shared)
+    if "imported_campaign" not in recorded:
         return
     published = f"BETWEEN {offset} AND {offset + LARGEST_OWN}"
     where = (

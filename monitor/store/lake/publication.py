@@ -22,8 +22,9 @@ import duckdb
 from monitor import __version__
 from monitor.exceptions import StoreError
 from monitor.store.connection import Database, utc_now
+from monitor.store.entries import select_portion
 from monitor.store.lake.attaching import LAKE, attach, connection_with_extensions, is_lake, literal
-from monitor.store.lake.copying import PORTION_OF_ENTRIES, attach_origin, statements
+from monitor.store.lake.copying import attach_origin, statements
 from monitor.store.lake.names import (
     register_names,
     register_plant,
@@ -210,7 +211,7 @@ class _Publisher:
 
     def _publish_portion(self, plant_no: int, name: str, first: int, last: int) -> int | None:
         """Add the entries from first to last with all that they record; rows, None where another process did."""
-        self._connection.execute(PORTION_OF_ENTRIES, {"first": first, "last": last})
+        select_portion(self._connection, "origin", first, last)
         ((largest,),) = self._rows("SELECT max(number) FROM portion")
         if largest > LARGEST_OWN:
             raise StoreError(f"a lake takes numbers of a plant up to {LARGEST_OWN}, not {largest}")

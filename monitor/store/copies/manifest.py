@@ -1,0 +1,134 @@
+"""What a backup says of itself: a manifest beside its file, with hashes, and which entries of the audit it holds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import duckdb
+
+from monitor import __version__
+from monitor.exceptions import StoreError
+from monitor.store.connection import utc_now
+
+_MANIFEST_END = ".manifest.json"
+
+#: Rows and checksum by table.
+Checksums = Mapping[str, tuple[int, str]]
+
+
+@dataclass(frozen=True)
+class Span:
+    """The entries of an audit that a backup holds, and what the database was after the last of them.
+
+    ``database`` is the hash of its first entry, by which it is known; "" before there is one. ``schema`` is the number
+    of the last migration. ``totals`` are rows and checksum of every table of the whole database. ``previous`` is the
+    name of the backup, in the same folder, that an incremental one follows; None of a full one.
+    """
+
+    database: str
+    first_entry: int
+    last_entry: int
+    last_sha256: str
+    schema: int
+    totals: Checksums
+    previous: str | None = None
+    previous_sha256: str | None = None
+
+
+@dataclass(frozen=True)
+class Backup:
+    """A backup: its file and hash, when it was made (UTC), and rows and checksum of every table in the file.
+
+    The checksum is DuckDB's own hash, summed over the rows; it compares tables within ``duckdb_version`` only. ``span``
+    is None where version 0.2.0 or an earlier one made it.
+    """
+
+    path: str
+    sha256: str
+    made_at: str
+    software_version: str
+    duckdb_version: str
+    tables: Checksums
+    span: Span | None = None
+
+    @property
+    def is_incremental(self) -> bool:
+        """Whether it holds only what was stored after another backup."""
+        return self.span is not None and self.span.previous is not None
+
+
+def write_manifest(partial: Path, target: Path, tables: Checksums, span: Span) -> Backup:
+    """Return the manifest of a file that is to be named ``target``, written beside it and synchronised with it."""
+    backup = Backup(
+        target.name,
+        file_sha256(partial),
+        utc_now().isoformat(),
+        __version__,
+        duckdb.__version__,
+        tables,
+        span,
+    )
+    path = manifest_of(partial)
+    path.write_text(json.dumps(asdict(backup), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    for file in (partial, path):
+        sync(file)
+    return backup
+
+
+def manifest_of(path: Path) -> Path:
+    """Return where the manifest of a file lies."""
+    return path.with_name(path.name + _MANIFEST_END)
+
+
+def read_manifest(path: Path) -> Backup:
+    """Return what a manifest says. Raises StoreError for what is none."""
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        span = manifest.pop("span", None)
+        return Backup(
+            **manifest | {"tables": _checksums(manifest["tables"])},
+            span=None if span is None else Span(**span | {"totals": _checksums(span["totals"])}),
+        )
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as fault:
+        raise StoreError(f"{path} is not a manifest of a backup: {fault}") from fault
+
+
+def list_backups(folder: str | Path) -> tuple[Backup, ...]:
+    """The backups and snapshots in a folder that have a manifest, the oldest first."""
+    backups = [read_manifest(path) for path in Path(folder).glob(f"*{_MANIFEST_END}")]
+    return tuple(sorted(backups, key=lambda backup: (backup.made_at, backup.path)))
+
+
+def remove_partial(partial: Path) -> None:
+    """Remove what was not finished: the file, its log and its manifest."""
+    for path in (partial, partial.with_name(partial.name + ".wal"), manifest_of(partial)):
+        path.unlink(missing_ok=True)
+
+
+def refuse_existing(target: Path) -> None:
+    """Raise StoreError where a file is there already, or its folder is not."""
+    if target.exists():
+        raise StoreError(f"{target} exists already; name a new file, or move that one away first")
+    if not target.absolute().parent.is_dir():
+        raise StoreError(f"the folder of {target} does not exist; make it first")
+
+
+def sync(path: Path) -> None:
+    """Write a file to the disk."""
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _checksums(tables: Mapping[str, tuple[int, str]]) -> Checksums:
+    return {name: (int(rows), str(checksum)) for name, (rows, checksum) in tables.items()}
