@@ -45,6 +45,8 @@ _SENSES = {
 _QUANTITY = re.compile(r"([+-]?[0-9]*[.,]?[0-9]+)\s*([^\s0-9]\S*)?")
 #: Digits of mm that a computed position is written with: a picometre.
 _DIGITS = 9
+#: Radii of file and mapping that differ by less are the same.
+_SAME_RADIUS = 1e-3
 #: A column of angles, and one of deviations.
 _ANGLES = ("angle", "winkel", "position")
 _DEVIATIONS = ("deviation", "radial deviation", "radius deviation", "error", "abweichung", "length change")
@@ -117,37 +119,49 @@ def read(file: ExportFile, how: BallBarSettings, faults: Faults) -> Export | Non
             "there is no table of angles and deviations; say in the mapping how it is written",
         )
         return None
+    read_circles = _read_circles(file.name, circles, decoded[1], how, faults)
+    if read_circles is None or len(faults) > before or how.axes is None:
+        return None
+    columns, lines, unit, layout = read_circles
+    stated = {
+        how.axes[0]: "mm",
+        how.axes[1]: "mm",
+        "angle": "deg",
+        "time": "s",
+        **({"deviation": unit} if unit else {}),
+    }
+    facts = [fact for circle in circles for fact in circle.facts]
+    return Export(columns, stated, lines, layout, tuple(facts), circles[0].value("date"))
+
+
+def _read_circles(
+    name: str, circles: Sequence[_Circle], encoding: str, how: BallBarSettings, faults: Faults
+) -> tuple[dict[str, list[str]], list[int], str, str] | None:
+    """Return the columns of all circles, their lines, the unit of the deviations and the layout; None with faults."""
     columns: dict[str, list[str]] = {}
-    units: dict[str, str] = {}
+    units: list[str] = []
     lines: list[int] = []
-    clock, layout = 0.0, decoded[1]
+    clock, layout = 0.0, encoding
     for circle in circles:
-        export = plain_table.read_text(
-            file.name, "\n".join(circle.lines), decoded[1], how.style, None, faults
-        )
+        export = plain_table.read_text(name, "\n".join(circle.lines), encoding, how.style, None, faults)
         if export is None:
             return None
         at = [line + circle.begin for line in export.lines]
-        cells = _cells(file.name, circle, export, at, how, clock, faults)
+        cells = _cells(name, circle, export, at, how, clock, faults)
         if cells is None:
             return None
         clock = float(cells["time"][-1]) + 1.0
         layout = export.layout
-        for name, values in cells.items():
-            columns.setdefault(name, []).extend(values)
-        unit = _unit(export, _DEVIATIONS) or ""
-        if units.setdefault("deviation", unit) != unit:
+        for column, values in cells.items():
+            columns.setdefault(column, []).extend(values)
+        units.append(_unit(export, _DEVIATIONS) or "")
+        if units[0] != units[-1]:
             faults.add(
-                file.name, circle.begin + 1, "deviation",
-                f"this circle is in {unit or 'no stated unit'}, the first in {units['deviation'] or 'none'}",
+                name, circle.begin + 1, "deviation",
+                f"this circle is in {units[-1] or 'no stated unit'}, the first in {units[0] or 'none'}",
             )  # fmt: skip
         lines += at
-    if len(faults) > before or how.axes is None:
-        return None
-    units |= {how.axes[0]: "mm", how.axes[1]: "mm", "angle": "deg", "time": "s"}
-    facts = [fact for circle in circles for fact in circle.facts]
-    stated = {name: unit for name, unit in units.items() if unit}
-    return Export(columns, stated, lines, layout, tuple(facts), circles[0].value("date"))
+    return columns, lines, units[0], layout
 
 
 def _circles(lines: Sequence[str], style: Style) -> list[_Circle]:
@@ -194,6 +208,28 @@ def _cells(
     radius = _radius(name, circle, how, faults)
     if angles is None or deviations is None or radius is None or how.axes is None or how.centre is None:
         return None
+    turns = _turns(name, export, angles, at, faults)
+    if turns is None:
+        return None
+    sense = _sense(name, circle, turns, at, faults)
+    first_axis, second_axis = (
+        [repr(round(middle + radius * part(turn), _DIGITS)) for turn in turns]
+        for middle, part in zip(how.centre, (math.cos, math.sin), strict=True)
+    )
+    return {
+        "angle": [repr(round(math.degrees(turn), _DIGITS)) for turn in turns],
+        "deviation": deviations,
+        "sense": [sense] * len(turns),
+        how.axes[0]: first_axis,
+        how.axes[1]: second_axis,
+        "time": _times(circle, turns, radius, clock),
+    }
+
+
+def _turns(
+    name: str, export: Export, angles: Sequence[str], at: Sequence[int], faults: Faults
+) -> list[float] | None:
+    """Return the angles in rad; None with the fault noted, also of an angle that is measured twice."""
     stated = _unit(export, _ANGLES)
     unit = foreign_unit(stated or "deg")
     if unit is None or unit.quantity != "angle":
@@ -213,19 +249,7 @@ def _cells(
             faults.add(
                 name, line, "angle", "the angle is that of the row before; remove the copy, or export again"
             )
-    sense = _sense(name, circle, turns, at, faults)
-    first_axis, second_axis = (
-        [repr(round(middle + radius * part(turn), _DIGITS)) for turn in turns]
-        for middle, part in zip(how.centre, (math.cos, math.sin), strict=True)
-    )
-    return {
-        "angle": [repr(round(math.degrees(turn), _DIGITS)) for turn in turns],
-        "deviation": deviations,
-        "sense": [sense] * len(turns),
-        how.axes[0]: first_axis,
-        how.axes[1]: second_axis,
-        "time": _times(circle, turns, radius, clock),
-    }
+    return turns
 
 
 def _column(
@@ -252,44 +276,46 @@ def _unit(export: Export, names: Sequence[str]) -> str | None:
 def _radius(name: str, circle: _Circle, how: BallBarSettings, faults: Faults) -> float | None:
     """Return the radius in mm as the file states it, with its unit; the mapping's must be the same."""
     text = circle.value("radius")
-    if text is None:
-        if how.radius is None:
-            faults.add(
-                name,
-                circle.line_of("radius"),
-                "radius",
-                "nothing states the radius; write radius_mm = 100.0 in the mapping",
+    wrong = None
+    radius = how.radius
+    if text is None and radius is None:
+        wrong = "nothing states the radius; write radius_mm = 100.0 in the mapping"
+    elif text is not None:
+        number, unit = _length(circle, text)
+        if number is None:
+            wrong = f"{quoted(text)} is no radius; write for example Radius: 100.0 mm"
+        elif unit is None and radius is None:
+            wrong = (
+                f"nothing states the unit of the radius {quoted(text)}; write radius_mm = {text} if it is mm"
             )
-        return how.radius
+        else:
+            read_radius = number * (1.0 if unit is None else unit)
+            radius = radius or read_radius
+            if abs(read_radius / radius - 1.0) > _SAME_RADIUS:
+                hint = (
+                    "; the file is in inches" if abs(read_radius * 25.4 / radius - 1.0) < _SAME_RADIUS else ""
+                )
+                wrong = (
+                    f"the file says {read_radius:g} mm, the mapping {radius:g} mm{hint}: correct one of them"
+                )
+    if wrong is not None:
+        faults.add(name, circle.line_of("radius"), "radius", wrong)
+    return None if wrong is not None else radius
+
+
+def _length(circle: _Circle, text: str) -> tuple[float | None, float | None]:
+    """Return the number of a length and how many mm its unit has, behind the number or in the key; None without."""
     match = _QUANTITY.fullmatch(text)
+    if match is None:
+        return None, None
     key = next(key for key, _ in circle.facts if _plain(key) in _KEYS["radius"])
     bracket = re.search(r"[\[(](.*?)[\])]", key)
-    unit = foreign_unit((match[2] if match and match[2] else bracket[1] if bracket else "") or "")
-    number = None if match is None else decimal_of(match[1].replace(",", "."))
-    if number is None:
-        faults.add(
-            name,
-            circle.line_of("radius"),
-            "radius",
-            f"{quoted(text)} is no radius; write for example Radius: 100.0 mm",
-        )
-        return None
-    if unit is None and how.radius is None:
-        faults.add(
-            name, circle.line_of("radius"), "radius",
-            f"nothing states the unit of the radius {quoted(text)}; write radius_mm = {text} if it is mm",
-        )  # fmt: skip
-        return None
-    radius = float(number) * (1.0 if unit is None or unit.quantity != "length" else float(unit.factor))
-    if how.radius is not None and abs(radius / how.radius - 1.0) > 1e-3:
-        inches = abs(radius * 25.4 / how.radius - 1.0) < 1e-3
-        hint = "; the file is in inches" if inches else ""
-        faults.add(
-            name, circle.line_of("radius"), "radius",
-            f"the file says {radius:g} mm, the mapping {how.radius:g} mm{hint}: correct radius_mm, or export in mm",
-        )  # fmt: skip
-        return None
-    return how.radius or radius
+    unit = foreign_unit(match[2] or (bracket[1] if bracket else ""))
+    number = decimal_of(match[1].replace(",", "."))
+    is_length = unit is not None and unit.quantity == "length"
+    return None if number is None or not number else float(number), float(
+        unit.factor
+    ) if is_length and unit else None
 
 
 def _sense(name: str, circle: _Circle, turns: Sequence[float], at: Sequence[int], faults: Faults) -> str:

@@ -72,19 +72,14 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
         _complete(part, file.name, faults)
     if len(faults) > before:
         return None
-    return _points(part, file.name, decoded[1], faults) or _table(part, decoded[1])
+    points = _points(part, file.name, decoded[1], faults)
+    return None if len(faults) > before else points or _table(part, decoded[1])
 
 
 def _line(part: _Part, line: str, number: int) -> str | None:
     """Read one line; what is wrong with it."""
     if not line.startswith("K"):
-        for index, value in enumerate(line.split("\x0f"), start=1):
-            if index > _MOST:
-                return "the line has more characteristics than any part"
-            fault = part.add(index, value.split("\x14"), number)
-            if fault is not None:
-                return fault
-        return None
+        return _values(part, line, number)
     match = _FIELD.fullmatch(line)
     if match is None:
         return f"{quoted(line.strip())} is no K-field; write for example K2002/1 P1.X"
@@ -100,6 +95,17 @@ def _line(part: _Part, line: str, number: int) -> str | None:
     elif key.startswith("1") and value:
         part.facts.append((f"K{key}", value))
     part.fields[key, which] = (value, number)
+    return None
+
+
+def _values(part: _Part, line: str, number: int) -> str | None:
+    """Read a line of values, one a characteristic; what is wrong with it."""
+    for index, value in enumerate(line.split("\x0f"), start=1):
+        if index > _MOST:
+            return "the line has more characteristics than any part"
+        fault = part.add(index, value.split("\x14"), number)
+        if fault is not None:
+            return fault
     return None
 
 
@@ -135,40 +141,43 @@ def _complete(part: _Part, name: str, faults: Faults) -> None:
         )  # fmt: skip
 
 
-def _points(part: _Part, name: str, layout: str, faults: Faults) -> Export | None:
-    """Return the rows of points where every characteristic with values is a coordinate of one; None otherwise."""
-    places: dict[str, dict[str, int]] = {}
+def _coordinates(part: _Part) -> dict[str, dict[str, int]] | None:
+    """Return the characteristics of the points by target and letter; None where one is no coordinate of a point."""
+    points: dict[str, dict[str, int]] = {}
     for number in sorted(part.values):
         match = _COORDINATE.fullmatch(part.text(_NAME, number) or "")
-        if match is None or match[2].lower() in places.get(match[1], {}):
+        if match is None or match[2].lower() in points.get(match[1], {}):
             return None
-        places.setdefault(match[1], {})[match[2].lower()] = number
-    letters = [letter for letter in "xyz" if all(letter in place for place in places.values())]
-    if any(len(place) != len(letters) for place in places.values()):
+        points.setdefault(match[1], {})[match[2].lower()] = number
+    letters = set(next(iter(points.values())))
+    return points if all(set(numbers) == letters for numbers in points.values()) else None
+
+
+def _points(part: _Part, name: str, layout: str, faults: Faults) -> Export | None:
+    """Return the rows of points where every characteristic with values is a coordinate of one; None otherwise."""
+    points = _coordinates(part)
+    if points is None:
         return None
-    units = {part.text(_UNIT, number) for place in places.values() for number in place.values()}
+    units = {part.text(_UNIT, number) for number in part.values}
     if len(units) > 1:
-        shown = ", ".join(sorted(str(unit) for unit in units))
+        shown = ", ".join(sorted(map(str, units)))
         faults.add(
             name, None, "K2142", f"the coordinates are in different units ({shown}); export them in one"
         )
         return None
-    count = len(next(iter(part.values.values())))
-    columns: dict[str, list[str]] = {"target": [], **{letter: [] for letter in letters}}
-    columns |= {f"nominal_{letter}": [] for letter in letters}
+    columns: dict[str, list[str]] = {}
     lines: list[int] = []
-    for visit in range(count):
-        for target, place in places.items():
-            columns["target"].append(target)
-            for letter in letters:
-                columns[letter].append(part.values[place[letter]][visit][0])
-                columns[f"nominal_{letter}"].append(
-                    (part.text(_NOMINAL, place[letter]) or "").replace(",", ".")
-                )
-            lines.append(part.values[place[letters[0]]][visit][1])
+    for visit in range(len(next(iter(part.values.values())))):
+        for target, numbers in points.items():
+            columns.setdefault("target", []).append(target)
+            for letter, number in sorted(numbers.items()):
+                nominal = (part.text(_NOMINAL, number) or "").replace(",", ".")
+                columns.setdefault(letter, []).append(part.values[number][visit][0])
+                columns.setdefault(f"nominal_{letter}", []).append(nominal)
+            lines.append(part.values[min(numbers.values())][visit][1])
     columns = {key: cells for key, cells in columns.items() if any(cells)}
     unit = next(iter(units)) or ""
-    stated = dict.fromkeys((key for key in columns if key != "target"), unit) if foreign_unit(unit) else {}
+    stated = dict.fromkeys(columns.keys() - {"target"}, unit) if foreign_unit(unit) else {}
     return Export(columns, stated, lines, layout, tuple(part.facts), part.started)
 
 

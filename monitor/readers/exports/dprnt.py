@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from monitor.readers.export import Export, ExportFile, ExportFormat
@@ -21,7 +22,7 @@ _WORD = re.compile(
 )
 _ROW = re.compile(rf"(?:{_WORD.pattern}[\s,;*]*)+")
 #: A line that begins as a row does; where it is none it is damaged.
-_BEGINS = re.compile(r"[A-Z]{1,2}\s*=?\s*[+-]?\.?[0-9]")
+_BEGINS = re.compile(r"[A-Z]{1,2}\s*=?\s*[+-]?[0-9]*\.[0-9]")
 _UNITS = {"G20": "inch", "INCH": "inch", "G70": "inch", "G21": "mm", "MM": "mm", "G71": "mm", "METRIC": "mm"}
 _UNIT = re.compile(r"\b(G20|G21|G70|G71|INCH|MM|METRIC)\b")
 _LENGTHS = frozenset("XYZUVWIJKDR")
@@ -33,20 +34,20 @@ _DATE = re.compile(r"\b(?:DATE|DATUM)\b[\s:=]*(.+)", re.IGNORECASE)
 class WordSettings:
     """The letters that a line must have to be a row; those of most lines where the mapping names none."""
 
-    words: tuple[str, ...] = ()
+    letters: tuple[str, ...] = ()
 
 
 def settings(table: Table) -> WordSettings:
     """Read the key of a log: ``words = ["X", "Y", "Z"]``."""
-    words = table.raw("words", required=False, example='["X", "Y", "Z"]')
-    if words is None:
+    letters = table.raw("words", required=False, example='["X", "Y", "Z"]')
+    if letters is None:
         return WordSettings()
-    if not isinstance(words, list) or not words or not all(isinstance(word, str) for word in words):
+    if not isinstance(letters, list) or not letters or not all(isinstance(word, str) for word in letters):
         table.fault(
-            "words", f'{quoted(words)} is no list of letters; write for example words = ["X", "Y", "Z"]'
+            "words", f'{quoted(letters)} is no list of letters; write for example words = ["X", "Y", "Z"]'
         )
         return WordSettings()
-    return WordSettings(tuple(word.upper() for word in words))
+    return WordSettings(tuple(word.upper() for word in letters))
 
 
 def read(file: ExportFile, how: WordSettings, faults: Faults) -> Export | None:
@@ -66,8 +67,8 @@ def read(file: ExportFile, how: WordSettings, faults: Faults) -> Export | None:
             units.setdefault(_UNITS[name], number)
         body = _UNIT.sub("", text.upper()).strip()
         if _ROW.fullmatch(body):
-            words = _WORD.findall(body)
-            if len({letter for letter, _ in words}) < len(words):
+            pairs = _WORD.findall(body)
+            if len({letter for letter, _ in pairs}) < len(pairs):
                 faults.add(
                     file.name,
                     number,
@@ -75,9 +76,9 @@ def read(file: ExportFile, how: WordSettings, faults: Faults) -> Export | None:
                     f"{quoted(text)} has a letter twice; print each value under its own",
                 )
                 return None
-            rows.append((number, dict(words)))
+            rows.append((number, dict(pairs)))
             continue
-        if rows and _BEGINS.match(body):
+        if _BEGINS.match(body):
             faults.add(
                 file.name, number, None, f"{quoted(text)} is damaged: a row has a number behind every letter"
             )
@@ -113,15 +114,15 @@ def _export(
             "no line has letters with numbers, such as X123.4567 Y-12.0; is it that log?",
         )
         return None
-    letters = how.words or Counter(tuple(words) for _, words in rows).most_common(1)[0][0]
-    taken = [(number, words) for number, words in rows if set(letters) <= set(words)]
-    others = [(number, words) for number, words in rows if not set(letters) <= set(words)]
-    if others and not how.words:
-        number, words = others[0]
+    letters = how.letters or Counter(tuple(row) for _, row in rows).most_common(1)[0][0]
+    taken = [(number, row) for number, row in rows if set(letters) <= set(row)]
+    others = [(number, row) for number, row in rows if not set(letters) <= set(row)]
+    if others and not how.letters:
+        number, row = others[0]
         faults.add(
             name, number, None,
-            f"the line has {one_of(words)} where others have {one_of(letters)}; the log is cut here, or say in the "
-            f"mapping which lines are rows: words = [{', '.join(repr(letter) for letter in letters)}]",
+            f"the line has {one_of(row)} where others have {one_of(letters)}; the log is cut here, or say in the "
+            f"mapping which lines are rows: words = {list(letters)}",
         )  # fmt: skip
         return None
     if not taken:
@@ -132,12 +133,16 @@ def _export(
             f"no line has all of {one_of(letters)}; the first has {one_of(rows[0][1])}",
         )
         return None
-    columns = {letter: [words[letter] for _, words in taken] for letter in letters}
-    stated = {letter: "deg" for letter in letters if letter in _ANGLES}
-    if unit is not None:
-        stated |= {letter: unit for letter in letters if letter in _LENGTHS}
+    columns = {letter: [row[letter] for _, row in taken] for letter in letters}
     notes = (f"{len(others)} lines without {one_of(letters)} were passed over",) if others else ()
-    return Export(columns, stated, [number for number, _ in taken], layout, tuple(facts), started, notes)
+    lines = [number for number, _ in taken]
+    return Export(columns, _units_of(letters, unit), lines, layout, tuple(facts), started, notes)
+
+
+def _units_of(letters: Sequence[str], unit: str | None) -> dict[str, str]:
+    """Return the unit of each letter: degrees, or the unit of lengths that the log states."""
+    stated = dict.fromkeys(_ANGLES & set(letters), "deg")
+    return stated if unit is None else stated | dict.fromkeys(_LENGTHS & set(letters), unit)
 
 
 EXPORT = ExportFormat(

@@ -132,6 +132,11 @@ def _complete(parser: _Parser, name: str, faults: Faults) -> None:
                 key,
                 f"{stated[0]} {what} are announced and {count} are there; export the file again",
             )
+    _visited(parser, name, faults)
+
+
+def _visited(parser: _Parser, name: str, faults: Faults) -> None:
+    """Refuse targets that there are not, that a run passes a third time, and those that it lacks."""
     visits: dict[tuple[int, int], int] = {}
     for run, number, _, line in parser.rows:
         if not 1 <= number <= len(parser.targets):

@@ -21,6 +21,7 @@ _END = re.compile(r"\s*(end of measuring log|ende (des )?messprotokolls?)\b.*", 
 _DIMENSION = re.compile(r"\s*(?:type of dimension|ma(?:ss|ß)art)\b.*?\)?\s*:\s*([01])\s*", re.IGNORECASE)
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]*)?")
 _PAIR = re.compile(r"\s*([^:]+?)\s*:\s*(.*?)\s*")
+_DATES = ("date", "datum", "time", "uhrzeit")
 _ANGLE = re.compile(r"angle|winkel", re.IGNORECASE)
 
 
@@ -34,6 +35,30 @@ class _Record:
     texts: dict[str, str] = field(default_factory=dict)
     unit: str | None = None
     ended: bool = False
+    heading: str = ""
+    waiting: str = ""
+
+    def read(self, text: str) -> None:
+        """Read one line: a heading, a key with its value, or the value of the key above."""
+        dimension = _DIMENSION.fullmatch(text)
+        pair = _PAIR.fullmatch(text)
+        if dimension is not None:
+            self.unit = ("mm", "inch")[int(dimension[1])]
+        elif self.waiting and _NUMBER.fullmatch(text):
+            # The value may stand on the line below its key.
+            self._note(self.waiting, text)
+            self.waiting = ""
+        elif pair is not None and not pair[2]:
+            self.heading, self.waiting = self.waiting or self.heading, pair[1]
+        elif pair is not None:
+            self.heading, self.waiting = self.waiting or self.heading, ""
+            if _NUMBER.fullmatch(pair[2]):
+                self._note(pair[1], pair[2])
+            else:
+                self.texts[pair[1]] = pair[2]
+
+    def _note(self, key: str, number: str) -> None:
+        self.cells[f"{self.heading}/{key}" if self.heading else key] = number
 
 
 def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
@@ -54,52 +79,26 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
         return None
     if not _sound(file.name, records, faults):
         return None
-    names = list(records[0].cells)
-    columns = {name: [record.cells[name].replace(",", ".") for record in records] for name in names}
-    unit = records[0].unit
-    units = {
-        name: "deg" if _ANGLE.search(name) else unit
-        for name in names
-        if unit is not None or _ANGLE.search(name)
-    }
     first = records[0]
-    date = " ".join(
-        value for key, value in first.texts.items() if key.casefold() in ("date", "datum", "time", "uhrzeit")
-    )
-    facts = (("protocol", first.title), *((key, value) for key, value in first.texts.items() if value))
-    stated = {name: text for name, text in units.items() if text is not None}
-    return Export(columns, stated, [record.line for record in records], decoded[1], facts, date or None)
+    columns = {name: [record.cells[name].replace(",", ".") for record in records] for name in first.cells}
+    stated = {name: "deg" if _ANGLE.search(name) else first.unit or "" for name in columns}
+    date = " ".join(value for key, value in first.texts.items() if key.casefold() in _DATES)
+    return Export(
+        columns, {name: unit for name, unit in stated.items() if unit}, [record.line for record in records],
+        decoded[1], (("protocol", first.title), *first.texts.items()), date or None,
+    )  # fmt: skip
 
 
 def _records(lines: list[str]) -> list[_Record]:
     records: list[_Record] = []
-    heading, waiting = "", ""
     for number, line in enumerate(lines, start=1):
         text = line.strip()
-        if _END.fullmatch(text):
-            if records:
-                records[-1].ended = True
-        elif _BEGIN.fullmatch(text):
+        if _BEGIN.fullmatch(text):
             records.append(_Record(text, number))
-            heading = waiting = ""
+        elif records and _END.fullmatch(text):
+            records[-1].ended = True
         elif records and text:
-            record = records[-1]
-            dimension = _DIMENSION.fullmatch(text)
-            pair = _PAIR.fullmatch(text)
-            if dimension is not None:
-                record.unit = ("mm", "inch")[int(dimension[1])]
-            elif waiting and _NUMBER.fullmatch(text):
-                # The value may stand on the line below its key.
-                record.cells[f"{heading}/{waiting}" if heading else waiting] = text
-                waiting = ""
-            elif pair is not None and not pair[2]:
-                heading, waiting = (waiting or heading) if waiting else heading, pair[1]
-            elif pair is not None:
-                heading, waiting = waiting or heading, ""
-                if _NUMBER.fullmatch(pair[2]):
-                    record.cells[f"{heading}/{pair[1]}" if heading else pair[1]] = pair[2]
-                else:
-                    record.texts[pair[1]] = pair[2]
+            records[-1].read(text)
     return records
 
 

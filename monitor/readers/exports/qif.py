@@ -9,7 +9,9 @@ The document is read by lxml without document types, entities or network, and no
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from monitor.readers.export import Export, ExportFile, ExportFormat
@@ -20,45 +22,36 @@ from monitor.readers.foreign_units import decimal_of, foreign_unit
 LARGEST_XML = 16 * 1024**2
 _NAMESPACE = "qifstandards.org"
 _LETTERS = "xyz"
+_FACTS = ("Author", "Organization", "ApplicationName")
+
+
+@dataclass(frozen=True)
+class _Document:
+    """A document: its root, the unit of its lengths, and the items and nominals of features by their numbers."""
+
+    root: Any
+    unit: str | None
+    items: Mapping[str, Any]
+    nominals: Mapping[str, Any]
 
 
 def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
-    """Read the measured features that have a place; None with the faults noted."""
+    """Read the measured features that have a location; None with the faults noted."""
     root = _root(file, faults)
     if root is None:
         return None
     before = len(faults)
-    unit = _unit(file.name, root, faults)
-    items = {node.get("id"): node for node in _ending(root, "FeatureItem")}
-    nominals = {node.get("id"): node for node in _ending(root, "FeatureNominal")}
+    items, nominals = (
+        {node.get("id"): node for node in _ending(root, name)} for name in ("FeatureItem", "FeatureNominal")
+    )
+    document = _Document(root, _unit(file.name, root, faults), items, nominals)
     rows: list[dict[str, str]] = []
     lines: list[int] = []
-    names: dict[str, int] = {}
     for node in _ending(root, "FeatureMeasurement"):
-        place = _child(node, "Location")
-        if place is None:
-            continue
-        item = items.get(_text(node, "FeatureItemId"))
-        nominal = None if item is None else nominals.get(_text(item, "FeatureNominalId"))
-        label = (
-            _text(item, "FeatureName") if item is not None else ""
-        ) or f"feature {node.get('id') or len(rows) + 1}"
-        row = {"target": label, **_numbers(file.name, place, "", label, faults)}
-        if nominal is not None and (wanted := _child(nominal, "Location")) is not None:
-            row |= _numbers(file.name, wanted, "nominal_", label, faults)
-        if diameter := _text(node, "Diameter"):
-            row["diameter"] = diameter
-        other = place.get("linearUnit")
-        if other is not None and foreign_unit(other) != foreign_unit(unit or ""):
-            faults.add(
-                file.name,
-                place.sourceline,
-                label,
-                f"the place is in {quoted(other)}, the document in {unit}; export in one unit",
-            )
-        names[label] = names.get(label, 0) + 1
-        rows.append(row)
-        lines.append(int(place.sourceline or 0))
+        row = _row(file.name, document, node, faults)
+        if row is not None:
+            rows.append(row)
+            lines.append(int(node.sourceline or 0))
         if len(faults) > before + 20:
             return None
     if not rows:
@@ -66,21 +59,42 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
             file.name,
             None,
             None,
-            "the document has no measured feature with a place; export results, not the plan",
+            "the document has no measured feature with a location; export results, not the plan",
         )
-    if len(faults) > before:
+    return None if len(faults) > before else _export(document, rows, lines)
+
+
+def _row(name: str, document: _Document, node: Any, faults: Faults) -> dict[str, str] | None:
+    """Return the cells of a measured feature; None where it has no location."""
+    location = _child(node, "Location")
+    if location is None:
         return None
+    feature = document.items.get(_text(node, "FeatureItemId"))
+    label = _text(feature, "FeatureName") or f"feature {node.get('id') or node.sourceline}"
+    row = {"target": label, **_numbers(name, location, "", label, faults)}
+    wanted = _child(document.nominals.get(_text(feature, "FeatureNominalId")), "Location")
+    if wanted is not None:
+        row |= _numbers(name, wanted, "nominal_", label, faults)
+    if diameter := _text(node, "Diameter"):
+        row["diameter"] = diameter
+    other = location.get("linearUnit")
+    if other is not None and foreign_unit(other) != foreign_unit(document.unit or ""):
+        faults.add(
+            name, location.sourceline, label,
+            f"the location is in {quoted(other)}, the document in {document.unit}; export in one unit",
+        )  # fmt: skip
+    return row
+
+
+def _export(document: _Document, rows: list[dict[str, str]], lines: list[int]) -> Export:
     keys = [key for key in rows[0] if all(key in row for row in rows)]
     columns = {key: [row[key] for row in rows] for key in keys}
-    units = {key: unit for key in keys if key != "target"} if unit is not None else {}
-    facts = tuple(
-        (name, text) for name in ("Author", "Organization", "ApplicationName") if (text := _first(root, name))
-    )
-    again = [label for label, count in names.items() if count > 1]
-    notes = (f"{quoted(again[0])} is measured {names[again[0]]} times",) if again else ()
-    return Export(
-        columns, units, lines, "XML, QIF " + (root.get("versionQIF") or "3"), facts, _started(root), notes
-    )
+    units = {} if document.unit is None else dict.fromkeys(set(keys) - {"target"}, document.unit)
+    label, count = Counter(columns["target"]).most_common(1)[0]
+    notes = (f"{quoted(label)} is measured {count} times",) if count > 1 else ()
+    facts = [(name, text) for name in _FACTS if (text := _first(document.root, name))]
+    layout = f"XML, QIF {document.root.get('versionQIF') or '3'}"
+    return Export(columns, units, lines, layout, tuple(facts), _started(document.root), notes)
 
 
 def _root(file: ExportFile, faults: Faults) -> Any:
@@ -179,6 +193,8 @@ def _first(root: Any, name: str) -> str | None:
 
 
 def _child(node: Any, name: str) -> Any:
+    if node is None:
+        return None
     return next((child for child in node if _local(child) == name), None)
 
 
