@@ -8,6 +8,7 @@ from datetime import datetime
 
 import numpy as np
 
+from monitor.reporting.frames import referred
 from monitor.reporting.health.records import (
     Change,
     ChangeKind,
@@ -20,6 +21,7 @@ from monitor.reporting.health.records import (
 from monitor.reporting.health.words import in_words
 from monitor.reporting.lacks import Undecided
 from monitor.reporting.symbols import describe
+from monitor.reporting.texts import texts_of
 from monitor.statistics import Change as FoundChange
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
@@ -60,7 +62,7 @@ def parameter_health(
     estimate, u, expanded = _stated(series, stated)
     return ParameterHealth(
         name=name,
-        description=describe(name),
+        description=referred(describe(name), (stated.frames or {}).get(name), texts_of()),
         unit=series.unit,
         estimate=estimate,
         u=u,
