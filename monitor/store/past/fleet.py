@@ -145,7 +145,8 @@ def _summed(
     """First day, columns of all cells and of their blocks, by way of tables that live as long as the connection."""
     for statement in (queries.MACHINES, queries.HEADINGS, queries.MODELS, queries.OWN):
         db.execute(statement)
-    db.execute(queries.CHOSEN, {"model": model, "version": version})
+    db.set_variables({"model": model, "version": version})
+    db.execute(queries.CHOSEN)
     ((epoch_d,),) = db.rows("SELECT min(began_d) FROM fleet_chosen")
     if epoch_d is None:
         under = "" if model is None else f" with model {model}"
@@ -160,8 +161,9 @@ def _summed(
         db.execute(statement)
     for statement in (queries.GROUPS, queries.SINCE, queries.ENDED, queries.LATEST, queries.ORIGINS):
         db.execute(statement)
-    db.execute(queries.BLOCKS, {"whole": cut.whole, "each": cut.each, "most": cut.most})
-    db.execute(queries.PARTS, {"epoch_d": epoch_d})
+    db.set_variables({"whole": cut.whole, "each": cut.each, "most": cut.most, "epoch_d": epoch_d})
+    db.execute(queries.BLOCKS)
+    db.execute(queries.PARTS)
     columns, of_blocks = (
         {name: np.ma.getdata(column) for name, column in db.arrays(query).items()}
         for query in (queries.TOGETHER, queries.OF_BLOCKS)

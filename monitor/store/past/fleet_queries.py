@@ -1,6 +1,6 @@
 """The queries of the sums over the fleet, each a table that the next ones read: groups of runs, blocks of these, sums.
 
-``fleet.py`` says what is summed and why so.
+``fleet.py`` says what is summed and why so, and sets the variables: a statement that makes a table cannot be prepared.
 """
 
 from __future__ import annotations
@@ -47,11 +47,12 @@ WITH latest AS (
     FROM identification
     LEFT JOIN fleet_model AS f USING (campaign_id, method)
     LEFT JOIN fleet_own AS o ON o.model = identification.method
-    WHERE CASE WHEN $model IS NULL
+    WHERE CASE WHEN getvariable('model') IS NULL
           -- That which the machine is followed by, else the latest version of the method's own.
           THEN identification.model = coalesce(f.model, identification.method)
                AND identification.model_version = coalesce(f.model_version, o.version, identification.model_version)
-          ELSE identification.model = $model AND ($version IS NULL OR identification.model_version = $version) END
+          ELSE identification.model = getvariable('model')
+               AND (getvariable('version') IS NULL OR identification.model_version = getvariable('version')) END
     GROUP BY campaign_id
 ), span AS (
     SELECT campaign_id, min(day) <> max(day) AS several_days, epoch(min(started_at)) / 86400.0 AS began_d
@@ -171,7 +172,8 @@ WITH span AS (
     FROM fleet_group GROUP BY machine_no
 ), cut AS (
     SELECT machine_no, first_d, greatest(last_d - first_d, 1e-300) AS span_d,
-           CASE WHEN k <= $whole THEN k ELSE least(greatest(k // $each, $whole), $most) END AS blocks
+           CASE WHEN k <= getvariable('whole') THEN k
+           ELSE least(greatest(k // getvariable('each'), getvariable('whole')), getvariable('most')) END AS blocks
     FROM span
 )
 SELECT g.*, CAST(least(floor((began_d - first_d) / span_d * blocks), blocks - 1) AS UTINYINT) AS block
@@ -233,7 +235,8 @@ SELECT cb, n, count(*) AS k, sum(v) AS v, min(v) AS least, sum(ln(CASE WHEN v > 
 FROM (
     SELECT cb, t, g, list_count(d) AS n, list_avg(d) AS m, list_var_pop(d) AS v
     FROM (
-        SELECT cb, began_d - $epoch_d AS t, degc - 20.0 AS g, list_transform(x, lambda value: value - origin) AS d
+        SELECT cb, began_d - getvariable('epoch_d') AS t, degc - 20.0 AS g,
+               list_transform(x, lambda value: value - origin) AS d
         FROM ({LISTS.format(groups="fleet_blocked")}) JOIN fleet_origin USING (cell)
     )
 )
