@@ -154,6 +154,26 @@ def test_the_tables_say_it_in_every_row(
     assert said == {symbol: expected(symbol, topology) for symbol in said}
 
 
+def test_the_weekly_report_says_it_in_every_row(
+    identified_examples: Path, tmp_path: Path, pdf_unread
+) -> None:
+    asked = ["--db", str(identified_examples), "report", "--week", "2026-W11", "--machine", "HU40-T"]
+    with pdf_unread():
+        assert main([*asked, "--out", str(tmp_path)]) == 0
+    (page,) = tmp_path.glob("*.html")
+    cells = re.findall(
+        r"<td><strong>(E\w+)</strong></td>\s*<td>([^<]*)", page.read_text(encoding="utf-8"), re.DOTALL
+    )
+    topology = read_campaign(EXAMPLES / "five-days").machine.topology
+    for symbol, words in cells:
+        said = expected(symbol, topology)
+        assert said is not None
+        said = "machine frame" if said == "machine" else said
+        ends = "in the axis&#39;s own frame" if said.endswith("itself") else said
+        assert words.strip().replace("'", "&#39;").endswith(ends), (symbol, words)
+    assert len(cells) == 13
+
+
 def test_limits_say_it(tmp_path: Path) -> None:
     folder = tmp_path / "five-days"
     shutil.copytree(EXAMPLES / "five-days", folder)

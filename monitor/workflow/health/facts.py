@@ -9,6 +9,7 @@ from datetime import datetime
 import numpy as np
 
 from monitor.documents import Said
+from monitor.reporting.frames import referred
 from monitor.reporting.health.records import (
     Change,
     ChangeKind,
@@ -27,6 +28,7 @@ from monitor.reporting.health.sentences import (
 )
 from monitor.reporting.lacks import Undecided
 from monitor.reporting.symbols import describe
+from monitor.reporting.texts import texts_of
 from monitor.store import Database, MachineEvent, RecordedRun, campaign_notes, probing_counts
 from monitor.units import COLUMN_UNITS
 from monitor.workflow.explain.explain_answer import ChangedParameter, MachineExplanation
@@ -66,7 +68,7 @@ def parameter_health(
     estimate, u, expanded = _stated(series, stated)
     return ParameterHealth(
         name=name,
-        description=describe(name),
+        description=referred(describe(name), (stated.frames or {}).get(name), texts_of()),
         unit=series.unit,
         estimate=estimate,
         u=u,
