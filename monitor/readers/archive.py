@@ -21,6 +21,8 @@ LONGEST_NAME = 200
 _CHUNK = 2**20
 #: The files that make a folder a campaign: its own, or the mapping of what instruments wrote.
 CAMPAIGN_FILES = ("campaign.toml", "mapping.toml")
+#: How the names of workbooks end.
+WORKBOOK = ".xlsx"
 
 
 @dataclass(frozen=True)
@@ -40,14 +42,22 @@ def unpack(files: Sequence[UploadedFile], folder: Path) -> tuple[Path, ...]:
         raise InputError("choose the folder of a campaign, its files, or a zip of it")
     room = _Room(folder)
     for file in files:
-        if zipfile.is_zipfile(file.content):
+        # A workbook of Excel is a zip too, of files that are nothing by themselves.
+        if zipfile.is_zipfile(file.content) and not file.name.lower().endswith(WORKBOOK):
             file.content.seek(0)
             _unpack_zip(file, room)
         else:
             file.content.seek(0)
+            if file.name.lower().endswith(".zip"):
+                raise InputError(f"{file.name} is no zip that can be read; pack the folder again")
             room.write(_safe_path(file.name), file.content)
     campaigns = tuple(sorted({path.parent for name in CAMPAIGN_FILES for path in folder.rglob(name)}))
     if not campaigns:
+        if any(file.name.lower().endswith(WORKBOOK) for file in files):
+            raise InputError(
+                f"a workbook of Excel holds the tables of a campaign, and {CAMPAIGN_FILES[0]} says of which machine "
+                "and method they are: choose both files together (docs/campaign-format.md)"
+            )
         raise InputError(
             f"no folder of the upload has a {CAMPAIGN_FILES[0]} or a {CAMPAIGN_FILES[1]}; choose the folder of a "
             "campaign or a zip of it "

@@ -28,7 +28,7 @@ _COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
 _POINT = re.compile(r"[+-]?[0-9]*\.[0-9]+([eE][+-]?[0-9]+)?")
 _TRUTHS = {"WAHR": "true", "FALSCH": "false", "TRUE": "true", "FALSE": "false"}
 #: Unpacked, a workbook of a million rows has some 200 MiB; what is larger is an attack on memory.
-LARGEST_UNPACKED = 512 * 2**20
+UNPACKED_BYTES = 512 * 2**20
 #: Columns of true and false.
 _OF_TRUTHS = ("warm_up",)
 
@@ -128,14 +128,11 @@ def sheet_rows(
         )  # fmt: skip
         return None
     try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            unpacked = sum(member.file_size for member in archive.infolist())
-        if unpacked > LARGEST_UNPACKED:
+        with zipfile.ZipFile(io.BytesIO(content)) as packed:
+            unpacked = sum(member.file_size for member in packed.infolist())
+        if unpacked > UNPACKED_BYTES:
             faults.add(
-                file,
-                None,
-                None,
-                f"the workbook unpacks to more than {LARGEST_UNPACKED // 2**20} MiB; split it",
+                file, None, None, f"the workbook unpacks to more than {UNPACKED_BYTES // 2**20} MiB; split it"
             )
             return None
         with warnings.catch_warnings():

@@ -62,11 +62,12 @@ def save_analysis(
     *,
     method: str,
     seed: int | None = None,
+    action: str = "save",
     **subject: Unpack[Subject],
 ) -> int:
     """Store a result; its number, below zero where the database keeps none (a lake).
 
-    ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend.
+    ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend. ``action`` stands in the audit.
 
     Raises DataError for a document that is not JSON (NaN and infinities included), NotFoundError for a
     campaign or machine that is not there.
@@ -102,7 +103,7 @@ def save_analysis(
                 utc_now(),
             ],
         )
-        audit.record(db, "save", "analysis", str(number), analysis_content(db, number))
+        audit.record(db, action, "analysis", str(number), analysis_content(db, number))
     return number
 
 
@@ -164,17 +165,20 @@ def stored_analyses(
     return tuple(_stored(row) for row in rows)
 
 
-def latest_maps(db: Database) -> dict[str, float]:
-    """By machine, the worst volumetric error in µm of the map of its latest mapped run, partial maps among them."""
+def latest_maps(db: Database, machine: str | None = None) -> dict[str, float]:
+    """By machine, the worst volumetric error in µm of the map of its latest mapped run, partial maps among them; of one
+    ``machine`` alone where it is named."""
     rows = db.rows(
         """
         SELECT c.machine, CAST((a.document ->> '$.worst.error_um') AS DOUBLE)
         FROM analysis AS a JOIN campaign AS c USING (campaign_id) JOIN run AS r USING (campaign_id, run)
         WHERE a.kind IN ('volumetric map', 'partial volumetric map') AND c.campaign IS NOT NULL
+              AND ($machine IS NULL OR c.machine = $machine)
         QUALIFY row_number() OVER (PARTITION BY c.machine ORDER BY r.started_at DESC, a.analysis_id DESC) = 1
-        """
+        """,
+        {"machine": machine},
     )
-    return {machine: float(worst) for machine, worst in rows}
+    return {name: float(worst) for name, worst in rows}
 
 
 def _stored(row: tuple[Any, ...]) -> StoredAnalysis:

@@ -47,6 +47,7 @@ NOT_RUN = {
         "command-line.md",
         "$ export MONITOR_SERVER=https://monitor.example MONITOR_SERVER_TOKEN_FILE=~/.config/monitor/token",
     ),
+    ("reliability.md", "$ monitor archive /mnt/archive --before 2024-01-01"),
     ("reliability.md", "$ monitor backup backups/2026-03-01.duckdb"),
     ("scale.md", "$ pip install 'machine-health-monitor[lake]'"),
     ("tutorial.md", "$ make demo"),

@@ -45,16 +45,18 @@ def run(options: Namespace) -> int:
             # Nothing is stored, and no database is left behind either.
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="monitor-"))
             options.db = str(Path(folder) / "dry-run.duckdb")
-        db = stack.enter_context(opened(options))
-        progress = stack.enter_context(output.stepping("importing", len(request.folders)))
-        answer = ask(db, import_folders, request, progress=progress)
+        with (
+            opened(options) as db,
+            output.stepping("importing", len(request.folders)) as progress,
+        ):
+            answer = ask(db, import_folders, request, progress=progress)
     if options.json:
         output.document(answer)
     else:
-        for folder in answer.imported:
-            understood_output.show(folder.understood)
-            output.say(folder.message)
-            for note in folder.notes:
+        for imported in answer.imported:
+            understood_output.show(imported.understood)
+            output.say(imported.message)
+            for note in imported.notes:
                 output.say(f"note: {note}")
     for refused in answer.refused:
         print(f"monitor: {refused.why}", file=sys.stderr)
