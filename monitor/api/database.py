@@ -52,15 +52,24 @@ class Database:
         """Close the file; other processes can open it then."""
         self._store.close()
 
-    def add(self, *folders: str | Path) -> Answer[ImportAnswer]:
-        """Import campaign folders, all or nothing each.
+    def add(
+        self, *folders: str | Path, mapping: str | Path | None = None, **options: Any
+    ) -> Answer[ImportAnswer]:
+        """Import campaign folders, all or nothing each; with a ``mapping`` files of instruments, as one campaign.
+
+        ``campaign="week-12"`` names it; ``dry_run=True`` says what was understood and stores nothing.
 
         Raises CampaignError with every fault of a folder; of several InputError with all that were refused, once the
         others are imported.
         """
         if not folders:
             raise InputError("name a campaign folder or more")
-        answer = self._ask("import", folders=[Path(folder) for folder in folders])
+        answer = self._ask(
+            "import",
+            folders=[Path(folder) for folder in folders],
+            mapping=None if mapping is None else Path(mapping),
+            **options,
+        )
         if answer.refused:
             whys = "\n".join(refused.why for refused in answer.refused)
             imported = ", ".join(folder.campaign for folder in answer.imported) or "none"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import stat
+from contextlib import suppress
 from pathlib import Path
 
 from monitor.bounded import read_bounded
@@ -42,16 +43,26 @@ def _too_large(largest: int) -> str:
     return f"the file is larger than {largest // 1024**2} MiB; split the campaign"
 
 
-def decode(name: str, content: bytes, faults: Faults) -> str | None:
-    """Decode UTF-8 without its byte-order mark; None with a fault that names the line of the bad byte."""
+def decode(name: str, content: bytes, faults: Faults, *, of_spreadsheet: bool = False) -> str | None:
+    """Decode UTF-8 without its byte-order mark; None with a fault that names the line of the bad byte.
+
+    A table ``of_spreadsheet`` whose cells are separated by semicolons or tabs may be Windows-1252, as a German Excel
+    saves "CSV".
+    """
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        faults.add(
-            name, line, None, f"byte 0x{content[error.start]:02x} is not UTF-8; save the file as UTF-8 text"
-        )
-        return None
+        legacy = _windows_text(content) if of_spreadsheet else None
+        if legacy is None:
+            line = content.count(b"\n", 0, error.start) + 1
+            faults.add(
+                name,
+                line,
+                None,
+                f"byte 0x{content[error.start]:02x} is not UTF-8; save the file as UTF-8 text",
+            )
+            return None
+        text = legacy
     text = text.removeprefix("\ufeff")
     if not text.strip():
         faults.add(name, 1, None, "the file is empty")
@@ -61,6 +72,16 @@ def decode(name: str, content: bytes, faults: Faults) -> str | None:
         faults.add(name, line, None, "a NUL character: this is not a text file; save it as UTF-8 text")
         return None
     return text
+
+
+def _windows_text(content: bytes) -> str | None:
+    """Return a table with semicolons or tabs as Windows-1252; None where it is no such table."""
+    header = content.partition(b"\n")[0]
+    if b"," in header or not (b";" in header or b"\t" in header):
+        return None
+    with suppress(UnicodeDecodeError):
+        return content.decode("cp1252")
+    return None
 
 
 def _what_is_there(folder: Path) -> str:

@@ -44,7 +44,11 @@ def read_table(folder: Path, name: str, faults: Faults) -> tuple[SourceFile | No
     content = read_bytes(folder, book or name, LARGEST_CSV, faults)
     if content is None:
         return None, None
-    text = decode(name, content, faults) if book is None else _sheet_text(book, content, stem, faults)
+    text = (
+        decode(name, content, faults, of_spreadsheet=True)
+        if book is None
+        else _sheet_text(book, content, stem, faults)
+    )
     return SourceFile(book or name, content), text
 
 

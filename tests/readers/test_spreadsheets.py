@@ -153,3 +153,22 @@ def test_a_workbook_without_the_sheet_says_what_it_has(tmp_path: Path) -> None:
         CampaignError, match="there is no sheet 'data'; name the sheet of that table so; there are Tabelle1"
     ):
         read_campaign(folder)
+
+
+def test_a_table_in_windows_1252_is_the_same_campaign(tmp_path):
+    folder = tmp_path / "folder"
+    shutil.copytree(EXAMPLES / "tracked-robot", folder)
+    text = (folder / "probings.csv").read_text(encoding="utf-8")
+    rows = list(csv.reader(io.StringIO(text.replace(",R1,", ",Würfel,"))))
+    toml = (folder / "campaign.toml").read_text(encoding="utf-8").replace('"R1"', '"Würfel"')
+    (folder / "campaign.toml").write_text(toml, encoding="utf-8")
+    (folder / "probings.csv").write_bytes(german(rows))
+    utf8 = read_campaign(folder)
+    (folder / "probings.csv").write_bytes(
+        german(rows).removeprefix(b"\xef\xbb\xbf").decode().encode("cp1252")
+    )
+    assert_same(read_campaign(folder), utf8)
+    # With commas between the cells nobody knows what wrote it.
+    (folder / "probings.csv").write_bytes(text.replace("target", "zi\u00e4l", 1).encode("cp1252"))
+    with pytest.raises(CampaignError, match="byte 0xe4 is not UTF-8; save the file as UTF-8 text"):
+        read_campaign(folder)
