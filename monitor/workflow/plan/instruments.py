@@ -11,7 +11,7 @@ from monitor.machine import Joint
 from monitor.methods import InstrumentPlan
 from monitor.methods.method import ExpectedTest, TestForecast
 from monitor.methods.model import chain_of
-from monitor.records import Campaign
+from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.workflow.models import as_model, label
 from monitor.workflow.plan.answer import InstrumentPlanAnswer, TestAnswer, UnseenParameter
@@ -20,6 +20,8 @@ from monitor.workflow.plan.strokes import strokes_of
 
 #: So many tests are listed, and at most proposed.
 LISTED, MOST_TESTS = 12, 12
+#: A rotary axis that turned by less (rad) may turn all around.
+LEAST_TURN = 0.5
 #: Kinds whose bar or sphere stands at a place that the plan chooses.
 PLACED = ("distance", "vector")
 
@@ -80,19 +82,27 @@ def _stands(campaign: Campaign, joint: Joint) -> bool:
 def forecast_of(
     method: InstrumentPlan, campaign: Campaign, model: StoredModel, run: int | None = None
 ) -> tuple[TestForecast, int]:
-    """The forecast of a ``run`` (the last with None), whose number is returned too; axes may move over their strokes, a
-    rotary axis without one all around."""
+    """The forecast of a ``run`` (the last with None), whose number is returned too; axes may move over their strokes."""
     number = int(campaign.probings.run.max()) if run is None else run
     chain = chain_of(campaign.machine)
     positions = np.column_stack([
         joint.sign * campaign.probings.readings[joint.name] for joint in chain.joints
     ])  # fmt: skip
     rotary, linear = strokes_of(campaign, chain, positions)
-    turn = 2.0 * np.pi
     around = {
-        joint.name: (0.0, turn) if joint.sign > 0 else (-turn, 0.0) for joint in chain.joints if joint.turns
+        joint.name: _angles(joint, positions[:, index])
+        for index, joint in enumerate(chain.joints)
+        if joint.turns
     }
     return method.forecast(campaign, as_model(model), number, {**around, **rotary, **linear}), number
+
+
+def _angles(joint: Joint, visited: Array) -> tuple[float, float]:
+    """The angles (rad) that a rotary axis without a stated stroke may take: those between which it went, else all."""
+    low, high = float(visited.min()), float(visited.max())
+    if high - low > LEAST_TURN:
+        return low, high
+    return (0.0, 2.0 * np.pi) if joint.sign > 0 else (-2.0 * np.pi, 0.0)
 
 
 def unseen(
