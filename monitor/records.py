@@ -1,7 +1,6 @@
 """What a calibration campaign is: frozen records in internal units (mm, rad, s, °C).
 
-Readers make them, the store keeps them, the methods read them. Recorded conditions and channels keep the
-unit that their name ends in (``ambient_degC``, ``warm_up_min``).
+Recorded conditions and channels keep the unit that their name ends in (``ambient_degC``, ``warm_up_min``).
 """
 
 from __future__ import annotations
@@ -341,15 +340,16 @@ class Probings:
 
 @dataclass(frozen=True)
 class SourceFile:
-    """One imported file, byte for byte."""
+    """One imported file, byte for byte; of one that was archived only the hash, its ``content`` is empty."""
 
     name: str
     content: bytes
+    archived_sha256: str | None = None
 
     @property
     def sha256(self) -> str:
         """The hash of the content, in hexadecimal digits."""
-        return hashlib.sha256(self.content).hexdigest()
+        return self.archived_sha256 or hashlib.sha256(self.content).hexdigest()
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,8 @@ VERBS = {
     "audit": "who changed what and when",
     "backup": "a second file with everything, checked",
     "restore": "a database from a backup",
+    "archive": "imported files of old campaigns out of the database into a folder",
+    "compact": "the database file written anew without gaps",
     "publish": "what was stored since the last time to a lake of many plants",
     "sql": "a query of your own, which may only read",
     "export": "tables as CSV or Parquet files, or as one workbook of Excel",

@@ -143,9 +143,12 @@ def _table(answer: TrendAnswer) -> None:
     slopes = "; slopes a year" if "slope" in columns else ""
     output.table(
         f"{answer.machine}: {_size(answer)}{slopes}",
-        ["parameter", *(_HEADINGS.get(heading, heading) for heading in columns)],
-        [list(row) for row in zip(answer.parameters, *columns.values(), strict=True)],
-        text_columns=2,
+        ["parameter", "relative to", *(_HEADINGS.get(heading, heading) for heading in columns)],
+        [
+            [name, answer.refers_to.get(name, ""), *cells]
+            for name, *cells in zip(answer.parameters, *columns.values(), strict=True)
+        ],
+        text_columns=3,
     )
 
 

@@ -296,7 +296,9 @@ def _suspected(problem: ChainProblem) -> str:
     if len(problem.runs) > 2 and max(runs_of_target.values(), default=0) > len(problem.runs) / 2:
         return ""
     rows = ", ".join(
-        f"run {reading.run}, sequence {reading.sequence} ({reading.target})" for reading in gross
+        f"run {reading.run}, sequence {reading.sequence} ({reading.target})"
+        + "".join(f" or sequence {other} of that run" for other in reading.others)
+        for reading in gross
     )
     subject = "this reading" if len(gross) == 1 else "these readings"
     return f". First look at {subject}, which the others contradict: {rows}" if gross else ""

@@ -15,12 +15,14 @@ from monitor.store.analyses import (
     save_analysis,
     stored_analyses,
 )
+from monitor.store.archiving import Archived, archive_faults, archive_files, archived_count
 from monitor.store.audit import AuditEntry, anchored_entry, chain_faults, last_anchor, last_entries
 from monitor.store.campaigns import Imported, import_campaign, import_curve, load_campaign
 from monitor.store.catalogue import (
     CampaignRow,
     RunRow,
     WithdrawnCampaign,
+    check_machine,
     described_machines,
     list_campaigns,
     list_runs,
@@ -37,6 +39,7 @@ from monitor.store.certificates import (
 )
 from monitor.store.connection import Database
 from monitor.store.copies.backup import snapshot, take_backup
+from monitor.store.copies.compaction import Compaction, compact
 from monitor.store.copies.export import export_tables
 from monitor.store.copies.increment import take_increment
 from monitor.store.copies.manifest import Backup, list_backups
@@ -80,6 +83,7 @@ from monitor.store.past.machine_runs import (
     campaign_tolerances,
     check_campaigns,
     identified_runs,
+    latest_frames,
     machine_descriptions,
     machine_runs,
     parameter_frames,
@@ -103,10 +107,12 @@ from monitor.store.withdrawals import Withdrawal, withdraw_campaign
 
 __all__ = [
     "NOTE",
+    "Archived",
     "AuditEntry",
     "Backup",
     "BlockCut",
     "CampaignRow",
+    "Compaction",
     "Database",
     "FleetSums",
     "Holder",
@@ -135,6 +141,9 @@ __all__ = [
     "WithdrawnCampaign",
     "analysis_text",
     "anchored_entry",
+    "archive_faults",
+    "archive_files",
+    "archived_count",
     "campaign_machines",
     "campaign_notes",
     "campaign_readings",
@@ -144,8 +153,10 @@ __all__ = [
     "check_analysis",
     "check_campaigns",
     "check_database_name",
+    "check_machine",
     "clear_refusals",
     "column_comments",
+    "compact",
     "curve_names",
     "described_machines",
     "export_tables",
@@ -165,6 +176,7 @@ __all__ = [
     "last_identification",
     "last_used_campaign",
     "latest_documents",
+    "latest_frames",
     "latest_maps",
     "latest_tolerances",
     "list_backups",

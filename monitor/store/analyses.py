@@ -62,11 +62,12 @@ def save_analysis(
     *,
     method: str,
     seed: int | None = None,
+    action: str = "save",
     **subject: Unpack[Subject],
 ) -> int:
     """Store a result; its number, below zero where the database keeps none (a lake).
 
-    ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend.
+    ``kind`` is a word: uncertainty, comparison, explanation, statistics, trend. ``action`` stands in the audit.
 
     Raises DataError for a document that is not JSON (NaN and infinities included), NotFoundError for a
     campaign or machine that is not there.
@@ -102,7 +103,7 @@ def save_analysis(
                 utc_now(),
             ],
         )
-        audit.record(db, "save", "analysis", str(number), analysis_content(db, number))
+        audit.record(db, action, "analysis", str(number), analysis_content(db, number))
     return number
 
 

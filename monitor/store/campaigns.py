@@ -12,8 +12,9 @@ import numpy as np
 
 from monitor import __version__
 from monitor.exceptions import CampaignError, DataError, Fault
-from monitor.records import Campaign, CurveCampaign, Run, SourceFile
+from monitor.records import Campaign, CurveCampaign, Run
 from monitor.store import audit, probings, record_json
+from monitor.store.archiving import source_files
 from monitor.store.bookkeeping import with_bookkeeping
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
@@ -266,9 +267,6 @@ def _load(db: Database, campaign_id: int) -> tuple[Campaign, probings.PrintedPro
         "FROM run WHERE campaign_id = ? ORDER BY position",
         [campaign_id],
     )
-    files = db.rows(
-        "SELECT file, content FROM source_file WHERE campaign_id = ? ORDER BY rowid", [campaign_id]
-    )
     described = record_json.machine_record(machine)
     campaign = Campaign(
         name=name,
@@ -281,7 +279,7 @@ def _load(db: Database, campaign_id: int) -> tuple[Campaign, probings.PrintedPro
             for run, at, offset, day, warm_up, names, values in stored_runs
         ),
         probings=probings.as_record(rows, described),
-        files=tuple(SourceFile(file, content) for file, content in files),
+        files=source_files(db, campaign_id),
         sources=record_json.sources_record(artefact),
     )
     return campaign, rows

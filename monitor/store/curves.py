@@ -9,8 +9,9 @@ import numpy as np
 
 from monitor import __version__
 from monitor.exceptions import DataError
-from monitor.records import CurveCampaign, Instrument, SourceFile
+from monitor.records import CurveCampaign, Instrument
 from monitor.store import audit
+from monitor.store.archiving import source_files
 from monitor.store.catalogue import campaign_number
 from monitor.store.connection import Database, utc_now
 from monitor.store.past.campaign_runs import insert_runs
@@ -92,9 +93,6 @@ def curve_by_number(db: Database, campaign_id: int) -> CurveCampaign:
     )
     values = np.array([row[2] for row in rows], dtype=np.float64).reshape(len(rows), -1)
     labels = [row[4] for row in rows]
-    files = db.rows(
-        "SELECT file, content FROM source_file WHERE campaign_id = ? ORDER BY rowid", [campaign_id]
-    )
     return CurveCampaign(
         name=name,
         method=method,
@@ -109,7 +107,7 @@ def curve_by_number(db: Database, campaign_id: int) -> CurveCampaign:
         time=time,
         lines=np.array([row[0] for row in rows], dtype=np.int64),
         standard_uncertainty=uncertainty,
-        files=tuple(SourceFile(file, content) for file, content in files),
+        files=source_files(db, campaign_id),
     )
 
 

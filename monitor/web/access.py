@@ -21,6 +21,8 @@ APPROVERS = frozenset(
 )
 #: Questions about files of the computer itself: they stay with the command line there.
 NOT_OFFERED: Mapping[str, str] = {
+    "archive files": "files are moved on the computer that has the database, by monitor archive",
+    "compact": "the file is written anew by monitor compact, while no server has it",
     "publish": "a plant publishes beside the server, by monitor publish",
     "restore": "a backup is restored beside the server, by monitor restore: no second database is served",
     "simulate": "a rehearsal is written by monitor simulate; upload its folder",
@@ -65,7 +67,7 @@ FILES: Mapping[str, FileFields] = {
     "digital certificate page": FileFields(download="path"),
     "explain": _FIGURES,
     "export": FileFields(download="folder"),
-    "import": FileFields(upload="folders"),
+    "import": FileFields(upload="folders", uploads=("mapping",)),
     "issue certificate": FileFields(upload="laboratory", download="out", uploads=("fonts",)),
     "issued certificate": FileFields(download="path"),
     "map": FileFields(download="out", downloads=("figures",)),

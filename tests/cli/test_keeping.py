@@ -70,6 +70,28 @@ def test_an_incremental_backup_and_a_moment_as_typed(typed: Any, db: Path, tmp_p
         assert answer.err.startswith("monitor: --at ")
 
 
+def test_files_are_archived_and_the_room_is_given_back_as_typed(typed: Any, db: Path, tmp_path: Path) -> None:
+    archive = tmp_path / "archive"
+    assert "nothing was imported before" in typed("archive", archive, "--before", "1999-01-01", db=db).out
+    before = typed("identify", "five-days", "--json", db=db).out
+    moved = typed("archive", archive, "--before", "2999-01-01", "--json", db=db).document
+    assert moved["files"] >= 3
+    assert " archive " in typed("audit", "--last", 1, db=db).out
+    assert f"{moved['files']} files were archived; each is there" in typed("archive", archive, db=db).out
+    small = typed("compact", "--json", db=db).document
+    assert small["bytes_after"] < small["bytes_before"]
+    assert typed("verify", db=db).status == 0
+    assert typed("identify", "five-days", "--json", db=db).out == before
+    next(archive.rglob("probings.csv")).write_bytes(b"")
+    told = typed("archive", archive, db=db)
+    assert (told.status, "1 are not as they were" in told.out) == (1, True)
+    answer = typed("archive", archive, "--machine", "HU40-T", db=db)
+    assert (answer.status, answer.out) == (2, "")
+    assert "--machine says whose files are moved: name --before as well" in answer.err
+    unknown = typed("archive", archive, "--before", "2999-01-01", "--machine", "HU4O-T", db=db)
+    assert (unknown.status, unknown.out) == (2, "")
+
+
 def test_a_damaged_backup_is_not_restored(typed: Any, db: Path) -> None:
     assert typed("backup", "copy.duckdb", db=db).status == 0
     damaged = bytearray(Path("copy.duckdb").read_bytes())

@@ -65,6 +65,26 @@ def test_a_touch_that_stands_apart_is_named_by_the_reading_that_is_wrong_along_t
     assert reading.size == pytest.approx(off, abs=0.1)
 
 
+@pytest.mark.parametrize(
+    "off", [{"S1": -50.0}, {"S1": 30.0}, {"S1": -30.0, "S2": 10.0}], ids=["S1", "S1 less", "both"]
+)
+def test_the_other_end_of_the_bar_is_not_named_with_the_one_that_is_wrong(off):
+    """In run 8 both were, since each alone explains the bar's length; the other runs tell them apart."""
+    campaign = read_campaign(EXAMPLES / "five-days")
+    probings, rows = campaign.probings, []
+    for target, size in off.items():
+        (row,) = np.flatnonzero((probings.run == 8) & (probings.target == target))
+        campaign = wrong.with_wrong_reading(campaign, row, "Y", size)
+        rows.append(row)
+    gross = robust_fit(problem_of(campaign)).gross
+    assert [reading.row for reading in gross] == rows
+    assert [reading.size for reading in gross] == pytest.approx(list(off.values()), abs=0.05)
+    if off == {"S1": -50.0}:
+        # A fit of one run after the other asks no other run: it names both ends, as the import does.
+        with pytest.raises(DataError, match=r"run 8, sequence 1[34] \(S[12]\) or sequence 1[34] of that run"):
+            campaign_method(campaign).identify(campaign)
+
+
 @pytest.mark.parametrize("example", ["tilting-table", "free-form-pocket", "tracked-robot"])
 @pytest.mark.parametrize("size", [0.5, 50.0])
 def test_other_methods_find_it_too(example, size):

@@ -85,7 +85,8 @@ def fleet(*machines: MachineHealth) -> tuple[Fleet, list[MachineHealth]]:
 
 
 CHANGED = machine(
-    "Stepped", "changed", parameter("EA0C", value=3.0, per_month=0.0),
+    "Stepped", "changed",
+    replace(parameter("EA0C", value=3.0, per_month=0.0), changed_at=(datetime(2026, 3, 4),)),
     since=datetime(2026, 3, 4), next_check="by 2026-05-01: EA0C stays in tolerance with 95 % until then",
     changes=(
         Change(ChangeKind.CHANGE, datetime(2026, 2, 27), datetime(2026, 3, 4), "EA0C stepped by +12 µrad", 1e-5, True),
@@ -129,9 +130,26 @@ def test_a_quiet_week_says_so() -> None:
     ("health", "kind", "sentence"),
     [
         (CHANGED, "since", "Between 2026-02-27 and 2026-03-04."),
-        (machine("M", "not evaluated"), "do", "Mend what its page names and measure again now."),
+        (machine("M", "out of tolerance"), "do", "Adjust or compensate its errors and measure again now."),
+        (
+            machine("M", "not evaluated", next_check="now: the last run could not be evaluated"),
+            "do",
+            "Mend what its page names and measure again (next check now: the last run could not be evaluated).",
+        ),
         (machine("M", "may be out of tolerance"), "since", "Not known: this is not stated run by run."),
-        (AWAY, "worst", "None: no machine that was measured needs attention."),
+        (AWAY, "worst", "Not known: no machine was measured this week."),
+        (AWAY, "why", "No machine was measured this week, so nothing is known of its state."),
+        (
+            GOOD,
+            "why",
+            "No parameter is out of its tolerance, none changed, and the models explain the measurements.",
+        ),
+        (
+            machine("M", "no change seen"),
+            "why",
+            "No parameter that has a tolerance is out of it (not every one has), none changed, and the models explain "
+            "the measurements.",
+        ),
         (AWAY, "fine", "No machine could be stated to be fine."),
         (machine("M", "no change seen"), "unjudged", "Not against every tolerance: M."),
     ],

@@ -64,6 +64,8 @@ def arguments(name: str, room: Path) -> list[str]:
             "--at",
             _moment(room),
         ],
+        "archive": [*database, "archive", str(room / "archive"), "--before", "2999-01-01"],
+        "compact": [*database, "compact"],
         "export": [*database, "export", str(room / "exported")],
         "publish": [
             *database,
@@ -78,7 +80,7 @@ def arguments(name: str, room: Path) -> list[str]:
 
 VERBS = (
     "import", "identify", "uncertainty", "issue", "amend", "withdraw certificate", "withdraw", "report", "migration",
-    "backup", "incremental backup", "restore", "restore at", "export", "publish",
+    "backup", "incremental backup", "restore", "restore at", "archive", "compact", "export", "publish",
 )  # fmt: skip
 
 

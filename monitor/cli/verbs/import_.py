@@ -9,7 +9,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from monitor.cli import output
+from monitor.cli import output, understood_output
 from monitor.cli.database import ask, opened
 from monitor.cli.parser import common
 from monitor.workflow.intake.importing import ImportRequest, import_folders
@@ -19,17 +19,31 @@ EXAMPLE = "monitor import examples/five-days examples/cold-cold"
 
 def options(parser: ArgumentParser) -> None:
     common(parser)
-    parser.add_argument("folder", nargs="+", type=Path, metavar="FOLDER", help="a campaign folder, format 1")
+    parser.add_argument(
+        "folder", nargs="+", type=Path, metavar="FOLDER",
+        help="a campaign folder, a folder with mapping.toml, or with --mapping a file of an instrument",
+    )  # fmt: skip
+    parser.add_argument(
+        "--mapping",
+        type=Path,
+        metavar="FILE",
+        help="what the columns of instruments' files are; they make one campaign",
+    )
+    parser.add_argument(
+        "--campaign", metavar="NAME", help="the name of that campaign instead of the mapping's"
+    )
+    parser.add_argument("--dry-run", action="store_true", help="say what was understood, and store nothing")
 
 
 def run(options: Namespace) -> int:
-    request = ImportRequest(options.folder)
+    request = ImportRequest(options.folder, options.mapping, options.campaign, options.dry_run)
     with opened(options) as db, output.stepping("importing", len(request.folders)) as progress:
         answer = ask(db, import_folders, request, progress=progress)
     if options.json:
         output.document(answer)
     else:
         for folder in answer.imported:
+            understood_output.show(folder.understood)
             output.say(folder.message)
             for note in folder.notes:
                 output.say(f"note: {note}")

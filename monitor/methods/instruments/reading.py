@@ -8,6 +8,7 @@ campaign stand in one table.
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Protocol, Self
 
@@ -128,6 +129,11 @@ class Reading(Protocol):
         """Names of the q unknowns of each run."""
         ...
 
+    @property
+    def shared(self) -> Mapping[str, Hashable]:
+        """Unknowns of what several setups use (a bar), by name: setups with the same value have them in common."""
+        ...
+
     def start(self, runs: int) -> Array:
         """Where the search for the unknowns begins (R, q)."""
         ...
@@ -166,6 +172,10 @@ class Plain:
     @property
     def unknowns(self) -> tuple[str, ...]:
         return ()
+
+    @property
+    def shared(self) -> Mapping[str, Hashable]:
+        return {}
 
     def start(self, runs: int) -> Array:
         return np.zeros((runs, len(self.unknowns)))

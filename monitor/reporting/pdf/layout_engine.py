@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+# ruff: noqa: E402  (what is loaded first decides how long the rest takes)
 import zlib
+
+from monitor.reporting.pdf.quick_loading import load_weasyprint
+
+load_weasyprint()
 
 import fontTools
 import pydyf

@@ -37,13 +37,7 @@ def take_backup(db: Database, target: str | Path) -> Backup:
     with finished_copy(target) as partial:
         with db.attached(partial, "backup_copy"):
             begin_copy(db, partial)
-            ((catalog,),) = db.rows("SELECT current_database()")
-            db.execute(f"COPY FROM DATABASE {quoted(catalog)} TO backup_copy")
-            tables = checksums(db)
-            copied = checksums(db, "backup_copy")
-        if copied != tables:
-            different = ", ".join(name for name in tables if copied.get(name) != tables[name])
-            raise StoreError(f"the copy differs from the database in {different}; nothing was kept of it")
+            tables = copy_all(db)
         return write_manifest(partial, target, tables, _span(db, tables))
 
 
@@ -81,6 +75,21 @@ def begin_copy(db: Database, partial: Path) -> None:
     mode = 0o600 if db.path == ":memory:" else stat.S_IMODE(os.stat(db.path).st_mode) & 0o666
     os.chmod(partial, mode)
     make_log(str(partial))
+
+
+def copy_all(db: Database) -> Checksums:
+    """Copy everything into the attached ``backup_copy``; return rows and checksum of every table.
+
+    Raises StoreError where the copy differs from the original.
+    """
+    ((catalog,),) = db.rows("SELECT current_database()")
+    db.execute(f"COPY FROM DATABASE {quoted(catalog)} TO backup_copy")
+    tables = checksums(db)
+    copied = checksums(db, "backup_copy")
+    if copied != tables:
+        different = ", ".join(name for name in tables if copied.get(name) != tables[name])
+        raise StoreError(f"the copy differs from the database in {different}; nothing was kept of it")
+    return tables
 
 
 def checksums(db: Database, catalog: str | None = None) -> Checksums:

@@ -155,7 +155,9 @@ def _columns(db: Database, folder: Path) -> Path:
 def _source_files(db: Database, folder: Path) -> list[Path]:
     written = []
     for campaign_id, file, content in db.rows(
-        "SELECT campaign_id, file, content FROM source_file ORDER BY ALL"
+        "SELECT campaign_id, file, content FROM source_file "
+        # Of those that were archived there is only the hash.
+        "WHERE octet_length(content) > 0 OR sha256 = sha256('') ORDER BY ALL"
     ):
         # Only the last part of a stored name: nothing is written outside the folder.
         path = folder / "source_files" / str(campaign_id) / Path(file).name

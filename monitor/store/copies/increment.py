@@ -12,13 +12,11 @@ from pathlib import Path
 import duckdb
 
 from monitor.exceptions import StoreError
+from monitor.store.archiving import ACTION as ARCHIVE
 from monitor.store.connection import Database
 from monitor.store.copies.backup import audit_ends, begin_copy, checksums, finished_copy, quoted
 from monitor.store.copies.manifest import Backup, Checksums, Span, list_backups, write_manifest
 from monitor.store.entries import rows_recorded, select_portion
-
-#: The entry of the audit after which rows of earlier ones are no longer what they were.
-_TAKES_ROWS_AWAY = "archived files"
 
 
 def take_increment(db: Database, target: str | Path) -> Backup:
@@ -88,7 +86,7 @@ def _previous(db: Database, folder: Path) -> Backup:
             f"{backup.path} was made with an earlier schema of the database ({span.schema}, now {schema}); {begin_anew}"
         )
     ((taken_away,),) = db.rows(
-        "SELECT count(*) FROM audit WHERE entry > ? AND subject = ?", [span.last_entry, _TAKES_ROWS_AWAY]
+        "SELECT count(*) FROM audit WHERE entry > ? AND action = ?", [span.last_entry, ARCHIVE]
     )
     if taken_away:
         raise StoreError(f"files of campaigns were archived since {backup.path} was made; {begin_anew}")

@@ -15,6 +15,7 @@ import duckdb
 
 from monitor.exceptions import InputError, StoreError
 from monitor.store import migrations
+from monitor.store.archiving import ACTION as ARCHIVE
 from monitor.store.connection import Database
 from monitor.store.copies.backup import checksums, quoted
 from monitor.store.copies.manifest import (
@@ -186,6 +187,14 @@ def _cut(db: Database, moment: datetime) -> None:
         raise InputError(
             f"--at {moment:%Y-%m-%d %H:%M:%S} UTC is before the first entry of the audit, of "
             f"{begin:%Y-%m-%d %H:%M:%S} UTC"
+        )
+    ((archived_at,),) = db.rows(
+        "SELECT min(made_at) FROM audit WHERE entry >= ? AND action = ?", [first, ARCHIVE]
+    )
+    if archived_at is not None:
+        raise InputError(
+            f"--at {moment:%Y-%m-%d %H:%M:%S} UTC: files were archived at {archived_at:%Y-%m-%d %H:%M:%S} UTC, and "
+            "this backup no longer has them; name a backup that was made before that"
         )
     ((last_made_at,),) = db.rows("SELECT made_at FROM audit WHERE entry = ?", [first - 1])
     ((catalog,),) = db.rows("SELECT current_database()")

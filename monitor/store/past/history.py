@@ -75,9 +75,10 @@ class MachineHistory:
 
     ``started_at`` keeps the shop's offset; ``method`` (n,) is that of the run's campaign; ``values`` and ``u`` (n, p)
     are NaN where a parameter was refused; ``conditions`` name to (n,): those of the runs and the means over each run of
-    the recorded channels, in the unit that the name ends in, NaN where not recorded. ``tolerances`` are those of the
-    machine's latest campaign. ``unidentified`` names the campaigns, in order of import, of which no identification
-    under the model holds every run; ``campaigns`` are the number and name of all that count, in the same order.
+    the recorded ``channels`` (names), in the unit that the name ends in, NaN where not recorded. ``tolerances``
+    are those of the machine's latest campaign. ``unidentified`` names the campaigns, in order of import,
+    of which no identification under the model holds every run; ``campaigns`` are the number and name of all that count,
+    in the same order.
     """
 
     machine: str
@@ -95,6 +96,7 @@ class MachineHistory:
     conditions: Mapping[str, Array]
     tolerances: Mapping[str, float]
     unidentified: tuple[str, ...]
+    channels: frozenset[str] = frozenset()
 
     @cached_property
     def seconds(self) -> Array:
@@ -144,6 +146,7 @@ def machine_history(
     ]
     rows = {(identified[run.campaign_id].number, run.run): row for row, run in enumerate(runs)}
     names, units, values, u = _values(db, identified.values(), rows, parameter)
+    conditions, channels = _conditions(db, runs)
     latest = max(recorded, key=lambda run: (run.started_at, run.campaign_id), default=None)
     return MachineHistory(
         machine=machine,
@@ -158,9 +161,10 @@ def machine_history(
         units=units,
         values=values,
         u=u,
-        conditions=_conditions(db, runs),
+        conditions=conditions,
         tolerances=_tolerances_of(db, max(campaigns, default=0) if latest is None else latest.campaign_id),
         unidentified=_unidentified(campaigns, recorded, identified),
+        channels=channels,
     )
 
 
@@ -262,19 +266,26 @@ def _values(
     return names, tuple(unit_of[name] for name in names), values, uncertainties
 
 
-def _conditions(db: Database, runs: list[RecordedRun]) -> dict[str, Array]:
-    """Conditions of the runs and means of their channels, each (n,)."""
+def _conditions(db: Database, runs: list[RecordedRun]) -> tuple[dict[str, Array], frozenset[str]]:
+    """Conditions of the runs and means of their channels, each (n,), and the names of the latter.
+
+    What is recorded for a run goes before the mean of a channel of that name.
+    """
     conditions: dict[str, Array] = {}
     for row, run in enumerate(runs):
         for name, value in run.conditions.items():
             conditions.setdefault(name, np.full(len(runs), np.nan))[row] = value
+    of_runs = set(conditions)
     rows = {(run.campaign_id, run.run): row for row, run in enumerate(runs)}
     for campaign, number, channel, value in _with_marks(
         db, _CHANNELS, sorted({run.campaign_id for run in runs})
     ):
-        if (campaign, number) in rows:
-            conditions.setdefault(channel, np.full(len(runs), np.nan))[rows[campaign, number]] = value
-    return conditions
+        if (campaign, number) not in rows:
+            continue
+        row = rows[campaign, number]
+        means = conditions.setdefault(channel, np.full(len(runs), np.nan))
+        means[row] = value if np.isnan(means[row]) else means[row]
+    return conditions, frozenset(set(conditions) - of_runs)
 
 
 def latest_tolerances(db: Database) -> dict[tuple[str, str], float]:
