@@ -82,7 +82,7 @@ def _stands(campaign: Campaign, joint: Joint) -> bool:
 def forecast_of(
     method: InstrumentPlan, campaign: Campaign, model: StoredModel, run: int | None = None
 ) -> tuple[TestForecast, int]:
-    """The forecast of a ``run`` (the last with None), whose number is returned too; axes may move over their strokes."""
+    """The forecast of a ``run`` (the last with None), whose number is returned too; axes move over their strokes."""
     number = int(campaign.probings.run.max()) if run is None else run
     chain = chain_of(campaign.machine)
     positions = np.column_stack([
