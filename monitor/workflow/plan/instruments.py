@@ -34,26 +34,13 @@ def plan_instruments(
     Raises InputError for what such a plan does not have, a number of tests that cannot be, a parameter that there is
     not, and a wanted uncertainty that no test reaches.
     """
-    if request.balls is not None or request.keep or request.separate is not None:
-        raise InputError(
-            "a plan of instruments is tests: --for names parameters, --poses N proposes N tests, --wanted P=U those "
-            "that reach an uncertainty"
-        )
-    if request.figures is not None:
-        raise InputError("--figures: a plan of instruments has no figure yet; leave it out")
-    count = request.poses or 0
-    if not 0 <= count <= MOST_TESTS or request.poses == 0:
-        raise InputError(f"--poses {request.poses}: choose 1 to {MOST_TESTS} tests")
+    count = _count(request)
     forecast, run = forecast_of(method, campaign, model)
     present, expected = forecast.present(), tuple(forecast.expected())
     asked = _asked(request, present, expected)
     internal = {name: forecast.unit_of(name).to_internal(u) for name, u in request.wanted.items()}
     chosen = _in_turn(forecast, expected, asked, count or (MOST_TESTS if internal else 0), internal)
-    if internal and not _reached((chosen or [ExpectedTest(expected[0].test, present)])[-1].u, internal):
-        raise InputError(
-            f"no {MOST_TESTS} tests reach {', '.join(f'{name}={u:g}' for name, u in request.wanted.items())}; "
-            "ask for more modest uncertainties, or repeat tests in several runs"
-        )
+    _refuse_unreached(request, present, chosen, internal)
     joints = chain_of(campaign.machine).joints
     ranked = _best_of_setups(expected, asked)[:LISTED]
     return InstrumentPlanAnswer(
@@ -70,6 +57,35 @@ def plan_instruments(
         unseen=unseen(forecast, joints, present, expected),
         standing=tuple(joint.name for joint in joints if _stands(campaign, joint)),
     )
+
+
+def _count(request: PlanRequest) -> int:
+    """How many tests are proposed. Raises InputError for what such a plan does not have."""
+    if request.balls is not None or request.keep or request.separate is not None:
+        raise InputError(
+            "a plan of instruments is tests: --for names parameters, --poses N proposes N tests, --wanted P=U those "
+            "that reach an uncertainty"
+        )
+    if request.figures is not None:
+        raise InputError("--figures: a plan of instruments has no figure yet; leave it out")
+    count = request.poses or 0
+    if not 0 <= count <= MOST_TESTS or request.poses == 0:
+        raise InputError(f"--poses {request.poses}: choose 1 to {MOST_TESTS} tests")
+    return count
+
+
+def _refuse_unreached(
+    request: PlanRequest,
+    present: Mapping[str, float],
+    chosen: Sequence[ExpectedTest],
+    limits: Mapping[str, float],
+) -> None:
+    """InputError where the wanted uncertainties are not reached."""
+    if limits and not _reached(chosen[-1].u if chosen else present, limits):
+        raise InputError(
+            f"no {MOST_TESTS} tests reach {', '.join(f'{name}={u:g}' for name, u in request.wanted.items())}; "
+            "ask for more modest uncertainties, or repeat tests in several runs"
+        )
 
 
 def _stands(campaign: Campaign, joint: Joint) -> bool:
