@@ -81,7 +81,10 @@ def _say(answer: InstrumentsAnswer) -> None:
         output.table("", ["alone", "unit", "by", "value", "u"], alone)
     _say_agreement(answer)
     if answer.not_determined:
-        output.say(f"all together do not separate {', '.join(answer.not_determined)}; identify says why")
+        output.say(
+            f"all together do not separate {', '.join(answer.not_determined)}; identify says why, and "
+            f"`monitor plan {answer.campaign}` which measurement would"
+        )
 
 
 def _say_agreement(answer: InstrumentsAnswer) -> None:

@@ -100,35 +100,37 @@ class Workspace:
 
     def _paths(self, setup: Setup) -> Iterator[Array]:
         """The paths (m, J) of a kind that reads along a line, about an axis, or anywhere."""
-        kind = setup.reading
-        way = np.array(setup.direction or (0.0, 0.0, 0.0))
-        dots = [abs(float(np.dot(joint.direction, way))) for joint in self.chain.joints]
-        if kind == "displacement":
-            along = [joint for joint in self.linear if dots[joint] > ALONG]
-            for joint in along:
-                yield from self.sweeps(joint)
-            if not along:
-                yield from self._diagonal(way)
-        elif kind == "component":
-            for joint in self.linear:
-                if dots[joint] < ACROSS:
-                    yield from self.sweeps(joint)
-        elif kind == "offset":
-            for joint in self.linear:
-                if self.chain.joints[joint].name == setup.along:
-                    yield from self.sweeps(joint)
-        elif kind in ("angle", "level"):
-            for joint in self.linear:
-                yield self._sweep(joint, self.rest)
-            for joint in self.rotary:
-                if kind == "level" or dots[joint] > ALONG:
-                    yield self.turn(joint)
-        elif kind in ("direction", "point"):
+        if setup.reading in ("displacement", "component", "offset"):
+            yield from self._lines(setup)
+        elif setup.reading in ("angle", "level"):
+            yield from (self._sweep(joint, self.rest) for joint in self.linear)
+            dots = self._dots(setup)
+            about = [joint for joint in self.rotary if setup.reading == "level" or dots[joint] > ALONG]
+            yield from map(self.turn, about)
+        elif setup.reading in ("direction", "point"):
             paths = [self.turn(joint) for joint in self.rotary] + self._grid()
-            if kind == "point" and self.linear:
+            if setup.reading == "point" and self.linear:
                 paths += [self._product([(joint, 3) for joint in self.linear])]
             if paths:
                 yield np.concatenate(paths)
+
+    def _lines(self, setup: Setup) -> Iterator[Array]:
+        """Sweeps along the direction of a beam (or a diagonal), across that of a dial, along that of a straightedge."""
+        dots, names = self._dots(setup), [joint.name for joint in self.chain.joints]
+        swept = {
+            "displacement": [joint for joint in self.linear if dots[joint] > ALONG],
+            "component": [joint for joint in self.linear if dots[joint] < ACROSS],
+            "offset": [joint for joint in self.linear if names[joint] == setup.along],
+        }[setup.reading]
+        for joint in swept:
+            yield from self.sweeps(joint)
+        if setup.reading == "displacement" and not swept:
+            yield from self._diagonal(np.array(setup.direction))
+
+    def _dots(self, setup: Setup) -> list[float]:
+        """How much every joint lies along the direction of a setup."""
+        way = np.array(setup.direction or (0.0, 0.0, 0.0))
+        return [abs(float(np.dot(joint.direction, way))) for joint in self.chain.joints]
 
     def sweeps(self, joint: int) -> Iterator[Array]:
         """A linear axis over its stroke, the other linear ones at the ends and all in the middle."""

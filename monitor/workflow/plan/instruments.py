@@ -11,7 +11,7 @@ from monitor.machine import Joint
 from monitor.methods import InstrumentPlan
 from monitor.methods.method import ExpectedTest, TestForecast
 from monitor.methods.model import chain_of
-from monitor.records import Campaign
+from monitor.records import Array, Campaign
 from monitor.store import StoredModel
 from monitor.workflow.models import as_model, label
 from monitor.workflow.plan.answer import InstrumentPlanAnswer, TestAnswer, UnseenParameter
@@ -20,6 +20,8 @@ from monitor.workflow.plan.strokes import strokes_of
 
 #: So many tests are listed, and at most proposed.
 LISTED, MOST_TESTS = 12, 12
+#: A rotary axis that turned by less (rad) may turn all around.
+LEAST_TURN = 0.5
 #: Kinds whose bar or sphere stands at a place that the plan chooses.
 PLACED = ("distance", "vector")
 
@@ -32,26 +34,13 @@ def plan_instruments(
     Raises InputError for what such a plan does not have, a number of tests that cannot be, a parameter that there is
     not, and a wanted uncertainty that no test reaches.
     """
-    if request.balls is not None or request.keep or request.separate is not None:
-        raise InputError(
-            "a plan of instruments is tests: --for names parameters, --poses N proposes N tests, --wanted P=U those "
-            "that reach an uncertainty"
-        )
-    if request.figures is not None:
-        raise InputError("--figures: a plan of instruments has no figure yet; leave it out")
-    count = request.poses or 0
-    if not 0 <= count <= MOST_TESTS or request.poses == 0:
-        raise InputError(f"--poses {request.poses}: choose 1 to {MOST_TESTS} tests")
+    count = _count(request)
     forecast, run = forecast_of(method, campaign, model)
     present, expected = forecast.present(), tuple(forecast.expected())
     asked = _asked(request, present, expected)
     internal = {name: forecast.unit_of(name).to_internal(u) for name, u in request.wanted.items()}
     chosen = _in_turn(forecast, expected, asked, count or (MOST_TESTS if internal else 0), internal)
-    if internal and not _reached((chosen or [ExpectedTest(expected[0].test, present)])[-1].u, internal):
-        raise InputError(
-            f"no {MOST_TESTS} tests reach {', '.join(f'{name}={u:g}' for name, u in request.wanted.items())}; "
-            "ask for more modest uncertainties, or repeat tests in several runs"
-        )
+    _refuse_unreached(request, present, chosen, internal)
     joints = chain_of(campaign.machine).joints
     ranked = _best_of_setups(expected, asked)[:LISTED]
     return InstrumentPlanAnswer(
@@ -70,6 +59,35 @@ def plan_instruments(
     )
 
 
+def _count(request: PlanRequest) -> int:
+    """How many tests are proposed. Raises InputError for what such a plan does not have."""
+    if request.balls is not None or request.keep or request.separate is not None:
+        raise InputError(
+            "a plan of instruments is tests: --for names parameters, --poses N proposes N tests, --wanted P=U those "
+            "that reach an uncertainty"
+        )
+    if request.figures is not None:
+        raise InputError("--figures: a plan of instruments has no figure yet; leave it out")
+    count = request.poses or 0
+    if not 0 <= count <= MOST_TESTS or request.poses == 0:
+        raise InputError(f"--poses {request.poses}: choose 1 to {MOST_TESTS} tests")
+    return count
+
+
+def _refuse_unreached(
+    request: PlanRequest,
+    present: Mapping[str, float],
+    chosen: Sequence[ExpectedTest],
+    limits: Mapping[str, float],
+) -> None:
+    """InputError where the wanted uncertainties are not reached."""
+    if limits and not _reached(chosen[-1].u if chosen else present, limits):
+        raise InputError(
+            f"no {MOST_TESTS} tests reach {', '.join(f'{name}={u:g}' for name, u in request.wanted.items())}; "
+            "ask for more modest uncertainties, or repeat tests in several runs"
+        )
+
+
 def _stands(campaign: Campaign, joint: Joint) -> bool:
     """Whether nobody knows how far a linear axis travels: it stood still, and its stroke is not stated."""
     settings = campaign.machine.axes.get(joint.name)
@@ -80,19 +98,27 @@ def _stands(campaign: Campaign, joint: Joint) -> bool:
 def forecast_of(
     method: InstrumentPlan, campaign: Campaign, model: StoredModel, run: int | None = None
 ) -> tuple[TestForecast, int]:
-    """The forecast of a ``run`` (the last with None), whose number is returned too; axes may move over their strokes, a
-    rotary axis without one all around."""
+    """The forecast of a ``run`` (the last with None), whose number is returned too; axes move over their strokes."""
     number = int(campaign.probings.run.max()) if run is None else run
     chain = chain_of(campaign.machine)
     positions = np.column_stack([
         joint.sign * campaign.probings.readings[joint.name] for joint in chain.joints
     ])  # fmt: skip
     rotary, linear = strokes_of(campaign, chain, positions)
-    turn = 2.0 * np.pi
     around = {
-        joint.name: (0.0, turn) if joint.sign > 0 else (-turn, 0.0) for joint in chain.joints if joint.turns
+        joint.name: _angles(joint, positions[:, index])
+        for index, joint in enumerate(chain.joints)
+        if joint.turns
     }
     return method.forecast(campaign, as_model(model), number, {**around, **rotary, **linear}), number
+
+
+def _angles(joint: Joint, visited: Array) -> tuple[float, float]:
+    """The angles (rad) that a rotary axis without a stated stroke may take: those between which it went, else all."""
+    low, high = float(visited.min()), float(visited.max())
+    if high - low > LEAST_TURN:
+        return low, high
+    return (0.0, 2.0 * np.pi) if joint.sign > 0 else (-2.0 * np.pi, 0.0)
 
 
 def unseen(
