@@ -11,6 +11,7 @@ import numpy as np
 import pypdf
 import pytest
 
+from monitor.reporting.health import render
 from monitor.reporting.health.answers import answers
 from monitor.reporting.health.records import (
     Change,
@@ -211,6 +212,20 @@ def test_no_page_but_the_last_is_more_than_half_empty() -> None:
 
         page.extract_text(visitor_text=note)
         assert min(y for y in lowest if y > 60.0) < 0.5 * float(page.mediabox.height)
+
+
+def test_a_short_report_is_set_closer_where_that_saves_an_almost_empty_page(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    machines = [
+        replace(GOOD, machine=f"M{index}", parameters=(parameter(value=2.0, per_month=0.0, runs=20),) * 13)
+        for index in range(2)
+    ]
+    assert len(pages_of(*machines)) == 2
+    monkeypatch.setattr(render, "_LAID_OUT_AGAIN", 0)
+    *_, last = pages_of(*machines)
+    assert len(pages_of(*machines)) == 3
+    assert len(last) < 600  # signs: what is left over of the second machine
 
 
 def test_a_narrow_screen_gets_one_column_with_the_names_of_the_cells() -> None:

@@ -14,6 +14,7 @@ import pydyf
 import pyphen
 import weasyprint
 from weasyprint import HTML, Attachment
+from weasyprint.document import Document
 from weasyprint.text.ffi import pango
 from weasyprint.text.fonts import FontConfiguration
 from weasyprint.urls import FatalURLFetchingError, URLFetcher, URLFetcherResponse
@@ -35,6 +36,7 @@ def engine_versions() -> dict[str, str]:
 __all__ = [
     "HTML",
     "Attachment",
+    "Document",
     "FatalURLFetchingError",
     "FontConfiguration",
     "URLFetcher",
