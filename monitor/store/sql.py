@@ -51,11 +51,6 @@ def run_query(db: Database, text: str, limit: int | None = None) -> QueryResult:
                 cursor = cursor if zoned is None else connection.execute(zoned)
                 rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit + 1)
             except duckdb.Error as fault:
-                if "'pytz'" in str(fault):
-                    raise InputError(
-                        "a column of this query is a TIMESTAMP WITH TIME ZONE, which is not shown; cast it, as in "
-                        "SELECT CAST(now() AS TIMESTAMP): that is its moment in UTC"
-                    ) from fault
                 raise InputError(f"the query cannot be answered: {fault}") from fault
     truncated = limit is not None and len(rows) > limit
     return QueryResult(columns, types, tuple(map(tuple, rows[:limit])), truncated)
