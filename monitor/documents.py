@@ -93,7 +93,7 @@ def data_key(field: dataclasses.Field[Any]) -> str:
 
 
 def _plain(value: object) -> Any:
-    if isinstance(value, Sentence | Path):
+    if isinstance(value, (Sentence, Path)):
         return str(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return _plain_record(value)

@@ -87,6 +87,7 @@ KEEPERS: dict[str, set[str]] = {
     "rich": {"cli"},
     "shtab": {"cli"},
     "openpyxl": {"store", "readers"},
+    "lxml": {"readers"},
 }
 
 # Packed folder -> the rooms that may look into it.

@@ -139,8 +139,9 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
 
 def fact_of(line: str) -> tuple[str, str] | None:
     """Return the key and the value of a line ``key: value`` or ``key = value``; None for any other."""
-    for mark in (":", "=", ";", "\t"):
-        key, separator, value = line.partition(mark)
-        if separator and key.strip() and value.strip(" ;\t,") and len(key) <= 60:
+    marks = sorted((line.index(mark), mark) for mark in (":", "=", ";", "\t") if mark in line)
+    for _, mark in marks:
+        key, _, value = line.partition(mark)
+        if key.strip() and value.strip(" ;\t,") and len(key) <= 60:
             return key.strip(' "'), value.strip(' ;\t,"')
     return None

@@ -89,6 +89,7 @@ from monitor.store.past.machine_runs import (
     parameter_frames,
     probing_counts,
 )
+from monitor.store.recalling import Recalled
 from monitor.store.refusals import StoredRefusal, clear_refusals, record_refusal, refusals
 from monitor.store.results import StoredIdentification, StoredRun
 from monitor.store.selections import (
@@ -123,6 +124,7 @@ __all__ = [
     "MachineModel",
     "Patience",
     "QueryResult",
+    "Recalled",
     "RecordedRun",
     "Restored",
     "RunRow",

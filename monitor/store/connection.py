@@ -13,7 +13,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,6 +28,7 @@ from monitor.store import bound_values, migrations
 from monitor.store.bound_values import Parameters
 from monitor.store.database_name import check_database_name
 from monitor.store.opening import connect, damaged, is_missing, make, make_log
+from monitor.store.recalling import Recalled
 from monitor.store.turns import Patience
 
 if TYPE_CHECKING:
@@ -63,6 +64,8 @@ class Database:
         self._one_writes = threading.RLock()  # of the sessions
         self._in_transaction = False
         self._remembered: list[str] = []
+        #: What was read and may be read again, where this process alone has the file and says so; None: read anew.
+        self.recalled: Recalled | None = None
         self._check_name()
         self._available = migrations.available()
         self._connection: duckdb.DuckDBPyConnection | None = None
@@ -150,6 +153,7 @@ class Database:
 
     def execute(self, sql: str, parameters: Parameters = ()) -> None:
         """Run a statement. Values are always bound, never written into the text."""
+        self._forget()
         with self._used() as connection:
             bound_values.execute(connection, sql, parameters)
 
@@ -188,6 +192,8 @@ class Database:
         # Loaded where something is written: whoever only reads does not wait for it.
         import pandas as pd
 
+        self._forget()
+
         with self._used() as connection:
             connection.register("incoming", pd.DataFrame(incoming))
             try:
@@ -199,7 +205,21 @@ class Database:
     def connected(self) -> Iterator[duckdb.DuckDBPyConnection]:
         """Yield DuckDB's connection for this block; no other thread uses the database meanwhile."""
         with self._used() as connection:
-            yield connection
+            try:
+                yield connection
+            finally:
+                self._forget()
+
+    def recall(self, key: Hashable, read: Callable[[], Record]) -> Record:
+        """Return what ``read`` read before under a key, if nothing was written since; a transaction reads anew."""
+        if self.recalled is None or self._in_transaction:
+            return read()
+        answer: Record = self.recalled.answer(key, read)
+        return answer
+
+    def _forget(self) -> None:
+        if self.recalled is not None:
+            self.recalled.forget()
 
     def next_number(self, table: str, column: str) -> int:
         """Return one more than the largest number in use; call it inside the transaction that uses it."""
@@ -251,6 +271,7 @@ class Database:
                     raise
                 finally:
                     self._in_transaction = False
+                    self._forget()
 
     def _fit(self, connection: duckdb.DuckDBPyConnection) -> None:
         """Bring the schema to the present one; refuse a database that does not fit this software."""

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from monitor.exceptions import InputError, NotFoundError
-from monitor.store import Database
+from monitor.store import Database, Recalled
 
 
 def host_user_name() -> str:
@@ -31,4 +31,5 @@ def opened(path: Path, working_folder: Path, *, must_exist: bool = False) -> Ite
         raise NotFoundError(f"there is no database {path}; `monitor --db {path} import FOLDER` makes one")
     with Database(path, threads=1, actor=host_user_name()) as db:
         db.confine(working_folder)
+        db.recalled = Recalled()
         yield db

@@ -46,7 +46,7 @@ class Schemas:
         """Return the schema of a type, a reference where it is a record."""
         origin, members = typing.get_origin(hint), typing.get_args(hint)
         if origin in (typing.Union, types.UnionType):
-            return self._of_union(members)
+            return self._of_alternatives(members)
         if origin is typing.Literal:
             return {"enum": list(members)}
         if origin is np.ndarray:
@@ -63,8 +63,8 @@ class Schemas:
             return {"enum": [member.value for member in hint]}
         return dict(_SCALARS.get(hint, {}))
 
-    def _of_union(self, members: tuple[Any, ...]) -> Schema:
-        """The schema of one of several types; the document of a sentence is the text beside it."""
+    def _of_alternatives(self, members: tuple[Any, ...]) -> Schema:
+        """The schema of a union; the document of a sentence is the text that stands beside it."""
         written = [self.of(member) for member in members if member is not Sentence]
         return {"anyOf": written} if len(written) > 1 else written[0]
 

@@ -85,7 +85,7 @@ def compact_database(db: Database) -> CompactAnswer:
         raise InputError(f"{db.path} is a lake: merge its files (docs/scale.md)")
     result = compact(db)
     message = (
-        f"{db.path}: {result.bytes_before / 1e6:.1f} MB before, {result.bytes_after / 1e6:.1f} MB now; {result.rows} rows, "
-        "all compared"
+        f"{db.path}: {result.bytes_before / 1e6:.1f} MB before, {result.bytes_after / 1e6:.1f} MB now; {result.rows} "
+        "rows, all compared"
     )
     return CompactAnswer(Path(db.path), result.bytes_before, result.bytes_after, result.rows, message)

@@ -15,6 +15,12 @@ import pytest
 
 from tests.browser.visits import EXAMPLES, Site, Visit, picture
 
+#: How far the drawn spindle is from where its figure says, in mm.
+MOVED = """() => { const drawn = document.getElementById('chart-scene').data.find((trace) => trace.meta === 'C1');
+  const figure = document.querySelector('figure[data-key="scene"] script.figure');
+  const still = JSON.parse(figure.textContent).data.find((trace) => trace.meta === 'C1');
+  return Math.max(...drawn.z.map((z, index) => z === null ? 0 : Math.abs(z - still.z[index]))); }"""
+
 
 def test_story_it_does_not_fit_spindle_growth_added_error_at_the_noise_floor(site: Site) -> None:
     with Visit(site) as visit:
@@ -37,8 +43,7 @@ def test_story_it_does_not_fit_spindle_growth_added_error_at_the_noise_floor(sit
         # It swings along Z with the spindle, and stands where it stood.
         page.wait_for_function("Number(document.getElementById('chart-scene').dataset.swung || 0) >= 3")
         assert "C1 shifts along Z and the tool" in page.locator("#scene-effect").inner_text()
-        page.wait_for_timeout(4000)
-        assert _moved(page) == pytest.approx(0.0, abs=1e-9)
+        page.wait_for_function(f"() => ({MOVED})() === 0")
         page.mouse.move(5, 5)
         assert "explained by EZC1:const@warmup" not in visit.drawn("scene")
         effect.focus()
@@ -81,17 +86,6 @@ def test_story_who_asked_for_less_motion_sees_where_it_moves_and_no_motion(site:
             "document.getElementById('chart-scene').data.some((trace) => trace.line && trace.line.dash === 'dash')"
         )
         assert visit.faults() == []
-
-
-def _moved(page: Any) -> float:
-    """How far the drawn spindle is from where its figure says, in mm."""
-    distance = page.evaluate(
-        """() => { const drawn = document.getElementById('chart-scene').data.find((trace) => trace.meta === 'C1');
-        const figure = document.querySelector('figure[data-key="scene"] script.figure');
-        const still = JSON.parse(figure.textContent).data.find((trace) => trace.meta === 'C1');
-        return Math.max(...drawn.z.map((z, index) => z === null ? 0 : Math.abs(z - still.z[index]))); }"""
-    )
-    return float(distance)
 
 
 def _lit(page: Any) -> list[str]:

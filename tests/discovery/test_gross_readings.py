@@ -16,7 +16,7 @@ from monitor.methods import campaign_method
 from monitor.methods.chain.gross import gross_readings
 from monitor.methods.model import Model
 from monitor.readers import read_campaign
-from monitor.workflow.identify.notes import gross_sentence
+from monitor.workflow.identify.notes import gross_noted
 from monitor.workflow.intake.gross_doubts import gross_doubts
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -147,7 +147,7 @@ def test_the_sentence_says_run_row_ball_pose_and_size(virtual_campaigns):
     assert gross_doubts(campaign) == ()
     method = campaign_method(spoiled)
     (reading,) = method.identify(spoiled, Model("samba")).gross
-    assert gross_sentence(reading, method.nouns.target) == sentence
+    assert str(gross_noted(reading, method.nouns.target)) == sentence
 
 
 def test_identify_says_which_reading_of_a_touch_far_off_is_wrong_and_what_would_be_right():

@@ -7,6 +7,7 @@ import re
 import shutil
 from dataclasses import replace
 from datetime import date
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from monitor.readers import doubts, read_campaign
 from monitor.records import Campaign
 from monitor.reporting.certificate.grounds import GroundKind, ground_sentence
 from monitor.reporting.texts import texts_of
-from monitor.store import Database, import_campaign, load_certificate
+from monitor.store import Database, StoredModel, import_campaign, load_certificate
 from monitor.workflow.certificate.grounds import accepted_grounds, grounds_against
 from monitor.workflow.certificate.issue import issue
 from monitor.workflow.certificate.remaking import remake
@@ -44,9 +45,15 @@ def five_days() -> Campaign:
     return campaign
 
 
-def grounds(campaign: Campaign, run: int = 20):
+@cache
+def plain_model(method: str) -> StoredModel:
+    """The model that a method has of itself; every database has it."""
     with Database(":memory:") as db:
-        return grounds_against(campaign, resolve(db, None, campaign.method), {run: None})
+        return resolve(db, None, method)
+
+
+def grounds(campaign: Campaign, run: int = 20):
+    return grounds_against(campaign, plain_model(campaign.method), {run: None})
 
 
 def with_bar(campaign: Campaign, more_mm: float) -> Campaign:

@@ -159,7 +159,7 @@ def test_limits_say_it(tmp_path: Path) -> None:
     shutil.copytree(EXAMPLES / "five-days", folder)
     with (folder / "campaign.toml").open("a", encoding="utf-8") as file:
         file.write("\n[machine.tolerances]\nEA0C = 20.0\nEA0B = 20.0\n")
-    with Database(":memory:") as db:
+    with Database(tmp_path / "limits.duckdb") as db:
         import_folders(db, ImportRequest((folder,)))
         assert db.rows("SELECT DISTINCT refers_to FROM v_tolerances") == [(None,)]
         identify(db, IdentifyRequest("five-days"))

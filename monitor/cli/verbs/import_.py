@@ -1,12 +1,15 @@
 """Import campaign folders, all or nothing each. A folder that was imported before changes nothing.
 
 Where several are named, one that is refused does not hinder the others: exit status 2 says that there was one.
+Files of instruments become one campaign by a mapping of their columns (docs/files-as-they-come.md).
 """
 
 from __future__ import annotations
 
 import sys
+import tempfile
 from argparse import ArgumentParser, Namespace
+from contextlib import ExitStack
 from pathlib import Path
 
 from monitor.cli import output, understood_output
@@ -37,15 +40,23 @@ def options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     request = ImportRequest(options.folder, options.mapping, options.campaign, options.dry_run)
-    with opened(options) as db, output.stepping("importing", len(request.folders)) as progress:
-        answer = ask(db, import_folders, request, progress=progress)
+    with ExitStack() as stack:
+        if options.dry_run and options.server is None and not Path(options.db).exists():
+            # Nothing is stored, and no database is left behind either.
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="monitor-"))
+            options.db = str(Path(folder) / "dry-run.duckdb")
+        with (
+            opened(options) as db,
+            output.stepping("importing", len(request.folders)) as progress,
+        ):
+            answer = ask(db, import_folders, request, progress=progress)
     if options.json:
         output.document(answer)
     else:
-        for folder in answer.imported:
-            understood_output.show(folder.understood)
-            output.say(folder.message)
-            for note in folder.notes:
+        for imported in answer.imported:
+            understood_output.show(imported.understood)
+            output.say(imported.message)
+            for note in imported.notes:
                 output.say(f"note: {note}")
     for refused in answer.refused:
         print(f"monitor: {refused.why}", file=sys.stderr)

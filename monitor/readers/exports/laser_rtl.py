@@ -104,7 +104,7 @@ def read(file: ExportFile, settings: None, faults: Faults) -> Export | None:
     runs, numbers, deviations, lines = zip(*parser.rows, strict=True)
     columns = {
         "run": [str(run) for run in runs],
-        "target": [str(number) for number in numbers],
+        "target number": [str(number) for number in numbers],
         "position": [parser.targets[number - 1] for number in numbers],
         "deviation": list(deviations),
     }
@@ -132,6 +132,11 @@ def _complete(parser: _Parser, name: str, faults: Faults) -> None:
                 key,
                 f"{stated[0]} {what} are announced and {count} are there; export the file again",
             )
+    _visited(parser, name, faults)
+
+
+def _visited(parser: _Parser, name: str, faults: Faults) -> None:
+    """Refuse targets that there are not, that a run passes a third time, and those that it lacks."""
     visits: dict[tuple[int, int], int] = {}
     for run, number, _, line in parser.rows:
         if not 1 <= number <= len(parser.targets):
@@ -159,7 +164,7 @@ def _complete(parser: _Parser, name: str, faults: Faults) -> None:
 
 EXPORT = ExportFormat(
     "laser rtl",
-    "laser interferometer, text with sections; columns position, deviation, run, target",
+    "laser interferometer, text with sections; columns position, deviation, run, target number",
     read,
     suffixes=(".rtl", ".rta", ".rts"),
 )

@@ -148,11 +148,8 @@ def _head(
     cells = _padded(cells_of(lines[index], separator), width)
     units: dict[str, str] = {}
     if header_line is None and len(above) > 1 and _are_units(cells):
-        units_cells, index = cells, above[-2]
+        units, index = _units_below(cells), above[-2]
         cells = _padded(cells_of(lines[index], separator), width)
-        units = {
-            str(number): cell for number, cell in enumerate(units_cells) if foreign_unit(cell.strip("[]()"))
-        }
     if len(cells) != width or any(is_number(cell) for cell in cells):
         faults.add(
             name, index + 1, None,
@@ -161,6 +158,11 @@ def _head(
         )  # fmt: skip
         return _Head(numbered, {}, begin, begin)
     return _named(cells, units, begin, index)
+
+
+def _units_below(cells: Sequence[str]) -> dict[str, str]:
+    """Return the units of a line of units by the number of their column."""
+    return {str(number): cell for number, cell in enumerate(cells) if foreign_unit(cell.strip("[]()"))}
 
 
 def _named(cells: Sequence[str], units: dict[str, str], begin: int, header: int) -> _Head:

@@ -16,11 +16,11 @@ def recognises(folder: Path) -> bool:
 
 
 def files_in(folder: Path) -> list[Path]:
-    """Return the files of a folder beside its mapping; those that begin with a dot are not looked at."""
+    """Return the files of a folder beside its mapping; README and hidden files are not looked at."""
     return sorted(
         path
         for path in folder.iterdir()
-        if path.is_file() and path.name != FILE and not path.name.startswith(".")
+        if path.is_file() and path.name != FILE and not path.name.startswith((".", "README"))
     )
 
 

@@ -91,12 +91,8 @@ class Dates:
             return first, second, third, numeric["rest"]
         if len(numeric["c"]) != 4:
             return f"{quoted(text)} has a year of two digits; write started_at of [[runs]]"
-        order = ORDERS.get(self.order or "")
-        if order is None and (numeric["mark"] == "." or first > 12):
-            order = "DMY"
-        elif order is None and second > 12:
-            order = "MDY"
-        if order == "DMY" or (order is None and first == second):
+        order = ORDERS.get(self.order or "") or _only_order(first, second, numeric["mark"])
+        if order == "DMY":
             return third, second, first, numeric["rest"]
         if order == "MDY":
             return third, first, second, numeric["rest"]
@@ -104,3 +100,10 @@ class Dates:
             f'{quoted(text)} may be day and month or month and day; write [dates] order = "day-month-year" or '
             '"month-day-year" in the mapping, or started_at of [[runs]]'
         )
+
+
+def _only_order(first: int, second: int, mark: str) -> str | None:
+    """Return the one order that two numbers of a date can have; None where they can have two."""
+    if mark == "." or first > 12 or first == second:
+        return "DMY"
+    return "MDY" if second > 12 else None

@@ -76,10 +76,16 @@ def read_exports(mapping: Path, paths: Sequence[Path], name: str | None = None) 
     sources = [SourceFile(mapping.name, content)]
     sources += [SourceFile(file.name, file.content) for file in files.values() if file.name in used]
     campaign = campaign_of(head, understood, tuple(sources))
-    unused = [file for file in files if file not in used]
+    return Exports(
+        campaign, tuple(map(_understood, parts)), _notes(parts, [file for file in files if file not in used])
+    )
+
+
+def _notes(parts: Sequence[_Part], unused: Sequence[str]) -> tuple[str, ...]:
+    """Return what may be a mistake in the files."""
     notes = [f"{part.file.name}: {note}" for part in parts for note in part.export.notes]
     notes += [f"{file} is named by no [[exports]] of the mapping and was not read" for file in unused]
-    return Exports(campaign, tuple(_understood(part) for part in parts), tuple(dict.fromkeys(notes)))
+    return tuple(dict.fromkeys(notes))
 
 
 def _files(paths: Sequence[Path], faults: Faults) -> dict[str, ExportFile]:
@@ -188,7 +194,7 @@ def _setup(entry: Entry, setups: Sequence[Setup]) -> Setup | None:
 
 
 def _runs_table(read: ExportMapping, parts: Sequence[_Part], faults: Faults) -> CsvTable | None:
-    """Return the runs as the mapping lists them, or one for each run of the exports, begun when its files say."""
+    """Return the runs as the mapping lists them, or one for each run of the exports, elapsed when its files say."""
     rows: list[dict[str, str]] = []
     lines: list[int] = []
     first_day = None
@@ -216,7 +222,7 @@ def _runs_table(read: ExportMapping, parts: Sequence[_Part], faults: Faults) -> 
 
 
 def _started(read: ExportMapping, parts: Sequence[_Part], run: int, faults: Faults) -> datetime | None:
-    """Return when the first file of a run was begun; None with the fault noted."""
+    """Return when the first file of a run was elapsed; None with the fault noted."""
     moments: list[datetime] = []
     for part in parts:
         if part.export.started is None:
@@ -253,39 +259,38 @@ def _probings_table(parts: Sequence[_Part]) -> tuple[CsvTable, list[tuple[int, i
     columns |= {name: [] for name in names}
     numbered: dict[int, int] = {}
     clock: dict[int, float] = {}
-    for run in dict.fromkeys(sorted(part.entry.run for part in parts)):
-        for index, part in enumerate(parts):
-            if part.entry.run != run:
-                continue
-            count, begun = len(part.rows), numbered.get(run, 0)
-            numbered[run] = begun + count
-            columns["run"] += [str(run)] * count
-            columns["sequence"] += [str(begun + row + 1) for row in range(count)]
-            times, clock[run] = _times(part, clock.get(run, 0.0))
-            columns[TIME] += times
-            if with_setups:
-                columns[probings_file.SETUP] += [part.entry.setup or ""] * count
-            for name in names:
-                columns[name] += part.rows.cells.get(name, [""] * count)
-            places += [(index, row) for row in range(count)]
+    for index, part in sorted(enumerate(parts), key=lambda pair: pair[1].entry.run):
+        run, setup = part.entry.run, part.entry.setup or ""
+        count, before = len(part.rows), numbered.get(run, 0)
+        numbered[run] = before + count
+        columns["run"] += [str(run)] * count
+        columns["sequence"] += [str(before + row + 1) for row in range(count)]
+        times, clock[run] = _times(part, clock.get(run, 0.0))
+        columns[TIME] += times
+        if with_setups:
+            columns[probings_file.SETUP] += [setup] * count
+        for name in names:
+            # Rows that name no target are readings of their setup, as in a campaign without that column.
+            columns[name] += part.rows.cells.get(name, [setup if name == TARGET else ""] * count)
+        places += [(index, row) for row in range(count)]
     lines = range(2, len(places) + 2)
     return CsvTable(probings_file.FILE, dict(columns), lines, ()), places
 
 
-def _times(part: _Part, begun: float) -> tuple[list[str], float]:
+def _times(part: _Part, elapsed: float) -> tuple[list[str], float]:
     """Return the times of a part from the start of its run, behind the parts before it, and when the next may begin."""
     interval = part.entry.interval
     cells = part.rows.cells.get(TIME)
     if cells is None:
-        times = [repr(round(begun + row * interval, 6)) for row in range(len(part.rows))]
-        return times, begun + len(part.rows) * interval
+        times = [repr(round(elapsed + row * interval, 6)) for row in range(len(part.rows))]
+        return times, elapsed + len(part.rows) * interval
     try:
         numbers = [float(cell) for cell in cells]
     except ValueError:
-        return list(cells), begun
-    if begun == 0.0:
+        return list(cells), elapsed
+    if elapsed == 0.0:
         return list(cells), max(numbers, default=0.0) + interval
-    shift = begun - numbers[0]
+    shift = elapsed - numbers[0]
     return [repr(round(number + shift, 6)) for number in numbers], max(numbers) + shift + interval
 
 

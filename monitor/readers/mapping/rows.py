@@ -14,6 +14,7 @@ from monitor.readers.export import Export
 from monitor.readers.faults import Faults, one_of, quoted
 from monitor.readers.foreign_units import (
     Conversion,
+    ForeignUnit,
     decimal_of,
     foreign_unit,
     plain,
@@ -74,7 +75,10 @@ def rows_of(entry: Entry, file: str, export: Export, wanted: Wanted, faults: Fau
     sources = _sources(entry, file, export, wanted)
     cells: dict[str, Sequence[str]] = {}
     origins: dict[str, Origin] = {}
-    for name, source in sources.items():
+    first = [axis.column for axis in wanted.axes] + list(wanted.columns)
+    for name, source in sorted(
+        sources.items(), key=lambda pair: (pair[0] not in first, pair[0] in wanted.columns)
+    ):
         filled = _filled(entry, file, export, name, source)
         if filled is not None:
             cells[name], origins[name] = filled
@@ -107,8 +111,8 @@ def _selected(entry: Entry, file: str, export: Export, faults: Faults) -> Export
             return export
         keep &= np.array([cell.casefold() == text.casefold() for cell in export.columns[column]])
         if not keep.any():
-            there = one_of(list(dict.fromkeys(export.columns[column]))[:8])
-            table.fault(name, f"no row of {file} has {quoted(text)} there; it has {there}")
+            others = one_of(list(dict.fromkeys(export.columns[column]))[:8])
+            table.fault(name, f"no row of {file} has {quoted(text)} there; it has {others}")
             return replace(export, lines=())
     if keep.all():
         return export
@@ -161,6 +165,23 @@ def _filled(
             table.fault(name, f"{name} has no unit; leave unit out")
             return None
         return cells, Origin(column, None, f"column {column}")
+    unit = _unit_in_file(entry, file, export, name, replace(source, column=column), target)
+    if unit is None:
+        return None
+    conversion = Conversion(unit, target, source.scale, source.shift)
+    how = f"column {column} in {unit.name}" + ("" if column in export.units else " (by the mapping)")
+    if source.scale != 1:
+        how += f", times {plain(source.scale)}"
+    if source.shift:
+        how += f", plus {plain(source.shift)} {target.name}"
+    return [conversion.cell(cell) for cell in cells], Origin(column, unit.name, how)
+
+
+def _unit_in_file(
+    entry: Entry, file: str, export: Export, name: str, source: ColumnSource, target: ForeignUnit
+) -> ForeignUnit | None:
+    """Return the unit of a column of a file; None with the fault noted where nobody or two different ones state it."""
+    table, column = entry.table.section("columns"), source.column or ""
     stated = export.units.get(column)
     unit = foreign_unit(stated or source.unit or "")
     if unit is None:
@@ -184,13 +205,7 @@ def _filled(
             f"{unit_names(target.quantity)}",
         )
         return None
-    conversion = Conversion(unit, target, source.scale, source.shift)
-    how = f"column {column} in {unit.name}" + ("" if stated else " (by the mapping)")
-    if source.scale != 1:
-        how += f", times {plain(source.scale)}"
-    if source.shift:
-        how += f", plus {plain(source.shift)} {target.name}"
-    return [conversion.cell(cell) for cell in cells], Origin(column, unit.name, how)
+    return unit
 
 
 def _with_travel(
@@ -256,33 +271,8 @@ def joined(
     Rows are matched by ``target`` where both have it, else by their order. Its columns of axes go by the names that a
     campaign has for them (``x_mm``), beside columns of the export that may be called X too.
     """
-    ours = entry.columns.get(TARGET)
-    name = (
-        None
-        if ours is not None and ours.column is None
-        else matching(export, TARGET if ours is None else ours.column or "")
-    )
-    key = matching(positions, TARGET)
-    if name is not None and key is not None:
-        index = {cell: row for row, cell in enumerate(positions.columns[key])}
-        if len(index) < len(positions.lines):
-            entry.table.fault("positions", f"{positions_file} names a target twice; list each once")
-            return None
-        lacking = [cell for cell in dict.fromkeys(export.columns[name]) if cell not in index]
-        if lacking:
-            entry.table.fault(
-                "positions", f"{positions_file} has no row of {one_of(map(quoted, lacking[:5]))} of {file}"
-            )
-            return None
-        rows = [index[cell] for cell in export.columns[name]]
-    elif len(positions.lines) == len(export.lines):
-        rows = list(range(len(export.lines)))
-    else:
-        entry.table.fault(
-            "positions",
-            f"{positions_file} has {len(positions.lines)} rows and {file} {len(export.lines)}; give one row for "
-            "each, or a column target in both",
-        )
+    rows = _row_of_each(entry, file, export, positions_file, positions)
+    if rows is None:
         return None
     further: dict[str, Sequence[str]] = {}
     units: dict[str, str] = {}
@@ -299,3 +289,32 @@ def joined(
         )
         return None
     return replace(export, columns={**export.columns, **further}, units={**export.units, **units})
+
+
+def _row_of_each(
+    entry: Entry, file: str, export: Export, positions_file: str, positions: Export
+) -> list[int] | None:
+    """Return the row of the positions that belongs to each row of an export; None with the fault noted."""
+    ours = entry.columns.get(TARGET, ColumnSource(TARGET))
+    name = matching(export, ours.column or "")
+    key = matching(positions, TARGET)
+    if name is not None and key is not None:
+        index = {cell: row for row, cell in enumerate(positions.columns[key])}
+        if len(index) < len(positions.lines):
+            entry.table.fault("positions", f"{positions_file} names a target twice; list each once")
+            return None
+        lacking = [cell for cell in dict.fromkeys(export.columns[name]) if cell not in index]
+        if lacking:
+            entry.table.fault(
+                "positions", f"{positions_file} has no row of {one_of(map(quoted, lacking[:5]))} of {file}"
+            )
+            return None
+        return [index[cell] for cell in export.columns[name]]
+    if len(positions.lines) == len(export.lines):
+        return list(range(len(export.lines)))
+    entry.table.fault(
+        "positions",
+        f"{positions_file} has {len(positions.lines)} rows and {file} {len(export.lines)}; give one row for "
+        "each, or a column target in both",
+    )
+    return None

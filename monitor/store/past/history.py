@@ -103,6 +103,18 @@ class MachineHistory:
         """Start of each run in seconds since 1970 (n,)."""
         return np.array([at.timestamp() for at in self.started_at])
 
+    def own_copy(self, parameter: str | None = None) -> MachineHistory:
+        """Return the history with arrays of its own, of one parameter (none where the history lacks it) or of all."""
+        columns = [j for j, name in enumerate(self.parameters) if parameter in (None, name)]
+        return replace(
+            self,
+            parameters=tuple(self.parameters[j] for j in columns),
+            units=tuple(self.units[j] for j in columns),
+            values=np.array(self.values[:, columns], order="C"),
+            u=np.array(self.u[:, columns], order="C"),
+            conditions={name: values.copy() for name, values in self.conditions.items()},
+        )
+
     def part(self, mask: npt.NDArray[np.bool_]) -> MachineHistory:
         """The runs of a mask (n,), with all parameters, tolerances and campaigns."""
         if mask.all():
@@ -136,6 +148,22 @@ def machine_history(
     Without ``model`` that of the run's method in ``followed_by`` (name and version), else any version of the method's
     own. May hold no run. Raises NotFoundError for a machine that is not there.
     """
+    if since is None:
+        key = ("history", machine, model, version, tuple(sorted(followed_by.items())))
+        whole = db.recall(key, lambda: _read(db, machine, model, version, None, None, followed_by))
+        return whole.own_copy(parameter)
+    return _read(db, machine, model, version, parameter, since, followed_by)
+
+
+def _read(
+    db: Database,
+    machine: str,
+    model: str | None,
+    version: int | None,
+    parameter: str | None,
+    since: datetime | None,
+    followed_by: Mapping[str, tuple[str, int]],
+) -> MachineHistory:
     campaigns = campaigns_of_machine(db, machine)
     identified = _identified(db, list(campaigns), None if model is None else (model, version), followed_by)
     recorded = runs_of_campaigns(db, campaigns)
