@@ -27,7 +27,7 @@ def health_html(fleet: Fleet, machines: Iterable[MachineHealth]) -> Iterator[str
         "pages": machine_pages(machines),
         "part": 1,
         "parts": 1,
-        "close": False,
+        "setting": "",
     }
     yield from pieces_of(TEMPLATE, context)
 
@@ -35,14 +35,13 @@ def health_html(fleet: Fleet, machines: Iterable[MachineHealth]) -> Iterator[str
 def health_pdf(fleet: Fleet, machines: Sequence[MachineHealth], part: int = 1, parts: int = 1) -> bytes:
     """A part of the report as PDF, the first with the fleet table: the same bytes for the same records.
 
-    Of few machines it is set closer where the last page would else be more than half empty.
+    Of few machines it is set closer, or the last two pages alike, where the last would else be more than half empty.
     """
     context = {**fleet_context(fleet), "pages": list(machine_pages(machines)), "part": part, "parts": parts}
+    settings = ("close", "balanced") if len(machines) <= _LAID_OUT_AGAIN else ()
     return pdf_of(
-        html_of(TEMPLATE, {**context, "close": False}),
+        html_of(TEMPLATE, {**context, "setting": ""}),
         identifier=f"health {fleet.week} {fleet.made_at.isoformat()} {part}",
         moment=fleet.made_at.replace(tzinfo=UTC),
-        closer=(lambda: html_of(TEMPLATE, {**context, "close": True}))
-        if len(machines) <= _LAID_OUT_AGAIN
-        else None,
+        others=[html_of(TEMPLATE, {**context, "setting": setting}) for setting in settings],
     )

@@ -10,7 +10,7 @@ import os
 import threading
 import unicodedata
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import cache
@@ -67,12 +67,12 @@ def pdf_of(
     moment: datetime,
     extra_fonts: Sequence[Path] = (),
     attached: Sequence[Attached] = (),
-    closer: Callable[[], str] | None = None,
+    others: Sequence[str] = (),
 ) -> bytes:
     """Make the PDF/A-3u of a page. ``identifier`` and ``moment`` (with an offset) make its bytes reproducible.
 
-    ``attached`` files travel inside it, named in the catalogue's ``/AF`` once each. ``closer`` makes the same page with
-    less room between its parts: it is taken where the last page would be less than half full, and is saved by it.
+    ``attached`` files travel inside it, named in the catalogue's ``/AF`` once each. Where the last page would be
+    less than half full, the first of ``others``, the same page set otherwise, is taken that saves it or fills it.
 
     Raises InputError where the page asks for anything but our fonts and inline pictures.
     """
@@ -97,9 +97,10 @@ def pdf_of(
     try:
         with _reproducible(moment):
             document = laid_out(html)
-            if closer is not None and _ends_early(document):
-                shorter = laid_out(closer())
-                document = shorter if len(shorter.pages) < len(document.pages) else document
+            if others and _ends_early(document):
+                count = len(document.pages)
+                settings = (laid_out(other) for other in others)
+                document = next((it for it in settings if _is_better(it, count)), document)
             return bytes(
                 document.write_pdf(finisher=_each_once, pdf_identifier=identifier.encode("utf-8"), **options)
             )
@@ -111,6 +112,10 @@ def _ends_early(document: Document) -> bool:
     """Whether the last of several pages is less than half full: what has the id ``end`` is in its upper half."""
     last = document.pages[-1]
     return len(document.pages) > 1 and "end" in last.anchors and last.anchors["end"][1] < 0.5 * last.height
+
+
+def _is_better(document: Document, count: int) -> bool:
+    return len(document.pages) < count or (len(document.pages) == count and not _ends_early(document))
 
 
 def certificate_html(record: CertificateRecord, extra_fonts: Sequence[Path] = ()) -> str:
