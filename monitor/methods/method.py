@@ -136,11 +136,19 @@ class PlannedTest(Protocol):
     """A test that could be made: its setup, the positions (m, J) of the joints, whether the campaign has it."""
 
     @property
-    def setup(self) -> Setup: ...
+    def setup(self) -> Setup:
+        """Return the setup."""
+        ...
+
     @property
-    def positions(self) -> Array: ...
+    def positions(self) -> Array:
+        """Return the positions (m, J) of the joints, mm and rad."""
+        ...
+
     @property
-    def available(self) -> bool: ...
+    def available(self) -> bool:
+        """Whether the campaign has the instrument."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ def tables(answer: InstrumentPlanAnswer) -> None:
     """Which instrument next, and where; the proposed tests in turn; what would see what has no number yet."""
     shown = answer.asked[:4]
     columns = ["test", *(f"u {name}" for name in shown), "where"]
-    now = ["as measured", *(_u(answer.present.get(name)) for name in shown), ""]
+    as_measured = ["as measured", *(_u(answer.present.get(name)) for name in shown), ""]
     rows = [[_name(test), *(_u(test.u.get(name)) for name in shown), where(test)] for test in answer.tests]
     units = ", ".join(f"{name} in {answer.units[name]}" for name in shown)
     further = len(answer.asked) - len(shown)
@@ -18,7 +18,7 @@ def tables(answer: InstrumentPlanAnswer) -> None:
     output.table(
         f"{answer.campaign}, run {answer.run}: u with one more test ({units}{more})",
         columns,
-        [now, *rows],
+        [as_measured, *rows],
         text_columns=1,
     )
     if any(not test.available for test in answer.tests):
@@ -43,10 +43,10 @@ def where(test: TestAnswer) -> str:
     for column, (low, high) in test.axes.items():
         axis, unit = column.upper().rpartition("_")[0], "°" if column.endswith("_deg") else " mm"
         parts.append(f"{axis} {low:g}{unit}" if low == high else f"{axis} {low:g} to {high:g}{unit}")
-    words = f"{test.poses} poses, {', '.join(parts)}"
+    sentence = f"{test.poses} poses, {', '.join(parts)}"
     if test.work_point_mm is not None:
-        words += f"; work point {', '.join(f'{value:g}' for value in test.work_point_mm)} mm"
-    return words
+        sentence += f"; work point {', '.join(f'{value:g}' for value in test.work_point_mm)} mm"
+    return sentence
 
 
 def _name(test: TestAnswer) -> str:

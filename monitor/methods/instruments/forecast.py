@@ -83,12 +83,12 @@ class InstrumentForecast:
     @cached_property
     def tests(self) -> tuple[CandidateTest, ...]:
         """Tests of the campaign's own instruments, then of usual ones that it does not have."""
-        own = self.problem.setups
-        have = {(setup.reading, setup.direction) for setup in own}
-        point = next((setup.tool_point for setup in own if any(setup.tool_point)), (0.0, 0.0, 0.0))
+        owned = self.problem.setups
+        have = {(setup.reading, setup.direction) for setup in owned}
+        point = next((setup.tool_point for setup in owned if any(setup.tool_point)), (0.0, 0.0, 0.0))
         others = [setup for setup in usual_instruments(point) if (setup.reading, setup.direction) not in have]
         return (
-            *self.workspace.tests(own, available=True),
+            *self.workspace.tests(owned, available=True),
             *self.workspace.tests(others, available=False),
         )
 
@@ -183,10 +183,10 @@ def _information(problem: InstrumentProblem) -> _Information:
     at = replace(problem, is_whole=True).linearise(problem.start, problem.common_start)
     count = len(problem.base_names)
     wanted = np.hstack([at.local[0, :, :count], at.common[0]])
-    own = at.local[0, :, count:]
-    scale = np.linalg.norm(own, axis=0)
+    by_own = at.local[0, :, count:]
+    scale = np.linalg.norm(by_own, axis=0)
     scale[scale == 0.0] = 1.0
-    vectors, strength, _ = np.linalg.svd(own / scale, full_matrices=False)
+    vectors, strength, _ = np.linalg.svd(by_own / scale, full_matrices=False)
     basis = vectors[:, strength > RANK_TOLERANCE * strength.max(initial=0.0)]
     size = np.linalg.norm(wanted, axis=0)
     wanted = wanted - basis @ (basis.T @ wanted)

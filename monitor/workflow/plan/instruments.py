@@ -39,8 +39,8 @@ def plan_instruments(
     present, expected = forecast.present(), tuple(forecast.expected())
     asked = _asked(request, present, expected)
     internal = {name: forecast.unit_of(name).to_internal(u) for name, u in request.wanted.items()}
-    chosen = _in_turn(forecast, expected, asked, count or (MOST_TESTS if internal else 0), internal)
-    _refuse_unreached(request, present, chosen, internal)
+    in_turn = _in_turn(forecast, expected, asked, count or (MOST_TESTS if internal else 0), internal)
+    _refuse_unreached(request, present, in_turn, internal)
     joints = chain_of(campaign.machine).joints
     ranked = _best_of_setups(expected, asked)[:LISTED]
     return InstrumentPlanAnswer(
@@ -53,7 +53,7 @@ def plan_instruments(
         units={name: forecast.unit_of(name).name for name in _names(present, expected)},
         present=_shown(forecast, present),
         tests=tuple(_answer(forecast, test, joints) for test in ranked),
-        proposed=tuple(_answer(forecast, test, joints) for test in chosen),
+        proposed=tuple(_answer(forecast, test, joints) for test in in_turn),
         unseen=unseen(forecast, joints, present, expected),
         standing=tuple(joint.name for joint in joints if _stands(campaign, joint)),
     )
@@ -77,11 +77,11 @@ def _count(request: PlanRequest) -> int:
 def _refuse_unreached(
     request: PlanRequest,
     present: Mapping[str, float],
-    chosen: Sequence[ExpectedTest],
+    in_turn: Sequence[ExpectedTest],
     limits: Mapping[str, float],
 ) -> None:
     """InputError where the wanted uncertainties are not reached."""
-    if limits and not _reached(chosen[-1].u if chosen else present, limits):
+    if limits and not _reached(in_turn[-1].u if in_turn else present, limits):
         raise InputError(
             f"no {MOST_TESTS} tests reach {', '.join(f'{name}={u:g}' for name, u in request.wanted.items())}; "
             "ask for more modest uncertainties, or repeat tests in several runs"
@@ -167,8 +167,8 @@ def _asked(
 def _rank(u: Mapping[str, float], asked: Sequence[str]) -> tuple[int, float]:
     """How many of the asked parameters have no number, and the mean logarithm of the u of the others."""
     values = np.array([u.get(name, np.nan) for name in asked])
-    seen = np.isfinite(values)
-    return int(np.sum(~seen)), float(np.log(values[seen]).mean()) if seen.any() else 0.0
+    is_seen = np.isfinite(values)
+    return int(np.sum(~is_seen)), float(np.log(values[is_seen]).mean()) if is_seen.any() else 0.0
 
 
 def _best_of_setups(expected: Sequence[ExpectedTest], asked: Sequence[str]) -> list[ExpectedTest]:
@@ -188,19 +188,19 @@ def _in_turn(
 ) -> list[ExpectedTest]:
     """The best next test, the best after it, and so on, of the campaign's own instruments where it has some; up to
     ``count``, or until the ``wanted`` uncertainties are reached."""
-    own = [test for test in expected if test.test.available] or list(expected)
-    chosen: list[ExpectedTest] = []
+    candidates = [test for test in expected if test.test.available] or list(expected)
+    in_turn: list[ExpectedTest] = []
     for _ in range(count):
-        if wanted and chosen and _reached(chosen[-1].u, wanted):
+        if wanted and in_turn and _reached(in_turn[-1].u, wanted):
             break
-        before = [test.test for test in chosen]
-        chosen.append(
+        before = [test.test for test in in_turn]
+        in_turn.append(
             min(
-                (forecast.together([*before, test.test]) for test in own),
+                (forecast.together([*before, test.test]) for test in candidates),
                 key=lambda test: _rank(test.u, asked),
             )
         )
-    return chosen
+    return in_turn
 
 
 def _reached(u: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
